@@ -1,0 +1,37 @@
+"""Bottles on industrial conveyors, simulated by force and recorded like a real line.
+
+A scene file (YAML) says which belts, rails, bottles, infeeds and outfeeds there are. `load_scene` checks it,
+`Simulation` turns it into compiled kernels and advances it by whole ticks:
+
+    from conveyor_sim import Simulation, load_scene
+    simulation = Simulation(load_scene("config/two_bottles.yaml"))
+    simulation.advance(100)
+    print(simulation.bottles().x)
+
+The same simulation runs as a ROS 2 node (`sim_node`) or without ROS (`conveyor-sim run`), into the same bags.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from conveyor_sim.version import __version__
+
+if TYPE_CHECKING:
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.simulation import Simulation
+
+__all__ = ["Simulation", "__version__", "load_scene"]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the two entry points when they are first asked for, so that importing the package stays cheap."""
+    if name == "Simulation":
+        from conveyor_sim.simulation import Simulation
+
+        return Simulation
+    if name == "load_scene":
+        from conveyor_sim.scene import load_scene
+
+        return load_scene
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

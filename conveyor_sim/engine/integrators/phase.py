@@ -1,0 +1,3 @@
+"""Where in a tick an integrator is called."""
+
+START, RESUME = 0, 1

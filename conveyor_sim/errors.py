@@ -1,0 +1,21 @@
+"""What can go wrong, one class a cause; every message is a sentence meant for the user."""
+
+
+class ConveyorError(Exception):
+    """Base of all errors that conveyor_sim raises on purpose."""
+
+
+class SceneError(ConveyorError):
+    """A scene file that can't be: one line per problem, with file, line, field, value and what was expected."""
+
+
+class CommandError(ConveyorError):
+    """A command that names what is not there, or asks for what can't be."""
+
+
+class BagError(ConveyorError):
+    """A recording that can't be written, read, recovered or replayed."""
+
+
+class SimulationError(ConveyorError):
+    """A simulation that can't go on."""

@@ -1,0 +1,1 @@
+"""What surrounds the physics on a line: the process image, supply and removal, watchdogs. All work at ticks."""

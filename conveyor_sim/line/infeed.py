@@ -1,0 +1,124 @@
+"""Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate; never onto another bottle."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from conveyor_sim.scene.schema import Infeed
+from conveyor_sim.state import State
+
+CLEAR = 1e-9
+"""m; bottles one gap of 0 apart touch, and rounding must not block them."""
+
+LATE = 2.0
+"""Of the time a bottle takes to enter from a moving in-line: after that without one, the infeed is blocked."""
+
+
+@dataclass
+class InfeedState:
+    """One infeed while it runs."""
+
+    infeed: Infeed
+    kind: int
+    """Index of the bottle type."""
+    random: np.random.Generator
+    fed: int = 0
+    blocked: bool = False
+    blocked_ticks: int = 0
+    last: int = -1
+    """Id of the bottle fed last."""
+    due: float = 0.0
+    """s: when the next bottle is due (rate), or when the last one entered (gap)."""
+    extra: float = 0.0
+    """m or s, jitter of the next bottle's place in the in-line."""
+    offset: float = 0.0
+    """m, lateral jitter of the next bottle."""
+    direction: tuple[float, float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.direction = (math.cos(self.infeed.direction), math.sin(self.infeed.direction))
+        self.due = self.infeed.start
+        self._draw()
+
+    def feed(self, state: State, time: float, tick: float) -> None:
+        """Let in what is due at `time` (s); `tick` is the time since the last call (s)."""
+        if time < self.infeed.start:
+            return
+        entered = True
+        self.blocked = False
+        while entered and not self._empty():
+            entered = self._feed_packed(state, time, tick) if self.infeed.gap is not None else self._feed_rate(state, time)
+        self.blocked_ticks += self.blocked
+
+    def _empty(self) -> bool:
+        return self.infeed.count is not None and self.fed >= self.infeed.count
+
+    def _feed_packed(self, state: State, time: float, tick: float) -> bool:
+        """The in-line moves with its last bottle: the next one enters a pitch behind it."""
+        pitch = 2.0 * float(state.model.type_radius[self.kind]) + (self.infeed.gap or 0.0)
+        advance = self.infeed.speed * tick
+        ahead = 0.0
+        previous = np.flatnonzero(state.world.bottles.id == self.last) if self.last >= 0 else ()
+        if len(previous):
+            x, y = state.world.bottles.x[previous[0]], state.world.bottles.y[previous[0]]
+            progress = (x - self.infeed.position[0]) * self.direction[0] + (y - self.infeed.position[1]) * self.direction[1]
+            ahead = progress - pitch - self.extra * self.infeed.speed
+            if ahead < 0.0:
+                self.blocked = self._late(time, pitch)
+                return False
+            # Past one tick's travel the last bottle no longer pulls the in-line behind it.
+            ahead = min(ahead, advance)
+        if not self._enter(state, ahead):
+            self.blocked = self._late(time, pitch)
+            return False
+        self.due = time
+        return True
+
+    def _late(self, time: float, pitch: float) -> bool:
+        if self.infeed.speed == 0.0:
+            return self.fed > 0
+        return time - self.due > LATE * (pitch / self.infeed.speed + self.extra)
+
+    def _feed_rate(self, state: State, time: float) -> bool:
+        rate = self.infeed.rate or 0.0
+        if time < self.due + self.extra:
+            return False
+        if not self._enter(state, 0.0):
+            self.blocked = True
+            return False
+        # A bottle that had to wait shifts the ones behind it: a line does not catch up by itself.
+        self.due = max(self.due + 1.0 / rate, time - abs(self.infeed.timing_jitter))
+        return True
+
+    def _enter(self, state: State, ahead: float) -> bool:
+        along, across = self.direction, (-self.direction[1], self.direction[0])
+        x = self.infeed.position[0] + ahead * along[0] + self.offset * across[0]
+        y = self.infeed.position[1] + ahead * along[1] + self.offset * across[1]
+        bottles = state.world.bottles
+        reach = bottles.radius + float(state.model.type_radius[self.kind]) - CLEAR
+        near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < reach**2
+        if bool((near & (bottles.id >= 0)).any()):
+            return False
+        speed = self.infeed.speed
+        self.last = state.add(self.kind, x, y, 0.0, speed * along[0], speed * along[1], 0.0)
+        self.fed += 1
+        self._draw()
+        return True
+
+    def _draw(self) -> None:
+        """Jitter of the next bottle. Packed bottles can only be late; timed ones may be early too."""
+        timing, lateral = self.infeed.timing_jitter, self.infeed.lateral_jitter
+        if timing:
+            self.extra = float(self.random.uniform(0.0 if self.infeed.gap is not None else -timing, timing))
+        if lateral:
+            self.offset = float(self.random.uniform(-lateral, lateral))
+
+
+def infeed_states(infeeds: dict[str, Infeed], bottle_types: tuple[str, ...], seed: int) -> dict[str, InfeedState]:
+    """One state an infeed, each with a random stream of its own drawn from the scene's seed."""
+    streams = np.random.SeedSequence(seed).spawn(len(infeeds))
+    return {
+        name: InfeedState(infeed, bottle_types.index(infeed.bottle), np.random.Generator(np.random.PCG64(stream)))
+        for (name, infeed), stream in zip(infeeds.items(), streams, strict=True)
+    }

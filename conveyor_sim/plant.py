@@ -1,0 +1,157 @@
+"""The plant as constant arrays for the engine: rail pieces with their joints, belts, the static grid."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays import F8, Arcs, Belts, Ends, Sectors, Segments, StaticGrid
+from conveyor_sim.engine.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
+from conveyor_sim.engine.static_grid import build_static_grid
+from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
+from conveyor_sim.surfaces import Joints, find_joints
+
+STRAIGHT = -1
+
+
+def reach_code(span: float) -> int:
+    """How the engine tells angles inside a span from those outside (engine/sector.py)."""
+    if is_full_turn(span):
+        return FULL_CIRCLE
+    return UP_TO_HALF if span <= math.pi else BEYOND_HALF
+
+
+def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[Segments | None, Arcs | None]:
+    """Straight and arc pieces of all rails, joined into surfaces; None for the kind that is absent."""
+    pieces = [(piece, index) for index, rail in enumerate(rails) for piece in rail.pieces]
+    pieces.sort(key=lambda entry: isinstance(entry[0], ArcPiece))
+    if not pieces:
+        return None, None
+    joints = find_joints(
+        np.array([piece.ends for piece, _ in pieces]), np.array([_inward(piece) for piece, _ in pieces])
+    )
+    straight = sum(isinstance(piece, SegmentPiece) for piece, _ in pieces)
+    rail = np.array([index for _, index in pieces], dtype=np.uint32)
+    material = np.array([materials.index(rails[index].material) for _, index in pieces], dtype=np.uint32)
+    first, rest = slice(0, straight), slice(straight, len(pieces))
+    segments = arcs = None
+    if straight:
+        lines = [piece for piece, _ in pieces if isinstance(piece, SegmentPiece)]
+        start, end = np.array([line.p1 for line in lines]), np.array([line.p2 for line in lines])
+        length = np.hypot(*(end - start).T)
+        tangent = (end - start) / length[:, None]
+        segments = Segments(
+            *_columns(start, tangent), length, _ends(start, end, joints, first),
+            material[first], rail[first], joints.surface[first],
+        )  # fmt: skip
+    if straight < len(pieces):
+        curves = [piece for piece, _ in pieces if isinstance(piece, ArcPiece)]
+        spans = [(curve.start_angle, curve.span) for curve in curves]
+        arcs = Arcs(
+            *_columns(np.array([curve.centre for curve in curves])),
+            np.array([curve.radius for curve in curves]),
+            *_span_vectors(spans),
+            np.array([reach_code(span) for _, span in spans], dtype=np.int8),
+            _ends(*np.array([curve.ends for curve in curves]).transpose(1, 0, 2), joints, rest),
+            material[rest], rail[rest], joints.surface[rest],
+        )  # fmt: skip
+    return segments, arcs
+
+
+def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Belts | None:
+    """Where belts lie, with room for what each of `slots` bottles stands on; None without belts."""
+    if not shapes:
+        return None
+    curved = [shape.kind == "curved" for shape in shapes]
+    sectors = None
+    if any(curved):
+        sectors = Sectors(
+            *_columns(np.array([shape.centre for shape in shapes])),
+            np.array([shape.inner_radius for shape in shapes]),
+            np.array([shape.inner_radius + shape.width for shape in shapes]),
+            *_span_vectors([(shape.start_angle, shape.span) for shape in shapes]),
+            np.array([reach_code(shape.span) if is_curved else STRAIGHT
+                      for shape, is_curved in zip(shapes, curved, strict=True)], dtype=np.int8),
+        )  # fmt: skip
+    angle = np.array([shape.angle for shape in shapes])
+    return Belts(
+        *_columns(np.array([shape.corner for shape in shapes])),
+        np.cos(angle),
+        np.sin(angle),
+        np.array([shape.length for shape in shapes]),
+        np.array([shape.width for shape in shapes]),
+        sectors,
+        np.full(slots, len(shapes), dtype=np.int32),
+        np.zeros(slots + 1, dtype=np.uint32),
+        np.zeros(candidates, dtype=np.uint32),
+    )
+
+
+def plant_grid(
+    rails: Sequence[RailShape], belts: Sequence[BeltShape], largest_radius: float, skin: float
+) -> StaticGrid | None:
+    """The static grid over all rails and belts; None if there are none."""
+    if not rails and not belts:
+        return None
+    pieces = [piece for rail in rails for piece in rail.pieces]
+    return build_static_grid(
+        _boxes([piece.points(2) for piece in pieces if isinstance(piece, SegmentPiece)]),
+        _boxes([_arc_extremes(piece) for piece in pieces if isinstance(piece, ArcPiece)]),
+        _boxes([_belt_extremes(shape) for shape in belts]),
+        rail_reach=largest_radius + skin,
+        belt_reach=skin,
+        cell=4.0 * largest_radius,
+    )
+
+
+def _columns(*points: F8) -> tuple[F8, ...]:
+    return tuple(np.ascontiguousarray(column) for group in points for column in group.T)
+
+
+def _span_vectors(spans: Sequence[tuple[float, float]]) -> tuple[F8, F8, F8, F8]:
+    start = np.array([angle for angle, _ in spans])
+    end = np.array([angle + span for angle, span in spans])
+    return np.cos(start), np.sin(start), np.cos(end), np.sin(end)
+
+
+def _ends(start: F8, end: F8, joints: Joints, part: slice) -> Ends:
+    return Ends(
+        np.column_stack([start[:, 0], end[:, 0]]),
+        np.column_stack([start[:, 1], end[:, 1]]),
+        joints.code[part],
+        np.ascontiguousarray(joints.neighbour[part, :, 0]),
+        np.ascontiguousarray(joints.neighbour[part, :, 1]),
+    )
+
+
+def _inward(piece: Piece) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Unit vectors from each end into the piece."""
+    if isinstance(piece, SegmentPiece):
+        dx, dy = piece.p2[0] - piece.p1[0], piece.p2[1] - piece.p1[1]
+        length = math.hypot(dx, dy)
+        return (dx / length, dy / length), (-dx / length, -dy / length)
+    start, end = piece.start_angle, piece.start_angle + piece.span
+    return (-math.sin(start), math.cos(start)), (math.sin(end), -math.cos(end))
+
+
+def _arc_extremes(piece: ArcPiece) -> F8:
+    """Points whose box holds the arc: its ends and where it crosses the axes through its centre."""
+    first = math.ceil(piece.start_angle / (math.pi / 2))
+    last = math.floor((piece.start_angle + piece.span) / (math.pi / 2))
+    angle = np.array([piece.start_angle, piece.start_angle + piece.span, *(np.arange(first, last + 1) * math.pi / 2)])
+    return np.column_stack([piece.centre[0] + piece.radius * np.cos(angle), piece.centre[1] + piece.radius * np.sin(angle)])
+
+
+def _belt_extremes(shape: BeltShape) -> F8:
+    if shape.kind == "straight":
+        return shape.outline()
+    outer = ArcPiece(shape.centre, shape.inner_radius + shape.width, shape.start_angle, shape.span)
+    inner = ArcPiece(shape.centre, shape.inner_radius, shape.start_angle, shape.span)
+    return np.concatenate([_arc_extremes(outer), _arc_extremes(inner)])
+
+
+def _boxes(groups: Sequence[NDArray[np.float64]]) -> F8:
+    if not groups:
+        return np.empty((0, 4))
+    return np.array([[*points.min(axis=0), *points.max(axis=0)] for points in groups])

@@ -1,0 +1,52 @@
+"""Tells how far a run is: a bar on a terminal, a plain line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import AbstractContextManager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+PLAIN_SHARE = 0.1
+"""Where there is no terminal: a line whenever this share of the whole has been done."""
+
+
+class ProgressBar(AbstractContextManager["ProgressBar"]):
+    """Progress in simulated time, with the real-time factor so far. `total` in s, simulated."""
+
+    def __init__(self, what: str, total: float, console: Console | None = None) -> None:
+        self._what = what
+        self._total = total
+        self._console = console or Console(file=sys.stderr)
+        self._start = time.monotonic()
+        self._next_line = PLAIN_SHARE * total
+        self._bar: Progress | None = None
+        if self._console.is_terminal:
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(bar_width=None),
+                TaskProgressColumn(),
+                TextColumn("{task.fields[state]}"),
+                TimeRemainingColumn(),
+            )
+            self._bar = Progress(*columns, console=self._console)
+            self._task = self._bar.add_task(what, total=total, state="")
+            self._bar.start()
+
+    def update(self, done: float) -> None:
+        """`done`: simulated time so far, s."""
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done, state=self._state(done))
+        elif done >= self._next_line:
+            self._next_line += PLAIN_SHARE * self._total
+            self._console.print(f"{self._what}: {self._state(done)}", highlight=False)
+
+    def _state(self, done: float) -> str:
+        wall = max(time.monotonic() - self._start, 1e-9)
+        return f"{done:.1f} of {self._total:.1f} s, {done / wall:.3g} x real time"
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()

@@ -1,0 +1,51 @@
+"""Where the files that ship beside the code are: the scenes (config/) and the message definitions (msg_defs/)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from conveyor_sim.errors import ConveyorError, SceneError
+
+
+@lru_cache(maxsize=1)
+def share_dir() -> Path:
+    """The folder that holds config/ and msg_defs/: the checkout, or share/conveyor_sim of the prefix of an
+    installation (pip puts it in the environment's prefix, colcon in the package's).
+
+    Raises ConveyorError if neither is there.
+    """
+    for parent in Path(__file__).resolve().parents:
+        for candidate in (parent, parent / "share" / "conveyor_sim"):
+            if (candidate / "config").is_dir() and (candidate / "msg_defs" / "msg").is_dir():
+                return candidate
+    raise ConveyorError(
+        f"{Path(__file__).parent}: the folders config and msg_defs were not installed with conveyor_sim; "
+        "expected them in share/conveyor_sim of the same prefix"
+    )
+
+
+def config_dir() -> Path:
+    """The folder of the scenes that ship with conveyor_sim."""
+    return share_dir() / "config"
+
+
+def msg_defs_dir() -> Path:
+    """The folder whose msg/ and srv/ define the package conveyor_msgs."""
+    return share_dir() / "msg_defs"
+
+
+def scene_path(name_or_path: str | Path) -> Path:
+    """The scene file meant by a path, or by the name of a shipped scene, with or without `.yaml` or `config/`.
+
+    A file where the caller stands wins over a shipped one. Raises SceneError if there is neither.
+    """
+    path = Path(name_or_path).expanduser()
+    if path.is_file():
+        return path
+    name = path.name if path.suffix else f"{path.name}.yaml"
+    shipped = config_dir() / name
+    if path.parent in (Path("."), Path("config")) and shipped.is_file():
+        return shipped
+    names = ", ".join(sorted(scene.stem for scene in config_dir().glob("*.yaml")))
+    raise SceneError(f"{name_or_path}: no such scene file; expected a path, or the name of a shipped scene ({names})")

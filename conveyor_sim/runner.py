@@ -1,0 +1,73 @@
+"""Runs a scene without ROS, as fast as it goes, into the same bag that the node records."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Run:
+    """What `run_scene` did."""
+
+    bag: Path | None
+    simulated: float
+    """s"""
+    wall: float
+    """s, from the first tick to the end of the recording; building the model and compiling are not in it."""
+    interrupted: bool
+    """Ended early by Ctrl-C or a request to terminate."""
+
+
+def run_scene(scene: Scene, bag: Path | None, progress: Callable[[float], None] | None = None) -> Run:
+    """Runs a scene for its duration and records it to the folder `bag`, if given.
+
+    progress(simulated time, s) is told after every tick. Ctrl-C ends the run at the next tick, with a whole bag.
+    Raises SceneError, SimulationError, and BagError if the recording can't be written.
+    """
+    simulation = Simulation(scene)
+    recorder = Recorder(bag) if bag is not None else None
+    with recorder or nullcontext(), _stop_request() as stop:
+        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        outputs.start()
+        start = time.monotonic()
+        while simulation.tick < scene.duration_ticks and not stop.is_set():
+            simulation.advance(1)
+            outputs.after_tick()
+            if progress is not None:
+                progress(simulation.time)
+        if recorder is not None:
+            recorder.close()
+        wall = time.monotonic() - start
+        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set())
+
+
+@contextmanager
+def _stop_request() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and SIGTERM set; a KeyboardInterrupt could strike in the middle of a write."""
+    stop = threading.Event()
+
+    def request(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield stop  # signals are only the main thread's to handle
+        return
+    before = {number: signal.signal(number, request) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,244 @@
+"""`Simulation`: the one class that the node, the command line and the tests drive."""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from conveyor_sim.engine.base import note_carriers
+from conveyor_sim.engine.contact_list import list_contacts
+from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.line.commands import CommandOutcome, refusal
+from conveyor_sim.line.infeed import infeed_states
+from conveyor_sim.line.outfeed import outfeed_states
+from conveyor_sim.line.process_image import ProcessImage, speed_command
+from conveyor_sim.line.watchdog import Watchdog
+from conveyor_sim.model import build_model
+from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.state import State
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Bottles so far."""
+
+    fed: int
+    """Entered through infeeds."""
+    removed: int
+    """Left through outfeeds."""
+    present: int
+    blocked_ticks: int
+    """Ticks at which an infeed had a bottle to feed and no room."""
+
+
+class Simulation:
+    """A scene in motion. Time passes in whole ticks only; commands act and observations are made between them.
+
+    The same scene and the same commands at the same ticks give the same bits, however the ticks are divided into calls
+    of `advance` and whoever observes. Raises SceneError for a scene that can't be.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.model = build_model(scene)
+        self.tick = 0
+        self._state = State(self.model)
+        self._advance = INTEGRATORS[self.model.integrator]
+        self._every = {output: scene.every(output) for output in scene.TOPICS}
+        self._pending: list[tuple[tuple[str, ...], tuple[float, ...], str]] = []
+        self._outcomes: list[CommandOutcome] = []
+        belts = list(scene.belts.values())
+        self._commanded = np.array([belt.speed for belt in belts])
+        self._actual = self._commanded.copy()
+        self._centre_radius = np.array(
+            [shape.centre_radius if shape.kind == "curved" else math.inf for shape in self.model.belt_shapes]
+        )
+        self._watchdogs = {
+            index: Watchdog(max(1, math.ceil(belt.watchdog / scene.tick - 1e-9)))
+            for index, belt in enumerate(belts)
+            if belt.watchdog is not None
+        }
+        self._infeeds = infeed_states(scene.infeeds, self.model.bottle_types, scene.seed)
+        self._outfeeds = outfeed_states(scene.outfeeds)
+        for kind, x, y, theta, vx, vy, omega in initial_bottles(scene):
+            self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
+        self._feed()
+        self._state.make_lists()
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.tick * self.model.tick_ns * 1e-9
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulated time for message headers, ns: 1 at tick 0, for ROS reads 0 as unset."""
+        return max(1, self.tick * self.model.tick_ns)
+
+    @property
+    def process_image(self) -> ProcessImage:
+        """Names, units and limits of signals and commands."""
+        return self.model.process_image
+
+    @property
+    def counts(self) -> Counts:
+        """Bottles fed, removed and present."""
+        return Counts(
+            fed=sum(infeed.fed for infeed in self._infeeds.values()),
+            removed=sum(outfeed.removed for outfeed in self._outfeeds.values()),
+            present=int((self._state.world.bottles.id >= 0).sum()),
+            blocked_ticks=sum(infeed.blocked_ticks for infeed in self._infeeds.values()),
+        )
+
+    def advance(self, ticks: int = 1) -> None:
+        """Let `ticks` ticks pass. Raises SimulationError if the state is no longer finite."""
+        for _ in range(ticks):
+            self._apply_commands()
+            if self.due("bottles"):
+                self._state.world.peaks.force[:] = 0.0
+                self._state.world.peaks.impulse[:] = 0.0
+            self._integrate()
+            self.tick += 1
+            for outfeed in self._outfeeds.values():
+                outfeed.take(self._state)
+            self._feed()
+            self._state.make_lists()
+
+    def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
+        """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together."""
+        self._pending.append((tuple(names), tuple(float(value) for value in values), source))
+
+    def take_outcomes(self) -> list[CommandOutcome]:
+        """What became of commands since the last call, in order."""
+        outcomes, self._outcomes = self._outcomes, []
+        return outcomes
+
+    def due(self, output: str) -> bool:
+        """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""
+        every = self._every[output]
+        return every > 0 and self.tick % every == 0
+
+    def bottles(self) -> BottleColumns:
+        """Every bottle present, ordered by id."""
+        world = self._state.world
+        slots = self._slots()
+        rest = np.zeros(slots.size)
+        spin = world.spin
+        return BottleColumns(
+            id=world.bottles.id[slots].astype(np.uint64),
+            type=world.bottles.type[slots].astype(np.uint16),
+            x=world.bottles.x[slots],
+            y=world.bottles.y[slots],
+            theta=spin.theta[slots] if spin is not None else rest,
+            vx=world.bottles.vx[slots],
+            vy=world.bottles.vy[slots],
+            omega=spin.omega[slots] if spin is not None else rest,
+            belt=self._carriers()[slots],
+            peak_force=world.peaks.force[slots],
+            impulse=world.peaks.impulse[slots],
+        )
+
+    def contacts(self) -> ContactColumns:
+        """Every closed contact at this tick, with the forces that act now."""
+        room = 64
+        while True:
+            kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
+            count = list_contacts(self._state.world, kind, ends[0], ends[1], values)
+            if count <= room:
+                break
+            room = count
+        ids = self._state.world.bottles.id
+        kind, ends, values = kind[:count], ends[:, :count], values[:, :count]
+        b = np.where(kind == 0, ids[np.where(kind == 0, ends[1], 0)], ends[1])
+        return ContactColumns(kind, ids[ends[0]].astype(np.uint64), b.astype(np.uint64), *values)
+
+    def belts(self) -> BeltColumns:
+        """Commanded and actual speeds, m/s."""
+        return BeltColumns(self._commanded.copy(), self._actual.copy())
+
+    def signals(self) -> np.ndarray:
+        """The process image's values, in the order of `process_image.signal_names`; float64."""
+        belts = len(self.model.belts)
+        on_belts = np.bincount(self._carriers()[self._slots()] + 1, minlength=belts + 1)[1:]
+        supply = [value for infeed in self._infeeds.values() for value in (infeed.fed, infeed.blocked)]
+        removed = [outfeed.removed for outfeed in self._outfeeds.values()]
+        return np.concatenate([self._actual, on_belts, supply, removed]).astype(np.float64)
+
+    def state_hash(self) -> int:
+        """64 bits over tick, bottles and belts: equal if and (all but surely) only if the states are."""
+        bottles = self.bottles()
+        digest = hashlib.blake2b(np.int64(self.tick).tobytes(), digest_size=8)
+        for name in ("id", "type", "x", "y", "theta", "vx", "vy", "omega"):
+            digest.update(getattr(bottles, name).tobytes())
+        digest.update(self._commanded.tobytes() + self._actual.tobytes())
+        return int.from_bytes(digest.digest(), "little")
+
+    def _slots(self) -> np.ndarray:
+        ids = self._state.world.bottles.id
+        slots = np.flatnonzero(ids >= 0)
+        return slots[np.argsort(ids[slots], kind="stable")]
+
+    def _carriers(self) -> np.ndarray:
+        """Belt under each slot now, -1 for the floor."""
+        world = self._state.world
+        if world.surface is None:
+            return np.full(world.bottles.id.size, -1, dtype=np.int32)
+        note_carriers(world.bottles, world.belts, world.surface)
+        return np.where(world.surface.carrier == len(self.model.belts), -1, world.surface.carrier).astype(np.int32)
+
+    def _feed(self) -> None:
+        for infeed in self._infeeds.values():
+            infeed.feed(self._state, self.time, self.scene.tick)
+
+    def _apply_commands(self) -> None:
+        pending, self._pending = self._pending, []
+        for names, values, source in pending:
+            reason = refusal(self.process_image, names, values)
+            if not reason:
+                for name, value in zip(names, values, strict=True):
+                    index = self.process_image.command_names.index(name)
+                    self._commanded[index] = value
+                    if index in self._watchdogs:
+                        self._watchdogs[index].command(self.tick)
+            self._outcomes.append(CommandOutcome(self.tick, source, names, values, not reason, reason))
+        for index, watchdog in self._watchdogs.items():
+            if watchdog.trips(self.tick):
+                self._commanded[index] = 0.0
+                name = speed_command(self.model.belts[index])
+                self._outcomes.append(CommandOutcome(self.tick, "watchdog", (name,), (0.0,), True, ""))
+        self._actual[:] = self._commanded
+        self._set_surfaces()
+
+    def _set_surfaces(self) -> None:
+        surface = self._state.world.surface
+        if surface is None or not self.model.belts:
+            return
+        for index, shape in enumerate(self.model.belt_shapes):
+            speed = self._actual[index]
+            if shape.kind == "straight":
+                surface.ux[index] = speed * math.cos(shape.angle)
+                surface.uy[index] = speed * math.sin(shape.angle)
+            elif surface.turn is not None:
+                surface.turn[index] = speed / self._centre_radius[index]
+
+    def _integrate(self) -> None:
+        """One tick in whole steps; a list that turned out too short is grown within it, without a trace."""
+        done, phase, steps = 0, START, self.model.steps_per_tick
+        while True:
+            done += self._advance(self._state.world, steps - done, self.model.dt, phase)
+            if not self._state.world.neighbourhood.stale[0]:
+                break
+            self._state.make_lists()
+            phase = RESUME
+        bottles = self._state.world.bottles
+        if not math.isfinite(bottles.x.sum() + bottles.y.sum() + bottles.vx.sum() + bottles.vy.sum()):
+            bad = ~np.isfinite(bottles.x + bottles.y + bottles.vx + bottles.vy)
+            raise SimulationError(
+                f"bottle {bottles.id[bad].min()} has no finite position or velocity after the tick from {self.time:g} s: "
+                f"dt = {self.model.dt:g} s is too long for this scene ({self.model.dt_reason}); raise step.per_tick"
+            )

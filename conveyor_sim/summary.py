@@ -1,0 +1,265 @@
+"""What a run amounts to, from its bag: the same for the node and for a run without ROS."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.box import SIMPLE
+from rich.console import Group
+from rich.table import Table
+
+from conveyor_sim.bag.messages import BOTTLES, OUTCOME, SIGNALS
+from conveyor_sim.bag.reader import Bag, open_bag, to_columns
+from conveyor_sim.observe.columns import BottleColumns
+
+FILE_NAME = "summary.json"
+
+
+@dataclass(frozen=True)
+class BeltFlow:
+    """One belt: what is on it, and how often a bottle came onto it (seen from one recorded Bottles to the next)."""
+
+    bottles: int
+    """On it at the end."""
+    per_minute: float
+    """Bottles that came onto it, per simulated minute, over the whole run."""
+    per_minute_second_half: float
+    """The same over the second half, when the line has filled."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed loop, seen from the belt to which bottles return most often.
+
+    A bottle has returned when it comes onto a belt that it had left, with at least two other belts in between.
+    """
+
+    belt: str
+    returns: int
+    per_minute: float
+    per_minute_second_half: float
+
+
+@dataclass(frozen=True)
+class TopicCount:
+    """What was recorded of one topic."""
+
+    messages: int
+    bytes: int
+    """Serialized, before compression."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The end-of-run account. Quantities that were not recorded are None."""
+
+    scene: str
+    bag: str
+    simulated: float
+    """s"""
+    wall: float | None
+    """s"""
+    fed: int | None
+    removed: int | None
+    present: int
+    """Bottles on the line at the end."""
+    on_floor: int
+    """Of them, on no belt."""
+    belts: dict[str, BeltFlow]
+    loop: Loop | None
+    """None if no bottle came back."""
+    peak_force: float
+    """N, the largest normal contact force of the run (accumulated every step)."""
+    peak_force_99: float
+    """N, 99th percentile over bottles and output intervals with a contact of the peak force in the interval."""
+    commands: int
+    refused: int
+    """Of the commands."""
+    topics: dict[str, TopicCount]
+
+    @property
+    def real_time_factor(self) -> float | None:
+        """Simulated over wall time."""
+        return self.simulated / self.wall if self.wall else None
+
+
+def summarize(path: str | Path, wall: float | None = None) -> Summary:
+    """Sums a bag up in one pass; wall: how long the run took, s, if known. Raises BagError if it can't be read."""
+    with open_bag(path) as bag:
+        return _Tally(bag).summary(wall)
+
+
+def write_summary(summary: Summary, folder: Path) -> Path:
+    """Writes summary.json into the folder; returns its path."""
+    file = folder / FILE_NAME
+    content = {**asdict(summary), "real_time_factor": summary.real_time_factor}
+    file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    return file
+
+
+class _Tally:
+    """Counts while a bag goes by."""
+
+    def __init__(self, bag: Bag) -> None:
+        self._bag = bag
+        self._topics: dict[str, list[int]] = {topic: [0, 0] for topic in bag.counts}
+        self._last_tick = 0
+        self._itinerary = _Itinerary(len(bag.line.belts))
+        self._forces: list[NDArray[np.float64]] = []
+        self._bottles: BottleColumns | None = None
+        self._signals: NDArray[np.float64] | None = None
+        self._outcomes: Counter[bool] = Counter()
+        for topic, _, data in bag.raw():
+            self._topics[topic][0] += 1
+            self._topics[topic][1] += len(data)
+            if bag.types[topic] in (BOTTLES, SIGNALS, OUTCOME):
+                self._take(bag.types[topic], bag.decode(topic, data))
+
+    def _take(self, kind: str, message: Any) -> None:
+        self._last_tick = max(self._last_tick, int(message.tick))
+        if kind == BOTTLES:
+            self._bottles = to_columns(BottleColumns, message)
+            self._itinerary.take(self._bag.time(message.tick), self._bottles)
+            self._forces.append(self._bottles.peak_force[self._bottles.peak_force > 0.0])
+        elif kind == SIGNALS:
+            self._signals = message.values
+        else:
+            self._outcomes[bool(message.accepted)] += 1
+
+    def summary(self, wall: float | None) -> Summary:
+        forces = np.concatenate(self._forces) if self._forces else np.zeros(0)
+        belt = np.zeros(0, dtype=np.int32) if self._bottles is None else self._bottles.belt
+        return Summary(
+            scene=self._bag.line.scene_name,
+            bag=str(self._bag.path),
+            simulated=self._bag.time(self._last_tick),
+            wall=wall,
+            fed=self._signal_sum("infeeds/", "/fed"),
+            removed=self._signal_sum("outfeeds/", "/removed"),
+            present=len(belt),
+            on_floor=int(np.count_nonzero(belt < 0)),
+            belts=self._belts(belt),
+            loop=self._loop(),
+            peak_force=float(forces.max()) if len(forces) else 0.0,
+            peak_force_99=float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
+            commands=self._outcomes.total(),
+            refused=self._outcomes[False],
+            topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
+        )
+
+    def _signal_sum(self, prefix: str, suffix: str) -> int | None:
+        if self._signals is None:
+            return None
+        pairs = zip(self._bag.line.signal_names, self._signals, strict=True)
+        return int(sum(value for name, value in pairs if name.startswith(prefix) and name.endswith(suffix)))
+
+    def _belts(self, belt: NDArray[np.int32]) -> dict[str, BeltFlow]:
+        flows = {}
+        for index, name in enumerate(self._bag.line.belts):
+            rates = self._itinerary.per_minute(self._itinerary.entries[index])
+            flows[name] = BeltFlow(int(np.count_nonzero(belt == index)), *rates)
+        return flows
+
+    def _loop(self) -> Loop | None:
+        returns = self._itinerary.returns
+        index = max(range(len(returns)), key=lambda belt: len(returns[belt]), default=None)
+        if index is None or not returns[index]:
+            return None
+        rates = self._itinerary.per_minute(returns[index])
+        return Loop(self._bag.line.belts[index], len(returns[index]), *rates)
+
+
+class _Itinerary:
+    """When bottles came onto belts, and back onto them."""
+
+    def __init__(self, belts: int) -> None:
+        self.entries: list[list[float]] = [[] for _ in range(belts)]
+        """Times by belt, s, at which a bottle came onto it from elsewhere on the line or from an infeed."""
+        self.returns: list[list[float]] = [[] for _ in range(belts)]
+        """Those of them at which it had been on the belt before, and on at least two other belts since."""
+        self._since: dict[int, dict[int, set[int]]] = {}
+        """By bottle, then by belt it has been on: the other belts it has been on since."""
+        self._ids = np.zeros(0, dtype=np.uint64)
+        self._belt = np.zeros(0, dtype=np.int32)
+        self._first: float | None = None
+        self._last = 0.0
+
+    def take(self, time: float, bottles: BottleColumns) -> None:
+        """The next recorded Bottles."""
+        stayed = np.zeros(len(bottles.id), dtype=bool)
+        if len(self._ids):
+            at = np.searchsorted(self._ids, bottles.id).clip(max=len(self._ids) - 1)
+            stayed = (self._ids[at] == bottles.id) & (self._belt[at] == bottles.belt)
+        for index in np.flatnonzero(~stayed & (bottles.belt >= 0)):
+            self._enter(int(bottles.id[index]), int(bottles.belt[index]), time)
+        self._ids, self._belt = bottles.id, bottles.belt
+        self._first = time if self._first is None else self._first
+        self._last = time
+
+    def _enter(self, bottle: int, belt: int, time: float) -> None:
+        since = self._since.setdefault(bottle, {})
+        if self._first is not None:  # what stands on a belt at the start has not come onto it
+            self.entries[belt].append(time)
+            if len(since.get(belt, ())) >= 2:
+                self.returns[belt].append(time)
+        for others in since.values():
+            others.add(belt)
+        since[belt] = set()
+
+    def per_minute(self, times: list[float]) -> tuple[float, float]:
+        """Rates over the whole recording and over its second half, 1/min."""
+        if self._first is None or self._last <= self._first:
+            return 0.0, 0.0
+        span = self._last - self._first
+        late = sum(time > self._first + 0.5 * span for time in times)
+        return 60.0 * len(times) / span, 120.0 * late / span
+
+
+def render(summary: Summary) -> Group:
+    """The summary for a terminal."""
+    account = Table.grid(padding=(0, 2))
+    for name, text in _account(summary):
+        account.add_row(name, text)
+    belts = _table("belt", "bottles now", "came on, per min", "second half, per min")
+    for name, flow in summary.belts.items():
+        belts.add_row(name, str(flow.bottles), f"{flow.per_minute:.1f}", f"{flow.per_minute_second_half:.1f}")
+    topics = _table("topic", "messages", "bytes")
+    for name, count in sorted(summary.topics.items()):
+        topics.add_row(name, f"{count.messages}", f"{count.bytes}")
+    return Group(account, belts, topics)
+
+
+def _account(summary: Summary) -> list[tuple[str, str]]:
+    wall, factor = summary.wall, summary.real_time_factor
+    fed = "not recorded" if summary.fed is None else str(summary.fed)
+    removed = "not recorded" if summary.removed is None else str(summary.removed)
+    loop = "no bottle has come round"
+    if summary.loop is not None:
+        loop = (
+            f"{summary.loop.returns} bottles came back to {summary.loop.belt}, {summary.loop.per_minute:.1f} per min "
+            f"({summary.loop.per_minute_second_half:.1f} in the second half)"
+        )
+    return [
+        ("scene", summary.scene),
+        ("recording", summary.bag),
+        ("simulated", f"{summary.simulated:.2f} s"),
+        ("wall time", "not known" if wall is None else f"{wall:.2f} s"),
+        ("real-time factor", "not known" if factor is None else f"{factor:.2f}"),
+        ("bottles", f"{fed} fed, {removed} removed, {summary.present} present ({summary.on_floor} on no belt)"),
+        ("loop", loop),
+        ("contact force", f"peak {summary.peak_force:.2f} N, 99th percentile of peaks {summary.peak_force_99:.2f} N"),
+        ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
+    ]
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=SIMPLE)
+    for index, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if index == 0 else "right")
+    return table

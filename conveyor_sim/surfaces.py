@@ -1,0 +1,74 @@
+"""Which rail pieces form one surface: those whose ends meet within JOINT_TOLERANCE, however they were listed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.joint import ANSWERS, FREE, SILENT
+
+JOINT_TOLERANCE = 1e-6
+"""m; well above the rounding of coordinates, well below anything a bottle can feel."""
+
+
+@dataclass(frozen=True)
+class Joints:
+    """How the ends of n rail pieces are joined, (n, 2), start and end of each."""
+
+    code: NDArray[np.int8]
+    """FREE, ANSWERS or SILENT."""
+    neighbour: NDArray[np.float64]
+    """(n, 2, 2), unit vector from a joint into the neighbouring piece."""
+    surface: NDArray[np.uint32]
+    """(n,), equal for pieces of one surface."""
+
+
+def find_joints(ends: NDArray[np.float64], inward: NDArray[np.float64]) -> Joints:
+    """Join rail pieces end to end.
+
+    ends: (n, 2, 2), start and end points, m. inward: (n, 2, 2), unit vectors from each end into its piece. Where just
+    two ends meet, the first piece answers for the point; where more meet, each end stays free and the surface's shared
+    push keeps the point from pushing more than once.
+    """
+    pieces = len(ends)
+    code = np.full((pieces, 2), FREE, dtype=np.int8)
+    neighbour = np.zeros((pieces, 2, 2))
+    parent = list(range(pieces))
+
+    def root(piece: int) -> int:
+        while parent[piece] != piece:
+            piece = parent[piece]
+        return piece
+
+    for meeting in _meeting_ends(ends):
+        first = root(meeting[0][0])
+        for piece, _ in meeting[1:]:
+            parent[max(root(piece), first)] = first = min(root(piece), first)
+        if len(meeting) == 2:
+            (a, end_a), (b, end_b) = meeting
+            code[a, end_a], code[b, end_b] = ANSWERS, SILENT
+            neighbour[a, end_a] = inward[b, end_b]
+            neighbour[b, end_b] = inward[a, end_a]
+    surface = np.array([root(piece) for piece in range(pieces)], dtype=np.uint32)
+    return Joints(code=code, neighbour=neighbour, surface=surface)
+
+
+def _meeting_ends(ends: NDArray[np.float64]) -> list[list[tuple[int, int]]]:
+    """Groups of two or more (piece, end) that share a point."""
+    points = ends.reshape(-1, 2)
+    order = np.argsort(points[:, 0], kind="stable")
+    taken: set[int] = set()
+    groups = []
+    for position, index in enumerate(order):
+        if int(index) in taken:
+            continue
+        group = [int(index)]
+        for other in order[position + 1 :]:
+            if points[other, 0] - points[index, 0] > JOINT_TOLERANCE:
+                break
+            if int(other) not in taken and np.hypot(*(points[other] - points[index])) <= JOINT_TOLERANCE:
+                group.append(int(other))
+        if len(group) > 1:
+            taken.update(group)
+            groups.append(sorted((flat // 2, flat % 2) for flat in group))
+    return groups

@@ -1,0 +1,59 @@
+"""What bounds the time step, and the choice of steps a tick. All bounds in s; references are to docs/paper.md."""
+
+import math
+from dataclasses import dataclass
+
+STEPS_PER_CONTACT = 20
+"""Steps that a contact should last: at most 0.1 % error in the rebound."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """One upper bound on the time step."""
+
+    name: str
+    dt: float
+    """s"""
+    reason: str
+
+
+def contact_time(stiffness: float, reduced_mass: float) -> float:
+    """Duration of an undamped linear contact, pi sqrt(m_r / k), in s. N/m, kg."""
+    return math.pi * math.sqrt(reduced_mass / stiffness)
+
+
+def contact_bound(stiffness: float, reduced_mass: float) -> float:
+    """Step that gives a contact STEPS_PER_CONTACT steps, s."""
+    return contact_time(stiffness, reduced_mass) / STEPS_PER_CONTACT
+
+
+def lattice_bound(stiffness: float, mass: float) -> float:
+    """Stability limit of a hexagonal packing, 2 / sqrt(6 k / m), in s."""
+    return 2.0 / math.sqrt(6.0 * stiffness / mass)
+
+
+def base_friction_bound(friction: float, gravity: float, slip_limit: float) -> float:
+    """Explicit regularised friction on a belt chatters beyond v_lim / (mu g), in s."""
+    return slip_limit / (friction * gravity)
+
+
+def contact_friction_bound(friction: float, normal_force: float, mass: float, inertia: float, radius: float,
+                           slip_limit: float) -> float:
+    """Explicit regularised friction in a contact chatters beyond v_lim / [2 mu (1/m + R^2/J) N], in s."""
+    return slip_limit / (2.0 * friction * (1.0 / mass + radius**2 / inertia) * normal_force)
+
+
+def steps_per_tick(tick: float, bounds: list[Bound], given: int | None) -> tuple[int, str]:
+    """Steps in a tick of `tick` s, and why: as given, or the fewest that keep every bound."""
+    if not bounds:
+        if given is not None:
+            return given, f"{given} steps a tick, given in the scene; nothing in it bounds the time step"
+        return 1, "1 step a tick: nothing in the scene bounds the time step"
+    tightest = min(bounds, key=lambda bound: bound.dt)
+    ruling = f"{tightest.name}: {tightest.dt * 1e6:.4g} us, {tightest.reason}"
+    if given is None:
+        steps = max(1, math.ceil(tick / tightest.dt * (1.0 - 1e-12)))
+        return steps, f"{steps} steps a tick, the fewest within the tightest bound ({ruling})"
+    dt = tick / given
+    verdict = "within" if dt <= tightest.dt else f"{dt / tightest.dt:.2g} x beyond"
+    return given, f"{given} steps a tick, given in the scene; {verdict} the tightest bound ({ruling})"
