@@ -1,0 +1,7 @@
+"""The scene: what a user writes about a line, read, validated and turned into shapes."""
+
+from conveyor_sim.scene.geometry import belt_shapes, initial_bottles, rail_shapes
+from conveyor_sim.scene.load import load_scene, parse_overrides, parse_scene
+from conveyor_sim.scene.schema import Scene
+
+__all__ = ["Scene", "belt_shapes", "initial_bottles", "load_scene", "parse_overrides", "parse_scene", "rail_shapes"]

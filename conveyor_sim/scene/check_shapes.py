@@ -1,0 +1,251 @@
+"""Geometry that can't be, and bottles that are born where something else is."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.scene.geometry import (
+    TOUCH,
+    XY,
+    Array,
+    RailShape,
+    arc_centre,
+    curved_shape,
+    grid_points,
+    rail_pieces,
+    rails_of_curved,
+)
+from conveyor_sim.scene.overlaps import overlapping
+from conveyor_sim.scene.polygons import why_not_simple
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.schema import CurvedBelt, Grid, Infeed, PolylineRail, Scene, SegmentRail, Single
+from conveyor_sim.scene.types import COORDINATE_LIMIT
+from conveyor_sim.scene.words import shown
+
+_MOST_BOTTLES = 1_000_000  # of one grid
+
+
+def shape_problems(scene: Scene) -> list[Problem]:
+    """Problems of belts, rails, outfeeds, and of where bottles are born."""
+    belts = list(_curved_belts(scene))
+    rails = list(_rails(scene))
+    wrong = {problem.path[:2] for problem in belts + rails}
+    shapes = _sound_rails(scene, wrong)
+    groups = list(_groups(scene))
+    return [
+        *belts,
+        *rails,
+        *_outfeeds(scene),
+        *_grids(scene),
+        *_in_rails(groups, shapes),
+        *_infeeds_in_rails(scene, shapes),
+        *_in_each_other(groups),
+    ]
+
+
+def _curved_belts(scene: Scene) -> Iterator[Problem]:
+    for name, belt in scene.belts.items():
+        if not isinstance(belt, CurvedBelt):
+            continue
+        path: Path = ("belts", name)
+        rails = belt.rails
+        if (rails.inner or rails.outer) and rails.material is None:
+            yield Problem((*path, "rails", "material"), "missing, expected the material of the belt's rails")
+        if rails.inner and belt.inner_radius == 0:
+            yield Problem((*path, "rails", "inner"), "true given, expected false, as the inner radius is 0")
+        by_centre = {"centre": belt.centre, "start_angle": belt.start_angle, "span": belt.span}
+        by_points = {"from": belt.from_, "to": belt.to, "side": belt.side}
+        given = [field for field, value in (by_centre | by_points).items() if value is not None]
+        if given not in (list(by_centre), list(by_points)):
+            yield Problem(
+                path,
+                f"{', '.join(given) or 'no place'} given, "
+                "expected either centre, start_angle and span, or from, to and side",
+            )
+        elif belt.from_ is not None and belt.to is not None:
+            yield from _two_points(path, belt.from_, belt.to, belt)
+
+
+def _two_points(path: Path, start: XY, end: XY, belt: CurvedBelt) -> Iterator[Problem]:
+    chord = math.dist(start, end)
+    if chord <= TOUCH:
+        yield Problem((*path, "to"), f"{shown(end)} given, expected a point away from `from`")
+        return
+    try:
+        arc_centre(start, end, belt.inner_radius, str(belt.side))
+    except ValueError:
+        yield Problem(
+            (*path, "inner_radius"),
+            f"{shown(belt.inner_radius)} given, expected at least half the chord between `from` and `to`, "
+            f"{chord / 2:.6g} (m)",
+        )
+
+
+def _rails(scene: Scene) -> Iterator[Problem]:
+    for name, rail in scene.rails.items():
+        if isinstance(rail, SegmentRail) and math.dist(rail.from_, rail.to) <= TOUCH:
+            yield Problem(
+                ("rails", name, "to"), f"{shown(rail.to)} given, expected a point away from `from` (zero length)"
+            )
+        if isinstance(rail, PolylineRail):
+            corners = rail.points
+            for index in range(0 if rail.closed else 1, len(corners)):
+                if math.dist(corners[index - 1], corners[index]) <= TOUCH:
+                    yield Problem(
+                        ("rails", name, "points", index),
+                        f"{shown(corners[index])} given, expected a point away from the one before it (zero length)",
+                    )
+
+
+def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
+    """The rails whose geometry can be, to go on checking with."""
+    shapes = [
+        RailShape(name, rail.material, rail_pieces(rail))
+        for name, rail in scene.rails.items()
+        if ("rails", name) not in wrong
+    ]
+    for name, belt in scene.belts.items():
+        if isinstance(belt, CurvedBelt) and ("belts", name) not in wrong:
+            shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
+    return shapes
+
+
+def _outfeeds(scene: Scene) -> Iterator[Problem]:
+    for name, outfeed in scene.outfeeds.items():
+        reason = why_not_simple(outfeed.region)
+        if reason is not None:
+            yield Problem(
+                ("outfeeds", name, "region"),
+                f"{shown(outfeed.region)} given, expected a simple polygon ({reason})",
+            )
+
+
+@dataclass(frozen=True)
+class _Group:
+    """The bottles of one entry of `bottles`."""
+
+    path: Path
+    points: Array
+    radius: float
+
+
+def _groups(scene: Scene) -> Iterator[_Group]:
+    for index, entry in enumerate(scene.bottles):
+        kind = scene.bottle_types.get(entry.type if isinstance(entry, Single) else entry.grid.type)
+        if kind is None:
+            continue
+        if isinstance(entry, Single):
+            yield _Group(("bottles", index, "position"), np.array([entry.position]), kind.radius)
+        elif _grid_problem(scene, index, entry) is None:
+            yield _Group(("bottles", index, "grid"), grid_points(entry.grid), kind.radius)
+
+
+def _grids(scene: Scene) -> Iterator[Problem]:
+    for index, entry in enumerate(scene.bottles):
+        if isinstance(entry, Grid):
+            problem = _grid_problem(scene, index, entry)
+            if problem is not None:
+                yield problem
+
+
+def _grid_problem(scene: Scene, index: int, entry: Grid) -> Problem | None:
+    grid = entry.grid
+    path: Path = ("bottles", index, "grid")
+    number = grid.rows * grid.columns
+    if number > _MOST_BOTTLES:
+        return Problem(path, f"{number} bottles given, expected at most {_MOST_BOTTLES}")
+    if max(grid.rows, grid.columns) * grid.pitch > COORDINATE_LIMIT:
+        return Problem(
+            (*path, "pitch"), f"{shown(grid.pitch)} given, expected a grid of at most {COORDINATE_LIMIT:g} m"
+        )
+    kind = scene.bottle_types.get(grid.type)
+    if kind is not None and number > 1 and grid.pitch < 2 * kind.radius - TOUCH:
+        return Problem(
+            (*path, "pitch"),
+            f"{shown(grid.pitch)} given, expected at least the diameter of {grid.type}, {2 * kind.radius:g} (m)",
+        )
+    return None
+
+
+def _in_rails(groups: list[_Group], rails: list[RailShape]) -> Iterator[Problem]:
+    for group in groups:
+        for rail in rails:
+            apart = _distance(group.points, rail)
+            inside = np.flatnonzero(apart < group.radius - TOUCH)
+            if len(inside):
+                yield Problem(
+                    group.path,
+                    f"{_at(group, inside)} given, expected at least {group.radius:g} m between a bottle's axis "
+                    f"and rail {rail.name} ({_metres(apart[inside[0]])})",
+                )
+
+
+def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]:
+    for name, feed in scene.infeeds.items():
+        if feed.bottle not in scene.bottle_types:
+            continue
+        radius = scene.bottle_types[feed.bottle].radius
+        points = _births(feed)
+        for rail in rails:
+            apart = float(_distance(points, rail).min())
+            if apart < radius - TOUCH:
+                jitter = ", lateral_jitter included" if feed.lateral_jitter else ""
+                yield Problem(
+                    ("infeeds", name, "position"),
+                    f"{shown(feed.position)} given, expected at least {radius:g} m between a bottle's axis "
+                    f"and rail {rail.name} ({_metres(apart)}{jitter})",
+                )
+
+
+def _births(feed: Infeed) -> Array:
+    """The middle and both ends of where an infeed's bottles appear, (3, 2)."""
+    sideways = np.array([-math.sin(feed.direction), math.cos(feed.direction)])
+    births: Array = np.array(feed.position) + np.outer([-1.0, 0.0, 1.0], feed.lateral_jitter * sideways)
+    return births
+
+
+def _in_each_other(groups: list[_Group]) -> Iterator[Problem]:
+    if not groups:
+        return
+    sizes = [len(group.points) for group in groups]
+    starts = np.cumsum([0, *sizes])
+    owner = np.repeat(np.arange(len(groups)), sizes)
+    centres = np.vstack([group.points for group in groups])
+    radii = np.repeat([group.radius for group in groups], sizes)
+    first, second = overlapping(centres, radii, TOUCH)
+    order = np.lexsort((first, second))
+    first, second = first[order], second[order]
+    later, begin = np.unique(owner[second], return_index=True)
+    for entry, where in zip(later, np.split(np.arange(len(second)), begin[1:]), strict=False):
+        i, j = first[where[0]], second[where[0]]
+        apart = float(np.hypot(*(centres[i] - centres[j])))
+        yield Problem(
+            groups[entry].path,
+            f"{_at(groups[entry], np.unique(second[where]) - starts[entry])} given, "
+            f"expected at least {radii[i] + radii[j]:g} m between the axes of two bottles, "
+            f"as to that at {_xy(centres[i])} ({_metres(apart)})",
+        )
+
+
+def _distance(points: Array, rail: RailShape) -> Array:
+    nearest: Array = np.min([piece.distance(points) for piece in rail.pieces], axis=0)
+    return nearest
+
+
+def _at(group: _Group, hit: NDArray[np.intp]) -> str:
+    """The first bottle that something is wrong with, and how many of its grid are like it."""
+    point = _xy(group.points[hit[0]])
+    if len(group.points) == 1:
+        return point
+    return f"a bottle at {point}" + (f" (and {len(hit) - 1} more)" if len(hit) > 1 else "")
+
+
+def _xy(point: Array) -> str:
+    return f"[{point[0]:.6g}, {point[1]:.6g}]"
+
+
+def _metres(distance: float) -> str:
+    return f"{round(float(distance), 9):.4g} m"

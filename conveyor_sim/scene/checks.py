@@ -1,0 +1,165 @@
+"""What a schema can't see: names that refer to nothing, pairs of materials left out, times that don't fit together."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import combinations_with_replacement
+
+from conveyor_sim.scene.check_shapes import shape_problems
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.schema import CurvedBelt, Grid, Scene
+from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
+from conveyor_sim.scene.words import shown
+
+
+def problems_of(scene: Scene) -> list[Problem]:
+    """Everything that is wrong with a scene whose fields are each valid by themselves."""
+    return [
+        *_times(scene),
+        *_damping(scene),
+        *_repeated("contacts", [tuple(sorted(contact.between)) for contact in scene.contacts]),
+        *_repeated("base", [base.between for base in scene.base]),
+        *_missing_contacts(scene),
+        *_missing_base(scene),
+        *_unknown_types(scene),
+        *_belt_speeds(scene),
+        *_infeeds(scene),
+        *_rail_names(scene),
+        *shape_problems(scene),
+    ]
+
+
+def _times(scene: Scene) -> Iterator[Problem]:
+    if not is_whole_nanoseconds(scene.tick):
+        yield Problem(("tick",), f"{shown(scene.tick)} given, expected a whole number of nanoseconds (s)")
+        return
+    tick = f"{scene.tick:g} s"
+    if not is_whole_nanoseconds(scene.duration) or nanoseconds(scene.duration) % scene.tick_ns:
+        yield Problem(("duration",), f"{shown(scene.duration)} given, expected a whole number of ticks of {tick} (s)")
+    tick_rate = 1e9 / scene.tick_ns
+    for topic in scene.TOPICS:
+        rate = getattr(scene.outputs, topic)
+        ticks = tick_rate / rate if rate else 1.0
+        if ticks < 0.5 or not math.isclose(ticks, round(ticks), rel_tol=1e-12):
+            yield Problem(
+                ("outputs", topic),
+                f"{shown(rate)} given, expected 0, or the tick rate divided by a whole number: "
+                f"{tick_rate:g}, {tick_rate / 2:g}, {tick_rate / 4:g}, {tick_rate / 5:g} ... (Hz)",
+            )
+
+
+def _damping(scene: Scene) -> Iterator[Problem]:
+    for index, contact in enumerate(scene.contacts):
+        damping = contact.damping
+        if damping.law == "none" and damping.coefficient > 0:
+            yield Problem(
+                ("contacts", index, "damping", "coefficient"),
+                f'{shown(damping.coefficient)} given, expected law "paper" or "normal" beside it (the law is "none")',
+            )
+
+
+def _repeated(field: str, pairs: Sequence[tuple[str, ...]]) -> Iterator[Problem]:
+    for index, pair in enumerate(pairs):
+        first = pairs.index(pair)
+        if first < index:
+            yield Problem(
+                (field, index, "between"),
+                f"{shown(pair)} given, expected each pair once ({field}[{first}] is the same pair)",
+            )
+
+
+def _missing_contacts(scene: Scene) -> Iterator[Problem]:
+    """Every pair of materials that can touch needs a contact."""
+    given = {frozenset(contact.between) for contact in scene.contacts}
+    wanted: dict[frozenset[str], str] = {}
+    bottles = _bottle_materials(scene)
+    if _several_bottles(scene):
+        for one, other in combinations_with_replacement(bottles, 2):
+            wanted.setdefault(frozenset((one, other)), f"bottle of {one} and bottle of {other}")
+    rails = {f"rail {name}": rail.material for name, rail in scene.rails.items()}
+    for name, belt in scene.belts.items():
+        if isinstance(belt, CurvedBelt) and belt.rails.material and (belt.rails.inner or belt.rails.outer):
+            rails[f"rails of belt {name}"] = belt.rails.material
+    for what, material in rails.items():
+        for one in bottles:
+            wanted.setdefault(frozenset((one, material)), f"bottle of {one} and {what} of {material}")
+    for pair, what in wanted.items():
+        if pair not in given:
+            names = ", ".join(sorted(pair) if len(pair) == 2 else [*pair, *pair])
+            yield Problem(("contacts",), f"no entry for {what}, expected one with between: [{names}]")
+
+
+def _missing_base(scene: Scene) -> Iterator[Problem]:
+    """Every pair of bottle and belt materials needs a base friction."""
+    known = {base.between for base in scene.base}
+    for name, belt in scene.belts.items():
+        for one in _bottle_materials(scene):
+            if (one, belt.material) not in known:
+                known.add((one, belt.material))
+                yield Problem(
+                    ("base",),
+                    f"no entry for bottle of {one} on belt {name} of {belt.material}, "
+                    f"expected one with between: [{one}, {belt.material}]",
+                )
+
+
+def _bottle_materials(scene: Scene) -> list[str]:
+    return list(dict.fromkeys(kind.material for kind in scene.bottle_types.values()))
+
+
+def _several_bottles(scene: Scene) -> bool:
+    """Whether two bottles can ever meet."""
+    return bool(scene.infeeds) or len(scene.bottles) > 1 or any(isinstance(entry, Grid) for entry in scene.bottles)
+
+
+def _unknown_types(scene: Scene) -> Iterator[Problem]:
+    used: list[tuple[Path, str]] = [(("infeeds", name, "bottle"), feed.bottle) for name, feed in scene.infeeds.items()]
+    for index, entry in enumerate(scene.bottles):
+        if isinstance(entry, Grid):
+            used.append((("bottles", index, "grid", "type"), entry.grid.type))
+        else:
+            used.append((("bottles", index, "type"), entry.type))
+    for path, name in used:
+        if name not in scene.bottle_types:
+            known = ", ".join(scene.bottle_types)
+            yield Problem(path, f"{shown(name)} given, expected a name from bottle_types: {known}")
+
+
+def _belt_speeds(scene: Scene) -> Iterator[Problem]:
+    for name, belt in scene.belts.items():
+        least, greatest = belt.speed_limits
+        if least > greatest:
+            yield Problem(
+                ("belts", name, "speed_limits"),
+                f"{shown(belt.speed_limits)} given, expected the smaller number first (m/s)",
+            )
+        elif not least <= belt.speed <= greatest:
+            yield Problem(
+                ("belts", name, "speed"),
+                f"{shown(belt.speed)} given, expected a number from {least:g} to {greatest:g} (m/s), the speed_limits",
+            )
+
+
+def _infeeds(scene: Scene) -> Iterator[Problem]:
+    for name, feed in scene.infeeds.items():
+        if (feed.gap is None) == (feed.rate is None):
+            given = "neither" if feed.gap is None else "both"
+            yield Problem(("infeeds", name), f"{given} of gap and rate given, expected one of them")
+        if feed.rate is not None and feed.timing_jitter > 0.5 / feed.rate:
+            yield Problem(
+                ("infeeds", name, "timing_jitter"),
+                f"{shown(feed.timing_jitter)} given, expected at most half the time between two bottles, "
+                f"{0.5 / feed.rate:g} (s), so that they stay in order",
+            )
+
+
+def _rail_names(scene: Scene) -> Iterator[Problem]:
+    for name, belt in scene.belts.items():
+        if isinstance(belt, CurvedBelt):
+            for side, wanted in (("inner", belt.rails.inner), ("outer", belt.rails.outer)):
+                derived = f"{name}_{side}"
+                if wanted and derived in scene.rails:
+                    yield Problem(
+                        ("rails", derived),
+                        f"{shown(derived)} given as a name, expected another one: "
+                        f"the {side} rail of belt {name} is called so",
+                    )

@@ -1,0 +1,249 @@
+"""Shapes of a scene: belts, rails and the bottles that are there at the start. Pure functions; m and rad."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.scene.schema import ArcRail, Belt, CurvedBelt, Grid, GridOfBottles, PolylineRail, Rail, Scene
+
+Array = NDArray[np.float64]
+XY = tuple[float, float]
+InitialBottle = tuple[str, float, float, float, float, float, float]
+
+TOUCH = 1e-9  # m; below this two things touch or coincide: rounding of coordinates of some metres is 1e-15
+
+
+@dataclass(frozen=True)
+class BeltShape:
+    """An area: straight (corner, angle, length, width), or curved (centre, inner_radius, start_angle, span, width).
+
+    The numbers of the other kind are 0. A straight belt's `corner` is xi = eta = 0, xi along `angle`, eta to its left.
+    """
+
+    name: str
+    kind: Literal["straight", "curved"]
+    width: float
+    corner: XY = (0.0, 0.0)
+    angle: float = 0.0
+    length: float = 0.0
+    centre: XY = (0.0, 0.0)
+    inner_radius: float = 0.0
+    start_angle: float = 0.0
+    span: float = 0.0
+
+    @property
+    def centre_radius(self) -> float:
+        """Radius of a curved belt's centre line (m), where its speed holds."""
+        return self.inner_radius + self.width / 2
+
+    def outline(self, n: int = 64) -> Array:
+        """Corners of the area, (k, 2), counter-clockwise, first not repeated; an arc has n points.
+
+        A full ring is cut open along its start angle; one without a hole is a circle.
+        """
+        if self.kind == "straight":
+            return self._point([0.0, self.length, self.length, 0.0], [0.0, 0.0, self.width, self.width])
+        outer = arc_points(self.centre, self.inner_radius + self.width, self.start_angle, self.span, n)
+        if self.inner_radius > 0:
+            return np.vstack([outer, arc_points(self.centre, self.inner_radius, self.start_angle, self.span, n)[::-1]])
+        return outer[:-1] if is_full_turn(self.span) else np.vstack([outer, [self.centre]])
+
+    def centre_line(self, n: int = 64) -> Array:
+        """Points along the middle, (n, 2), in the direction of positive speed."""
+        if self.kind == "straight":
+            return self._point(np.linspace(0.0, self.length, n), np.full(n, self.width / 2))
+        return arc_points(self.centre, self.centre_radius, self.start_angle, self.span, n)
+
+    def _point(self, xi: list[float] | Array, eta: list[float] | Array) -> Array:
+        """Global coordinates (k, 2) of belt coordinates (11)-(13)."""
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        xi, eta = np.asarray(xi), np.asarray(eta)
+        return np.column_stack([self.corner[0] + cos * xi - sin * eta, self.corner[1] + sin * xi + cos * eta])
+
+
+@dataclass(frozen=True)
+class SegmentPiece:
+    """A straight piece of a rail."""
+
+    p1: XY
+    p2: XY
+
+    @property
+    def ends(self) -> tuple[XY, XY]:
+        """Both end points."""
+        return self.p1, self.p2
+
+    def points(self, n: int = 64) -> Array:
+        """The end points, (2, 2)."""
+        return np.array([self.p1, self.p2])
+
+    def distance(self, points: Array) -> Array:
+        """Distance (k,) of points (k, 2) from the piece, its end points included."""
+        start = np.array(self.p1)
+        along = np.array(self.p2) - start
+        share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
+        return _length(points - start - share[:, None] * along)
+
+
+@dataclass(frozen=True)
+class ArcPiece:
+    """A piece of a rail along a circle, counter-clockwise from `start_angle` through `span`."""
+
+    centre: XY
+    radius: float
+    start_angle: float
+    span: float
+
+    @property
+    def ends(self) -> tuple[XY, XY]:
+        """Both end points."""
+        first, last = self.points(2)
+        return (float(first[0]), float(first[1])), (float(last[0]), float(last[1]))
+
+    def points(self, n: int = 64) -> Array:
+        """Points along the arc, (n, 2)."""
+        return arc_points(self.centre, self.radius, self.start_angle, self.span, n)
+
+    def distance(self, points: Array) -> Array:
+        """Distance (k,) of points (k, 2) from the arc, its end points included."""
+        seen = points - np.array(self.centre)
+        angle = np.mod(np.arctan2(seen[:, 1], seen[:, 0]) - self.start_angle, 2 * math.pi)
+        to_circle = np.abs(_length(seen) - self.radius)
+        to_ends = np.min([_length(points - np.array(end)) for end in self.ends], axis=0)
+        return np.where(angle <= self.span, to_circle, to_ends)
+
+
+Piece = SegmentPiece | ArcPiece
+
+
+@dataclass(frozen=True)
+class RailShape:
+    """A rail as pieces that follow each other."""
+
+    name: str
+    material: str
+    pieces: tuple[Piece, ...]
+
+    def outline(self, n: int = 64) -> Array:
+        """Points along the rail, (k, 2); an arc has n points."""
+        return np.vstack([self.pieces[0].points(n), *(piece.points(n)[1:] for piece in self.pieces[1:])])
+
+
+def arc_points(centre: XY, radius: float, start_angle: float, span: float, n: int) -> Array:
+    """Points of an arc, (n, 2), counter-clockwise (21)."""
+    angle = start_angle + np.linspace(0.0, span, n)
+    return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
+
+
+def is_full_turn(span: float) -> bool:
+    """Whether a span closes on itself."""
+    return span >= 2 * math.pi - 1e-12
+
+
+def arc_centre(p1: XY, p2: XY, radius: float, side: str) -> XY:
+    """Centre of the circle of a radius (m) through two points, on the "left" or "right" of the way from p1 to p2.
+
+    From the chord's midpoint and perpendicular, so that horizontal chords are nothing special (the paper's (16)-(20)
+    divide by their height). ValueError if the radius is shorter than half the chord, or the points coincide.
+    """
+    chord_x, chord_y = p2[0] - p1[0], p2[1] - p1[1]
+    chord = math.hypot(chord_x, chord_y)
+    if chord <= TOUCH:
+        raise ValueError("the two points coincide")
+    if radius < chord / 2 - TOUCH:
+        raise ValueError(f"the radius {radius:g} m is shorter than half the chord, {chord / 2:g} m")
+    height = math.sqrt(max((radius - chord / 2) * (radius + chord / 2), 0.0))
+    shift = (height if side == "left" else -height) / chord
+    return p1[0] + chord_x / 2 - shift * chord_y, p1[1] + chord_y / 2 + shift * chord_x
+
+
+def curved_shape(name: str, belt: CurvedBelt) -> BeltShape:
+    """A curved belt's area; from two points on the inner race the shorter arc between them, which ends on both.
+
+    ValueError as in `arc_centre`.
+    """
+    if belt.centre is not None and belt.start_angle is not None and belt.span is not None:
+        centre, start, span = belt.centre, belt.start_angle, belt.span
+    elif belt.from_ is not None and belt.to is not None and belt.side is not None:
+        centre = arc_centre(belt.from_, belt.to, belt.inner_radius, belt.side)
+        first, last = (belt.from_, belt.to) if belt.side == "left" else (belt.to, belt.from_)
+        start = math.atan2(first[1] - centre[1], first[0] - centre[0])
+        span = (math.atan2(last[1] - centre[1], last[0] - centre[0]) - start) % (2 * math.pi)
+    else:
+        raise ValueError("neither centre, start_angle and span nor from, to and side are given")
+    return BeltShape(
+        name, "curved", belt.width, centre=centre, inner_radius=belt.inner_radius, start_angle=start, span=span
+    )
+
+
+def belt_shape(name: str, belt: Belt) -> BeltShape:
+    """A belt's area. ValueError as in `curved_shape`."""
+    if isinstance(belt, CurvedBelt):
+        return curved_shape(name, belt)
+    return BeltShape(name, "straight", belt.width, corner=belt.start, angle=belt.angle, length=belt.length)
+
+
+def belt_shapes(scene: Scene) -> list[BeltShape]:
+    """The areas of the belts, in the scene's order."""
+    return [belt_shape(name, belt) for name, belt in scene.belts.items()]
+
+
+def rail_pieces(rail: Rail) -> tuple[Piece, ...]:
+    """The pieces of a rail."""
+    if isinstance(rail, ArcRail):
+        return (ArcPiece(rail.centre, rail.radius, rail.start_angle, rail.span),)
+    if not isinstance(rail, PolylineRail):
+        return (SegmentPiece(rail.from_, rail.to),)
+    corners = [*rail.points, rail.points[0]] if rail.closed else list(rail.points)
+    return tuple(SegmentPiece(*ends) for ends in pairwise(corners))
+
+
+def rails_of_curved(shape: BeltShape, belt: CurvedBelt) -> Iterator[RailShape]:
+    """The rails along a curved belt's arcs that it asks for: `<belt>_inner`, `<belt>_outer`."""
+    for side, wanted, radius in (
+        ("inner", belt.rails.inner, shape.inner_radius),
+        ("outer", belt.rails.outer, shape.inner_radius + shape.width),
+    ):
+        if wanted and belt.rails.material is not None:
+            piece = ArcPiece(shape.centre, radius, shape.start_angle, shape.span)
+            yield RailShape(f"{shape.name}_{side}", belt.rails.material, (piece,))
+
+
+def rail_shapes(scene: Scene) -> list[RailShape]:
+    """The scene's rails in its order, then those of its curved belts; a rail's index everywhere is its place here."""
+    shapes = [RailShape(name, rail.material, rail_pieces(rail)) for name, rail in scene.rails.items()]
+    for name, belt in scene.belts.items():
+        if isinstance(belt, CurvedBelt):
+            shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
+    return shapes
+
+
+def grid_points(grid: GridOfBottles) -> Array:
+    """Positions (rows x columns, 2) of a grid's bottles, row by row."""
+    row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
+    hexagonal = grid.pattern == "hexagonal"
+    along = grid.pitch * (column + (row % 2) / 2 if hexagonal else column)
+    across = grid.pitch * row * (math.sqrt(3) / 2 if hexagonal else 1.0)
+    cos, sin = math.cos(grid.angle), math.sin(grid.angle)
+    return np.column_stack([grid.origin[0] + cos * along - sin * across, grid.origin[1] + sin * along + cos * across])
+
+
+def initial_bottles(scene: Scene) -> list[InitialBottle]:
+    """Bottles at the start, in order, grids row by row: (type, x, y, theta, vx, vy, omega)."""
+    bottles: list[InitialBottle] = []
+    for entry in scene.bottles:
+        if isinstance(entry, Grid):
+            points = grid_points(entry.grid).tolist()
+            bottles.extend((entry.grid.type, x, y, 0.0, 0.0, 0.0, 0.0) for x, y in points)
+        else:
+            bottles.append((entry.type, *entry.position, entry.angle, *entry.velocity, entry.spin))
+    return bottles
+
+
+def _length(vectors: Array) -> Array:
+    return np.hypot(vectors[:, 0], vectors[:, 1])

@@ -1,0 +1,126 @@
+"""Reads a scene: YAML and overrides in, a validated Scene out, or an error that names file, line, field and value."""
+
+import io
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path as FilePath
+from typing import Any
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+
+from conveyor_sim.errors import SceneError
+from conveyor_sim.scene.checks import problems_of
+from conveyor_sim.scene.problems import Path, Problem, dotted
+from conveyor_sim.scene.schema import Scene, Source
+from conveyor_sim.scene.yaml_lines import Document
+
+_MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
+
+
+def load_scene(path: str | PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Read a scene file. `overrides` is laid over it before it is validated: mappings merge, all else replaces.
+
+    Raises SceneError with one line for each problem of the file.
+    """
+    file = FilePath(path)
+    try:
+        text = file.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise SceneError(f"{path}: no such file, expected a scene file") from None
+    except IsADirectoryError:
+        raise SceneError(f"{path}: is a folder, expected a scene file") from None
+    except OSError as error:
+        raise SceneError(f"{path}: can't be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise SceneError(f"{path}:{line}: not UTF-8 text, expected a scene file in UTF-8") from None
+    return parse_scene(text, str(path), overrides)
+
+
+def parse_scene(text: str, name: str = "<text>", overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Read a scene from YAML text; `name` stands for the file in errors. See `load_scene`."""
+    document = Document(text, name)
+    changes = plain(overrides or {}, name)
+    data = _merge(document.data, changes) if changes else document.data
+    try:
+        scene = Scene.model_validate(data)
+    except ValidationError as error:
+        raise _refused(_untagged(error), document, name, changes) from None
+    problems = problems_of(scene)
+    if problems:
+        raise _refused(problems, document, name, changes)
+    scene._source = Source(text, name, _yaml_text(changes))
+    return scene
+
+
+def parse_overrides(text: str) -> dict[str, Any]:
+    """Overrides from the YAML that `Scene.overrides_text` holds ("" is none). SceneError if it is not a mapping."""
+    if not text.strip():
+        return {}
+    data = Document(text, "overrides").data
+    if not isinstance(data, dict):
+        raise SceneError("overrides: expected a mapping of fields of the scene")
+    return data
+
+
+def plain(value: Any, name: str) -> Any:
+    """Overrides as plain data. SceneError if there is something in them that YAML has no form for."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item, name) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, name) for item in value]
+    for kind in (bool, int, float, str):
+        if isinstance(value, kind):
+            return kind(value)
+    if value is None:
+        return None
+    raise SceneError(f"{name} (override): a value of type {type(value).__name__} given, expected what YAML can hold")
+
+
+def _merge(data: Any, changes: Any) -> Any:
+    if not (isinstance(data, dict) and isinstance(changes, dict)):
+        return changes
+    return {**data, **{key: _merge(data.get(key), change) for key, change in changes.items()}}
+
+
+def _untagged(error: ValidationError) -> list[Problem]:
+    """The problems of a failed validation; kinds of belts, rails and bottles are left out of their paths."""
+    return [
+        Problem(tuple(part for part in item["loc"] if not str(part).startswith("(")), item["msg"])
+        for item in error.errors(include_url=False)
+    ]
+
+
+def _refused(problems: list[Problem], document: Document, name: str, changes: Any) -> SceneError:
+    lines = []
+    for problem in problems:
+        overridden = _holds(changes, problem.path)
+        place = f"{name} (override)" if overridden else f"{name}:{document.line_of(problem.path)}"
+        path = f" {dotted(problem.path)}:" if problem.path else ""
+        lines.append((0 if overridden else document.line_of(problem.path), f"{place}:{path} {problem.text}"))
+    texts = [text for _, text in sorted(lines, key=lambda line: line[0])]
+    if len(texts) > _MOST_PROBLEMS:
+        texts[_MOST_PROBLEMS:] = [f"{name}: and {len(texts) - _MOST_PROBLEMS} more problems"]
+    return SceneError("\n".join(texts))
+
+
+def _holds(changes: Any, path: Path) -> bool:
+    """Whether the value at a path, or one above it, comes from the overrides."""
+    for part in path:
+        if not isinstance(changes, dict):
+            return True
+        if part not in changes:
+            return False
+        changes = changes[part]
+    return bool(path)
+
+
+def _yaml_text(changes: Any) -> str:
+    if not changes:
+        return ""
+    stream = io.StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.dump(changes, stream)
+    return stream.getvalue()

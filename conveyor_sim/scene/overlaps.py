@@ -1,0 +1,43 @@
+"""Which of many circles overlap: cell grid, vectorised."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MOST_CELLS = 1e6  # along one axis, so that the number of a cell fits 64 bits; coarser cells are only slower
+# Half of a cell's neighbours: the other half sees the pair from its own side.
+_FORWARD = ((0, 0), (1, -1), (1, 0), (1, 1), (0, 1))
+
+
+def overlapping(
+    centres: NDArray[np.float64], radii: NDArray[np.float64], tolerance: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs (i, j), i < j, of circles (centres (n, 2), radii (n,), m) that overlap by more than the tolerance (m)."""
+    if len(centres) < 2:
+        return np.empty(0, np.intp), np.empty(0, np.intp)
+    low = centres.min(axis=0)
+    size = max(2 * float(radii.max()), float((centres.max(axis=0) - low).max()) / _MOST_CELLS)
+    column, row = ((centres - low) / size).astype(np.int64).T
+    stride = int(row.max()) + 3  # a free cell at either end of a column, so that neighbours never wrap around
+    cell = column * stride + row + 1
+    order = np.argsort(cell, kind="stable")
+    ordered = cell[order]
+    found = []
+    for right, up in _FORWARD:
+        wanted = ordered + right * stride + up
+        begin = np.arange(len(cell)) + 1 if right == up == 0 else np.searchsorted(ordered, wanted, "left")
+        one, place = _ranges(begin, np.searchsorted(ordered, wanted, "right"))
+        i, j = order[one], order[place]
+        apart = np.hypot(*(centres[i] - centres[j]).T)
+        close = apart < radii[i] + radii[j] - tolerance
+        found.append(np.sort(np.column_stack([i[close], j[close]]), axis=1))
+    pairs = np.vstack(found)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _ranges(begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All (k, place) with begin[k] <= place < end[k]."""
+    count = end - begin
+    one = np.repeat(np.arange(len(begin)), count)
+    first = np.repeat(np.cumsum(count) - count, count)
+    return one, begin[one] + np.arange(len(one)) - first

@@ -1,0 +1,45 @@
+"""Whether a polygon is simple: no side without length, no two sides that meet."""
+
+import math
+
+from conveyor_sim.scene.geometry import TOUCH, XY
+
+
+def why_not_simple(corners: tuple[XY, ...]) -> str | None:
+    """Why a polygon is not simple, or None if it is."""
+    sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
+    for index, (start, end) in enumerate(sides):
+        if math.dist(start, end) <= TOUCH:
+            return f"side {index + 1} has no length"
+    for i, one in enumerate(sides):
+        for j in range(i + 1, len(sides)):
+            neighbours = j == i + 1 or (i == 0 and j == len(sides) - 1)
+            if _fold_back(one, sides[j]) if neighbours else _touch(one, sides[j]):
+                return f"sides {i + 1} and {j + 1} meet"
+    return None
+
+
+def _fold_back(one: tuple[XY, XY], other: tuple[XY, XY]) -> bool:
+    """Whether two sides with a common corner lie on each other."""
+    common, first = (one[1], one[0]) if one[1] == other[0] else (one[0], one[1])
+    second = other[1] if common == other[0] else other[0]
+    away = (first[0] - common[0]) * (second[0] - common[0]) + (first[1] - common[1]) * (second[1] - common[1])
+    return away > 0 and _turn(common, first, second) == 0
+
+
+def _touch(one: tuple[XY, XY], other: tuple[XY, XY]) -> bool:
+    (a, b), (c, d) = one, other
+    if _turn(a, b, c) != _turn(a, b, d) and _turn(c, d, a) != _turn(c, d, b):
+        return True
+    ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+    return any(_turn(*three) == 0 and _between(*three) for three in ends)
+
+
+def _turn(a: XY, b: XY, c: XY) -> int:
+    """Sign of the turn a to b to c; 0 if c is within touching distance of the line."""
+    cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return 0 if abs(cross) <= TOUCH * math.dist(a, b) else (1 if cross > 0 else -1)
+
+
+def _between(a: XY, b: XY, point: XY) -> bool:
+    return all(min(a[k], b[k]) - TOUCH <= point[k] <= max(a[k], b[k]) + TOUCH for k in (0, 1))

@@ -1,0 +1,94 @@
+"""The kinds of value that a scene is made of, each with the words that tell a user what is expected."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from annotated_types import Ge, Gt, Le, Len
+from pydantic import AllowInfNan, BeforeValidator, Field, GetCoreSchemaHandler, Strict, StringConstraints
+from pydantic import ValidationError as _PydanticError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+COORDINATE_LIMIT = 1e5  # m; farther out a double no longer resolves a contact, and a static grid would not fit memory
+
+_ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad)\s*")
+
+
+@dataclass(frozen=True)
+class Holds:
+    """Marks a container with what is expected in its place; what is wrong inside speaks for itself."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Says(Holds):
+    """Marks a type with what is expected of its values; whatever is wrong inside is reported in these words."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        def in_words(value: Any, validate: core_schema.ValidatorFunctionWrapHandler) -> Any:
+            try:
+                return validate(value)
+            except (_PydanticError, ValueError):
+                raise PydanticCustomError("expected", "{text}", {"text": self.text}) from None
+
+        return core_schema.no_info_wrap_validator_function(in_words, handler(source))
+
+
+def parse_angle(value: Any) -> Any:
+    """Angle in rad from a number (rad) or a text such as "90 deg" or "0.5 rad"; anything else is returned as it is."""
+    match = _ANGLE.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        return value
+    number = float(match[1])
+    return math.radians(number) if match[2] == "deg" else number
+
+
+Number = Annotated[float, Strict(), AllowInfNan(False), Says("a number")]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Says("a number greater than 0")]
+NotNegative = Annotated[float, Strict(), AllowInfNan(False), Ge(0), Says("a number, 0 or greater")]
+Count = Annotated[int, Strict(), Ge(1), Says("a whole number, 1 or greater")]
+Seed = Annotated[int, Strict(), Ge(0), Le(2**64 - 1), Says("a whole number from 0 to 2^64 - 1")]
+Flag = Annotated[bool, Strict(), Says("true or false")]
+Text = Annotated[str, Says("a text")]
+
+_angle_words = 'an angle, a number or a text like "90 deg"'
+_span_words = 'an angle greater than 0 and at most a full turn, a number or a text like "90 deg"'
+Angle = Annotated[float, Strict(), AllowInfNan(False), BeforeValidator(parse_angle), Says(_angle_words)]
+Span = Annotated[
+    float, Strict(), AllowInfNan(False), Gt(0), Le(2 * math.pi), BeforeValidator(parse_angle), Says(_span_words)
+]
+
+_coordinate = Annotated[float, Strict(), AllowInfNan(False), Ge(-COORDINATE_LIMIT), Le(COORDINATE_LIMIT)]
+_component = Annotated[float, Strict(), AllowInfNan(False)]
+Point = Annotated[
+    tuple[_coordinate, _coordinate], Says(f"a point [x, y] of two numbers within +-{COORDINATE_LIMIT:.0f}")
+]
+Velocity = Annotated[tuple[_component, _component], Says("a velocity [vx, vy] of two numbers")]
+Limits = Annotated[tuple[_component, _component], Says("two numbers [least, greatest]")]
+
+# A name becomes part of a ROS topic, which takes these characters only and at most 255 of them.
+Name = Annotated[
+    str,
+    StringConstraints(pattern=r"\A[A-Za-z][A-Za-z0-9_]*\z", max_length=100),
+    Says("a name of at most 100 letters, digits and underscores, beginning with a letter"),
+]
+Pair = Annotated[tuple[Name, Name], Says("two names of materials [one, other]")]
+PointList = Annotated[tuple[Point, ...], Len(2), Holds("a list of two or more points [x, y]")]
+PolygonList = Annotated[tuple[Point, ...], Len(3), Holds("a list of three or more points [x, y]")]
+
+
+def quantity(description: str, unit: str = "", **more: Any) -> Any:
+    """A schema field with its description and SI unit ("1" if it has no dimension, "" if it is not a quantity)."""
+    return Field(description=description, json_schema_extra={"unit": unit}, **more)
+
+
+def nanoseconds(seconds: float) -> int:
+    """Seconds as nanoseconds, rounded."""
+    return round(seconds * 1e9)
+
+
+def is_whole_nanoseconds(seconds: float) -> bool:
+    """Whether a time is a whole number of nanoseconds, within the rounding of a double."""
+    return math.isclose(seconds * 1e9, nanoseconds(seconds), rel_tol=4e-15, abs_tol=0.0)

@@ -1,0 +1,139 @@
+"""Turns what pydantic finds wrong into sentences: what was given, what was expected, in which unit."""
+
+import difflib
+import math
+from collections.abc import Mapping
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+from conveyor_sim.scene.types import Holds
+
+_LONGEST_VALUE = 60
+
+
+def shown(value: Any) -> str:
+    """The value of a field for an error: as YAML, cut short when it is long."""
+    text = in_yaml(value)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
+
+
+def in_yaml(value: Any) -> str:
+    """The value as YAML would show it, on one line."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        special = {math.inf: ".inf", -math.inf: "-.inf"}
+        return ".nan" if math.isnan(value) else special.get(value, repr(value).removesuffix(".0"))
+    if isinstance(value, str):
+        return '"' + value.replace("\n", "\\n") + '"'
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{k}: {in_yaml(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(in_yaml(v) for v in value) + "]"
+    return str(value)
+
+
+def listed(words: list[str]) -> str:
+    """`a, b or c`."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
+
+
+def expectation(field: FieldInfo) -> str:
+    """What a field takes, with its unit: `a number greater than 0 (m)`."""
+    says = [m.text for m in field.metadata if isinstance(m, Holds)]
+    text = says[-1] if says else _expectation_of(field.annotation)
+    unit = unit_of(field)
+    return f"{text} ({unit})" if unit not in ("", "1") else text
+
+
+def unit_of(field: FieldInfo) -> str:
+    """SI unit of a field: "1" if it has no dimension, "" if it is not a quantity."""
+    extra = field.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+def _expectation_of(annotation: Any) -> str:
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        says = [m.text for m in annotation.__metadata__ if isinstance(m, Holds)]
+        return says[-1] if says else _expectation_of(get_args(annotation)[0])
+    if origin is Literal:
+        return listed([f'"{value}"' for value in get_args(annotation)])
+    if origin in (Union, UnionType):
+        (something,) = (part for part in get_args(annotation) if part is not type(None))
+        return _expectation_of(something)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return fields_of(annotation)
+    raise TypeError(f"{annotation} has no words; mark it with Says or Holds")
+
+
+def field_names(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The fields of a model by the name that a scene file uses."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
+def fields_of(model: type[BaseModel]) -> str:
+    """`a mapping with the fields a, b and c`, shortened to the required ones if there are many."""
+    names = field_names(model)
+    needed = [name for name, field in names.items() if field.is_required()]
+    if needed and len(names) > 6:
+        return "a mapping with at least the fields " + ", ".join(needed)
+    return "a mapping with the fields " + ", ".join(names)
+
+
+def in_words(model: type[BaseModel], error: ValidationError) -> ValidationError:
+    """The same problems, those of the model's own fields said in words (error type "said", which passes unchanged)."""
+    details = [_said(model, problem) for problem in error.errors(include_url=False)]
+    return ValidationError.from_exception_data(error.title, details)
+
+
+def _said(model: type[BaseModel], problem: ErrorDetails) -> InitErrorDetails:
+    loc, value = problem["loc"], problem["input"]
+    text = _sentence(model, problem)
+    if problem["type"] == "kind" and isinstance(value, Mapping):
+        loc = (*loc, "kind")
+    if loc and loc[-1] == "[key]":
+        loc = loc[:-1]
+    return {"type": PydanticCustomError("said", "{text}", {"text": text}), "loc": loc, "input": value}
+
+
+def _sentence(model: type[BaseModel], problem: ErrorDetails) -> str:
+    kind, loc, value = problem["type"], problem["loc"], problem["input"]
+    if kind == "said":
+        return str(problem["ctx"]["text"])
+    if not loc:
+        return f"{shown(value)} given, expected {fields_of(model)}"
+    names = field_names(model)
+    if kind == "extra_forbidden":
+        return _unknown(str(loc[0]), list(names))
+    field = names[str(loc[0])]
+    if kind == "missing":
+        return f"missing, expected {expectation(field)}"
+    if kind == "kind":
+        return _wrong_kind(value, str(problem["ctx"]["text"]))
+    if loc[-1] == "[key]":
+        return f"{shown(value)} given as a name, expected {problem['ctx']['text']}"
+    if kind == "expected" and len(loc) > 1:
+        unit = unit_of(field)
+        text = str(problem["ctx"]["text"])
+        return f"{shown(value)} given, expected {text}" + (f" ({unit})" if unit not in ("", "1") else "")
+    return f"{shown(value)} given, expected {expectation(field)}"
+
+
+def _unknown(name: str, names: list[str]) -> str:
+    close = difflib.get_close_matches(name, names, n=1)
+    return "no such field, " + (f"did you mean {close[0]}?" if close else "expected " + listed(names))
+
+
+def _wrong_kind(value: Any, kinds: str) -> str:
+    if not isinstance(value, Mapping):
+        return f"{shown(value)} given, expected a mapping with kind {kinds}"
+    if "kind" not in value:
+        return f"missing, expected {kinds}"
+    return f"{shown(value['kind'])} given, expected {kinds}"

@@ -1,0 +1,115 @@
+"""Every way a scene can be wrong is answered with one line that names file, line, field, value and expectation."""
+
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from conveyor_sim.errors import SceneError
+from conveyor_sim.scene import load_scene, parse_scene
+
+HERE = Path(__file__).parent
+GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")
+CASES = YAML(typ="safe", pure=True).load((HERE / "bad_scenes.yaml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case["id"] for case in CASES])
+def test_one_wrong_thing_gets_one_line(case: dict[str, str]) -> None:
+    assert GOOD.count(case["old"]) >= 1, "the change no longer fits good.yaml"
+    text = GOOD.replace(case["old"], case["new"], 1)
+    line = 1 + next(number for number, content in enumerate(text.splitlines()) if case["at"] in content)
+    with pytest.raises(SceneError) as error:
+        parse_scene(text, "plant.yaml")
+    assert str(error.value) == f"plant.yaml:{line}: {case['says']}"
+
+
+def test_the_unchanged_scene_is_accepted() -> None:
+    parse_scene(GOOD)
+
+
+def test_all_problems_are_listed_in_the_order_of_lines() -> None:
+    text = GOOD.replace("duration: 1.0", "duration: -1").replace("mass: 0.2", "mass: -1").replace("rows: 2", "rows: 0")
+    with pytest.raises(SceneError) as error:
+        parse_scene(text, "plant.yaml")
+    assert [line.split(" given")[0] for line in str(error.value).splitlines()] == [
+        "plant.yaml:2: duration: -1",
+        "plant.yaml:10: bottle_types.jar.mass: -1",
+        "plant.yaml:33: bottles[1].grid.rows: 0",
+    ]
+
+
+def test_no_more_than_fifty_problems_are_listed() -> None:
+    heap = "".join("  - {type: jar, position: [0.4, 0.4]}\n" for _ in range(60))
+    with pytest.raises(SceneError) as error:
+        parse_scene(GOOD.replace("  - grid:", heap + "  - grid:"), "plant.yaml")
+    lines = str(error.value).splitlines()
+    assert len(lines) == 51
+    assert lines[0].startswith("plant.yaml:33: bottles[1].position: [0.4, 0.4] given")
+    assert lines[50] == "plant.yaml: and 10 more problems"
+
+
+def test_long_values_are_cut_short() -> None:
+    with pytest.raises(SceneError) as error:
+        parse_scene(GOOD.replace("name: good", f"name: {'x' * 200}"), "plant.yaml")
+    assert str(error.value).startswith('plant.yaml:1: name: "xxx')
+    assert "x ... given, expected a name" in str(error.value)
+    assert len(str(error.value)) < 200
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    path = tmp_path / "nothing.yaml"
+    with pytest.raises(SceneError, match="no such file, expected a scene file") as error:
+        load_scene(path)
+    assert str(error.value).startswith(f"{path}: ")
+
+
+def test_folder(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="is a folder, expected a scene file"):
+        load_scene(tmp_path)
+
+
+def test_file_below_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SceneError, match="can't be read: Not a directory"):
+        load_scene(tmp_path / "file" / "scene.yaml")
+
+
+@pytest.mark.parametrize("content", [b"", b"# only a comment\n", b"---\n"])
+def test_empty_file(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "empty.yaml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=r"empty\.yaml"):
+        load_scene(path)
+
+
+def test_not_utf_8(tmp_path: Path) -> None:
+    path = tmp_path / "latin.yaml"
+    path.write_bytes("name: a\ndescription: Zuführung\n".encode("latin-1"))
+    with pytest.raises(SceneError) as error:
+        load_scene(path)
+    assert str(error.value) == f"{path}:2: not UTF-8 text, expected a scene file in UTF-8"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("- 1\n", "plant.yaml:1: [1] given, expected a mapping with at least the fields name, duration, bottle_types"),
+        ("hello\n", 'plant.yaml:1: "hello" given, expected a mapping with at least the fields name, duration, '),
+        ("a: 1\n---\nb: 2\n", "plant.yaml:2: not valid YAML: expected a single document in the stream"),
+        ("a: \x01\n", "plant.yaml:1: not valid YAML: a control character that YAML does not allow"),
+        ("a: &a [*a]\n", "plant.yaml:1: not a scene: nested too deeply, or too many values"),
+        ("[" * 5000, "plant.yaml:1: not a scene: nested too deeply"),
+        ("a: *nowhere\n", "plant.yaml:1: not valid YAML: found undefined alias 'nowhere'"),
+    ],
+)
+def test_what_is_no_scene_at_all(text: str, says: str) -> None:
+    with pytest.raises(SceneError) as error:
+        parse_scene(text, "plant.yaml")
+    assert str(error.value).startswith(says)
+
+
+def test_aliases_that_multiply_are_stopped() -> None:
+    levels = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    levels += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12)]
+    with pytest.raises(SceneError, match="too many values"):
+        parse_scene("\n".join(levels))

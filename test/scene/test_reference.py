@@ -1,0 +1,46 @@
+"""The reference of the scene file is what the schema says, and says all that is needed."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from conveyor_sim.scene import schema
+from conveyor_sim.scene.reference import SECTIONS, reference
+from conveyor_sim.scene.types import parse_angle
+from conveyor_sim.scene.words import expectation, field_names, unit_of
+
+DOCS = Path(__file__).parents[2] / "docs" / "scene.md"
+MODELS = [model for _, model in SECTIONS]
+
+
+def test_docs_are_current() -> None:
+    assert DOCS.read_text(encoding="utf-8") == reference(), (
+        "run `python -m conveyor_sim.scene.reference > docs/scene.md`"
+    )
+
+
+def test_every_part_of_a_scene_has_its_section() -> None:
+    public = {
+        model
+        for name, model in vars(schema).items()
+        if isinstance(model, type) and issubclass(model, schema.Part) and not name.startswith("_")
+    }
+    assert public - {schema.Part} == set(MODELS)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
+def test_every_field_says_what_it_is_what_it_takes_and_in_which_unit(model: type[BaseModel]) -> None:
+    assert model.__doc__
+    for name, field in field_names(model).items():
+        assert field.description, name
+        assert field.description.endswith("."), name
+        takes = expectation(field)
+        assert takes, name
+        numeric = any(word in takes for word in ("number", "an angle", "points [", "a point [", "a velocity ["))
+        assert bool(unit_of(field)) == numeric, name
+
+
+def test_other_things_are_no_angles() -> None:
+    assert parse_angle([1]) == [1]
+    assert parse_angle("ninety deg") == "ninety deg"
