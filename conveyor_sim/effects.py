@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from conveyor_sim.laws import base_friction
-from conveyor_sim.scene.schema import CurvedBelt, Scene, Single
 from conveyor_sim.scene.geometry import ArcPiece, initial_bottles, rail_shapes
+from conveyor_sim.scene.schema import CurvedBelt, Scene, Single
 
 
 @dataclass(frozen=True)
@@ -123,17 +123,31 @@ def _curved_belts(scene: Scene) -> str | None:
 
 EFFECTS: tuple[Effect, ...] = (
     Effect("bottle_contact", "N = k delta between bottles", "(22)-(23)", _pairs, "a single bottle"),
-    Effect("segment_rails", "N = k delta at the nearest point of a segment", "(22)-(23)", _segments, "no straight rail"),
+    Effect(
+        "segment_rails", "N = k delta at the nearest point of a segment", "(22)-(23)", _segments, "no straight rail"
+    ),
     Effect("arc_rails", "N = k delta at the nearest point of an arc", "(21)-(23)", _arcs, "no arc rail"),
     Effect("paper_damping", "-c v*, isotropic", "(22)", _damping("paper"), "no contact with damping law paper"),
     Effect(
-        "normal_damping", "N = max(0, k delta + c v_n)", "added", _damping("normal"), "no contact with damping law normal"
+        "normal_damping",
+        "N = max(0, k delta + c v_n)",
+        "added",
+        _damping("normal"),
+        "no contact with damping law normal",
     ),
     Effect("contact_friction", "mu N p(s), at the rim", "(7)-(10)", _contact_friction, "no contact with friction"),
     Effect(
-        "rotation", "J alpha = M", "(1)", _rotation, "nothing turns a bottle: no contact friction, no paper damping, no spin"
+        "rotation",
+        "J alpha = M",
+        "(1)",
+        _rotation,
+        "nothing turns a bottle: no contact friction, no paper damping, no spin",
     ),
-    Effect("base_friction", "mu m g p(s), at the axis", "(7)-(10), (15)", _base_friction, "no friction under the bottles"),
+    Effect(
+        "base_friction", "mu m g p(s), at the axis", "(7)-(10), (15)", _base_friction, "no friction under the bottles"
+    ),
     Effect("belts", "the last listed belt under the axis carries", "(11)-(15)", _belts, "no belt with friction"),
-    Effect("curved_belts", "surface velocity Omega x (r - C)", "Table 1", _curved_belts, "no curved belt with friction"),
+    Effect(
+        "curved_belts", "surface velocity Omega x (r - C)", "Table 1", _curved_belts, "no curved belt with friction"
+    ),
 )

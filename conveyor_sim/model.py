@@ -129,9 +129,7 @@ def build_model(scene: Scene) -> Model:
     )
 
 
-def _bounds(
-    scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base: F8 | None
-) -> tuple[Bound, ...]:
+def _bounds(scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base: F8 | None) -> tuple[Bound, ...]:
     """The bounds on dt that apply, each the tightest over types and materials."""
     types = list(scene.bottle_types.values())
     mass = np.array([kind.mass for kind in types])
@@ -159,8 +157,10 @@ def _bounds(
     tightest("lattice stability", lattices)
     if base is not None:
         mu = float(base.max())
-        tightest("base friction", [(base_friction_bound(mu, scene.gravity, scene.slip_limit),
-                                    f"v_lim / (mu g) at mu = {mu:g}")])  # fmt: skip
+        tightest(
+            "base friction",
+            [(base_friction_bound(mu, scene.gravity, scene.slip_limit), f"v_lim / (mu g) at mu = {mu:g}")],
+        )
         tightest("contact friction", _contact_friction_bounds(scene, pairs, rails, mu))
     return tuple(found)
 
@@ -178,8 +178,13 @@ def _contact_friction_bounds(
         if mu > 0.0:
             force = queue * base_mu * kind.mass * scene.gravity
             dt = contact_friction_bound(mu, force, kind.mass, kind.moment_of_inertia, kind.radius, scene.slip_limit)
-            candidates.append((dt, f"v_lim / [2 mu (1/m + R^2/J) N] at mu = {mu:g} and N = {force:.3g} N, "
-                                   f"a single-file queue of {queue}"))  # fmt: skip
+            candidates.append(
+                (
+                    dt,
+                    f"v_lim / [2 mu (1/m + R^2/J) N] at mu = {mu:g} and N = {force:.3g} N, "
+                    f"a single-file queue of {queue}",
+                )
+            )
     return candidates
 
 

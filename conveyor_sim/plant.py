@@ -42,20 +42,35 @@ def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[S
         length = np.hypot(*(end - start).T)
         tangent = (end - start) / length[:, None]
         segments = Segments(
-            *_columns(start, tangent), length, _ends(start, end, joints, first),
-            material[first], rail[first], joints.surface[first],
-        )  # fmt: skip
+            x=start[:, 0].copy(),
+            y=start[:, 1].copy(),
+            tx=tangent[:, 0].copy(),
+            ty=tangent[:, 1].copy(),
+            length=length,
+            ends=_ends(start, end, joints, first),
+            material=material[first],
+            rail=rail[first],
+            surface=joints.surface[first],
+        )
     if straight < len(pieces):
         curves = [piece for piece, _ in pieces if isinstance(piece, ArcPiece)]
-        spans = [(curve.start_angle, curve.span) for curve in curves]
+        centre, ends = np.array([curve.centre for curve in curves]), np.array([curve.ends for curve in curves])
+        start_angle = np.array([curve.start_angle for curve in curves])
+        end_angle = start_angle + np.array([curve.span for curve in curves])
         arcs = Arcs(
-            *_columns(np.array([curve.centre for curve in curves])),
-            np.array([curve.radius for curve in curves]),
-            *_span_vectors(spans),
-            np.array([reach_code(span) for _, span in spans], dtype=np.int8),
-            _ends(*np.array([curve.ends for curve in curves]).transpose(1, 0, 2), joints, rest),
-            material[rest], rail[rest], joints.surface[rest],
-        )  # fmt: skip
+            x=centre[:, 0].copy(),
+            y=centre[:, 1].copy(),
+            radius=np.array([curve.radius for curve in curves]),
+            start_x=np.cos(start_angle),
+            start_y=np.sin(start_angle),
+            end_x=np.cos(end_angle),
+            end_y=np.sin(end_angle),
+            reach=np.array([reach_code(curve.span) for curve in curves], dtype=np.int8),
+            ends=_ends(ends[:, 0], ends[:, 1], joints, rest),
+            material=material[rest],
+            rail=rail[rest],
+            surface=joints.surface[rest],
+        )
     return segments, arcs
 
 
@@ -63,28 +78,19 @@ def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Bel
     """Where belts lie, with room for what each of `slots` bottles stands on; None without belts."""
     if not shapes:
         return None
-    curved = [shape.kind == "curved" for shape in shapes]
-    sectors = None
-    if any(curved):
-        sectors = Sectors(
-            *_columns(np.array([shape.centre for shape in shapes])),
-            np.array([shape.inner_radius for shape in shapes]),
-            np.array([shape.inner_radius + shape.width for shape in shapes]),
-            *_span_vectors([(shape.start_angle, shape.span) for shape in shapes]),
-            np.array([reach_code(shape.span) if is_curved else STRAIGHT
-                      for shape, is_curved in zip(shapes, curved, strict=True)], dtype=np.int8),
-        )  # fmt: skip
     angle = np.array([shape.angle for shape in shapes])
+    corner = np.array([shape.corner for shape in shapes])
     return Belts(
-        *_columns(np.array([shape.corner for shape in shapes])),
-        np.cos(angle),
-        np.sin(angle),
-        np.array([shape.length for shape in shapes]),
-        np.array([shape.width for shape in shapes]),
-        sectors,
-        np.full(slots, len(shapes), dtype=np.int32),
-        np.zeros(slots + 1, dtype=np.uint32),
-        np.zeros(candidates, dtype=np.uint32),
+        x=corner[:, 0].copy(),
+        y=corner[:, 1].copy(),
+        ax=np.cos(angle),
+        ay=np.sin(angle),
+        length=np.array([shape.length for shape in shapes]),
+        width=np.array([shape.width for shape in shapes]),
+        sectors=_sectors(shapes) if any(shape.kind == "curved" for shape in shapes) else None,
+        certain=np.full(slots, len(shapes), dtype=np.int32),
+        start=np.zeros(slots + 1, dtype=np.uint32),
+        candidate=np.zeros(candidates, dtype=np.uint32),
     )
 
 
@@ -105,23 +111,32 @@ def plant_grid(
     )
 
 
-def _columns(*points: F8) -> tuple[F8, ...]:
-    return tuple(np.ascontiguousarray(column) for group in points for column in group.T)
-
-
-def _span_vectors(spans: Sequence[tuple[float, float]]) -> tuple[F8, F8, F8, F8]:
-    start = np.array([angle for angle, _ in spans])
-    end = np.array([angle + span for angle, span in spans])
-    return np.cos(start), np.sin(start), np.cos(end), np.sin(end)
+def _sectors(shapes: Sequence[BeltShape]) -> Sectors:
+    centre = np.array([shape.centre for shape in shapes])
+    inner = np.array([shape.inner_radius for shape in shapes])
+    start_angle = np.array([shape.start_angle for shape in shapes])
+    end_angle = start_angle + np.array([shape.span for shape in shapes])
+    reach = [reach_code(shape.span) if shape.kind == "curved" else STRAIGHT for shape in shapes]
+    return Sectors(
+        x=centre[:, 0].copy(),
+        y=centre[:, 1].copy(),
+        inner=inner,
+        outer=inner + np.array([shape.width for shape in shapes]),
+        start_x=np.cos(start_angle),
+        start_y=np.sin(start_angle),
+        end_x=np.cos(end_angle),
+        end_y=np.sin(end_angle),
+        reach=np.array(reach, dtype=np.int8),
+    )
 
 
 def _ends(start: F8, end: F8, joints: Joints, part: slice) -> Ends:
     return Ends(
-        np.column_stack([start[:, 0], end[:, 0]]),
-        np.column_stack([start[:, 1], end[:, 1]]),
-        joints.code[part],
-        np.ascontiguousarray(joints.neighbour[part, :, 0]),
-        np.ascontiguousarray(joints.neighbour[part, :, 1]),
+        x=np.column_stack([start[:, 0], end[:, 0]]),
+        y=np.column_stack([start[:, 1], end[:, 1]]),
+        joint=joints.code[part],
+        neighbour_x=joints.neighbour[part, :, 0].copy(),
+        neighbour_y=joints.neighbour[part, :, 1].copy(),
     )
 
 
@@ -139,8 +154,9 @@ def _arc_extremes(piece: ArcPiece) -> F8:
     """Points whose box holds the arc: its ends and where it crosses the axes through its centre."""
     first = math.ceil(piece.start_angle / (math.pi / 2))
     last = math.floor((piece.start_angle + piece.span) / (math.pi / 2))
-    angle = np.array([piece.start_angle, piece.start_angle + piece.span, *(np.arange(first, last + 1) * math.pi / 2)])
-    return np.column_stack([piece.centre[0] + piece.radius * np.cos(angle), piece.centre[1] + piece.radius * np.sin(angle)])
+    crossings = np.arange(first, last + 1) * (math.pi / 2)
+    angle = np.array([piece.start_angle, piece.start_angle + piece.span, *crossings])
+    return np.array(piece.centre) + piece.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def _belt_extremes(shape: BeltShape) -> F8:

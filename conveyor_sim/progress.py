@@ -20,7 +20,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self._what = what
         self._total = total
         self._console = console or Console(file=sys.stderr)
-        self._start = time.monotonic()
+        self._start: tuple[float, float] | None = None
         self._next_line = PLAIN_SHARE * total
         self._bar: Progress | None = None
         if self._console.is_terminal:
@@ -35,17 +35,22 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self._task = self._bar.add_task(what, total=total, state="")
             self._bar.start()
 
-    def update(self, done: float) -> None:
-        """`done`: simulated time so far, s."""
+    def update(self, done: float, total: float | None = None) -> None:
+        """`done`: simulated time so far, s; `total`: the whole, where it was not known at first."""
+        if self._start is None:  # building and compiling come before the first tick and would look like slowness
+            self._start = (time.monotonic(), done)
+        if total is not None and total != self._total:
+            self._total, self._next_line = total, PLAIN_SHARE * total
         if self._bar is not None:
-            self._bar.update(self._task, completed=done, state=self._state(done))
+            self._bar.update(self._task, completed=done, total=self._total, state=self._state(done))
         elif done >= self._next_line:
             self._next_line += PLAIN_SHARE * self._total
             self._console.print(f"{self._what}: {self._state(done)}", highlight=False)
 
     def _state(self, done: float) -> str:
-        wall = max(time.monotonic() - self._start, 1e-9)
-        return f"{done:.1f} of {self._total:.1f} s, {done / wall:.3g} x real time"
+        start, already = self._start or (time.monotonic(), done)
+        wall = max(time.monotonic() - start, 1e-9)
+        return f"{done:.1f} of {self._total:.1f} s, {(done - already) / wall:.3g} x real time"
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

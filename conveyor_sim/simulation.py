@@ -239,6 +239,7 @@ class Simulation:
         if not math.isfinite(bottles.x.sum() + bottles.y.sum() + bottles.vx.sum() + bottles.vy.sum()):
             bad = ~np.isfinite(bottles.x + bottles.y + bottles.vx + bottles.vy)
             raise SimulationError(
-                f"bottle {bottles.id[bad].min()} has no finite position or velocity after the tick from {self.time:g} s: "
+                f"bottle {bottles.id[bad].min()} has no finite position or velocity "
+                f"after the tick that began at {self.time:g} s: "
                 f"dt = {self.model.dt:g} s is too long for this scene ({self.model.dt_reason}); raise step.per_tick"
             )

@@ -3,6 +3,8 @@
 import numpy as np
 
 from conveyor_sim.engine.arrays import (
+    F8,
+    U4,
     Bottles,
     Load,
     Near,
@@ -99,9 +101,14 @@ class State:
         law = self.model.pair_law
         if law is None:
             return None
-        columns = [np.zeros(entries) if table is not None else None for table in law[1:]]
         return Pairs(
-            np.zeros(entries, np.uint32), np.zeros(entries, np.uint32), np.zeros(entries), *columns, np.zeros(1, np.int64)
+            i=np.zeros(entries, np.uint32),
+            j=np.zeros(entries, np.uint32),
+            stiffness=np.zeros(entries),
+            friction=_column_like(law.friction, entries),
+            damping_paper=_column_like(law.damping_paper, entries),
+            damping_normal=_column_like(law.damping_normal, entries),
+            used=np.zeros(1, np.int64),
         )
 
     @staticmethod
@@ -110,35 +117,31 @@ class State:
 
     def _empty_world(self, slots: int, entries: int) -> World:
         model = self.model
-        reals = [np.zeros(slots) for _ in range(16)]
-        take = iter(reals)
-        ids = np.full(slots, -1, dtype=np.int64)
-        bottles = Bottles(*(next(take) for _ in range(7)), np.zeros(slots, np.uint32), ids)
         buckets = 1 << max(4, (2 * slots - 1).bit_length())
-        floor = len(model.belts)
-        surface = None
-        if model.base_friction is not None:
-            curved = model.has("curved_belts")
-            centres = np.array([shape.centre for shape in model.belt_shapes] + [(0.0, 0.0)])
-            surface = Surface(
-                ux=np.zeros(floor + 1),
-                uy=np.zeros(floor + 1),
-                turn=np.zeros(floor + 1) if curved else None,
-                cx=np.ascontiguousarray(centres[:, 0]) if curved else None,
-                cy=np.ascontiguousarray(centres[:, 1]) if curved else None,
-                friction=model.base_friction,
-                carrier=np.full(slots, floor, dtype=np.int32),
-            )
+
+        def reals() -> F8:
+            return np.zeros(slots)
+
         return World(
             settings=model.settings,
-            bottles=bottles,
-            spin=Spin(*(np.zeros(slots) for _ in range(4))) if model.has("rotation") else None,
-            load=Load(*(next(take) for _ in range(4))),
-            peaks=Peaks(*(next(take) for _ in range(2))),
-            stage=Stage(*(next(take) for _ in range(3))) if model.integrator in STAGED else None,
+            bottles=Bottles(
+                x=reals(),
+                y=reals(),
+                vx=reals(),
+                vy=reals(),
+                radius=reals(),
+                inverse_mass=reals(),
+                weight=reals(),
+                type=np.zeros(slots, np.uint32),
+                id=np.full(slots, -1, dtype=np.int64),
+            ),
+            spin=Spin(reals(), reals(), reals(), reals()) if model.has("rotation") else None,
+            load=Load(reals(), reals(), reals(), reals()),
+            peaks=Peaks(reals(), reals()),
+            stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
             neighbourhood=Neighbourhood(
-                x=np.zeros(slots),
-                y=np.zeros(slots),
+                x=reals(),
+                y=reals(),
                 stale=np.ones(1, np.int64),
                 cell=np.zeros((slots, 2), np.int64),
                 bucket=np.zeros(buckets + 1, np.uint32),
@@ -154,15 +157,45 @@ class State:
             rail_law=model.rail_law,
             rail_contacts=_rail_contacts() if model.rail_law is not None else None,
             belts=belt_arrays(model.belt_shapes, slots, entries) if model.has("belts") else None,
-            surface=surface,
+            surface=self._surface(slots),
+        )
+
+    def _surface(self, slots: int) -> Surface | None:
+        model, floor = self.model, len(self.model.belts)
+        if model.base_friction is None:
+            return None
+        curved = model.has("curved_belts")
+        centres = np.array([shape.centre for shape in model.belt_shapes] + [(0.0, 0.0)])
+        return Surface(
+            ux=np.zeros(floor + 1),
+            uy=np.zeros(floor + 1),
+            turn=np.zeros(floor + 1) if curved else None,
+            cx=centres[:, 0].copy() if curved else None,
+            cy=centres[:, 1].copy() if curved else None,
+            friction=model.base_friction,
+            carrier=np.full(slots, floor, dtype=np.int32),
         )
 
 
+def _column_like(table: F8 | None, entries: int) -> F8 | None:
+    """A column for an effect that is there, None for one that is not."""
+    return None if table is None else np.zeros(entries)
+
+
 def _rail_contacts() -> RailContacts:
-    def reals() -> np.ndarray:
+    def reals() -> F8:
         return np.zeros(MOST_CONTACTS)
 
-    def whole() -> np.ndarray:
+    def whole() -> U4:
         return np.zeros(MOST_CONTACTS, np.uint32)
 
-    return RailContacts(reals(), reals(), reals(), reals(), whole(), whole(), whole(), reals())
+    return RailContacts(
+        nx=reals(),
+        ny=reals(),
+        overlap=reals(),
+        share=reals(),
+        material=whole(),
+        rail=whole(),
+        surface=whole(),
+        solution=reals(),
+    )

@@ -154,10 +154,11 @@ class _Tally:
         )
 
     def _signal_sum(self, prefix: str, suffix: str) -> int | None:
-        if self._signals is None:
-            return None
-        pairs = zip(self._bag.line.signal_names, self._signals, strict=True)
-        return int(sum(value for name, value in pairs if name.startswith(prefix) and name.endswith(suffix)))
+        names = self._bag.line.signal_names
+        chosen = [index for index, name in enumerate(names) if name.startswith(prefix) and name.endswith(suffix)]
+        if not chosen:
+            return 0
+        return None if self._signals is None else int(self._signals[chosen].sum())
 
     def _belts(self, belt: NDArray[np.int32]) -> dict[str, BeltFlow]:
         flows = {}
@@ -232,7 +233,7 @@ def render(summary: Summary) -> Group:
     topics = _table("topic", "messages", "bytes")
     for name, count in sorted(summary.topics.items()):
         topics.add_row(name, f"{count.messages}", f"{count.bytes}")
-    return Group(account, belts, topics)
+    return Group(account, belts, topics) if summary.belts else Group(account, topics)
 
 
 def _account(summary: Summary) -> list[tuple[str, str]]:

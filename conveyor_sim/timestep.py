@@ -37,8 +37,9 @@ def base_friction_bound(friction: float, gravity: float, slip_limit: float) -> f
     return slip_limit / (friction * gravity)
 
 
-def contact_friction_bound(friction: float, normal_force: float, mass: float, inertia: float, radius: float,
-                           slip_limit: float) -> float:
+def contact_friction_bound(
+    friction: float, normal_force: float, mass: float, inertia: float, radius: float, slip_limit: float
+) -> float:
     """Explicit regularised friction in a contact chatters beyond v_lim / [2 mu (1/m + R^2/J) N], in s."""
     return slip_limit / (2.0 * friction * (1.0 / mass + radius**2 / inertia) * normal_force)
 

@@ -34,7 +34,11 @@ def arc_contact(arcs: Arcs, k: int, x: float, y: float, radius: float) -> tuple[
     distance = math.sqrt(to_start if end == 0 else to_end)
     if distance == 0.0:
         # A centre exactly on the end: pushed off along the arc's radius.
-        return radius, -arcs.start_x[k] if end == 0 else -arcs.end_x[k], -arcs.start_y[k] if end == 0 else -arcs.end_y[k]
+        return (
+            radius,
+            -arcs.start_x[k] if end == 0 else -arcs.end_x[k],
+            -arcs.start_y[k] if end == 0 else -arcs.end_y[k],
+        )
     if end == 0:
         return radius - distance, to_start_x / distance, to_start_y / distance
     return radius - distance, to_end_x / distance, to_end_y / distance

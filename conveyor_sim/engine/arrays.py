@@ -74,7 +74,7 @@ class Pairs(NamedTuple):
     friction: F8 | None
     damping_paper: F8 | None
     damping_normal: F8 | None
-    count: I8
+    used: I8
     """(1,), pairs in use."""
 
 
@@ -201,7 +201,7 @@ class Belts(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """Velocity field of each belt's surface, (H + 1,): (ux - turn (y - cy), uy + turn (x - cx)); at rest for the floor."""
+    """Velocity field of each belt's surface, (H + 1,): (ux - turn (y - cy), uy + turn (x - cx)); the floor rests."""
 
     ux: F8
     uy: F8

@@ -10,9 +10,9 @@ from .sector import span_distance
 
 @kernel
 def belt_distance(belts: Belts, sectors: Any, h: int, x: float, y: float) -> float:
-    """Signed distance in m of a point from the edge of belt h: >= 0 on the belt, never more in size than the true one."""
+    """Signed distance in m of a point from the edge of belt h: >= 0 on it, never more in size than the true one."""
     if sectors is not None:
-        if sectors.reach[h] >= 0:
+        if sectors.reach[h] >= 0:  # a test for None is pruned where it stands alone
             return _sector_distance(sectors, h, x, y)
     dx = x - belts.x[h]
     dy = y - belts.y[h]

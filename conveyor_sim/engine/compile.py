@@ -44,19 +44,23 @@ def cache_dir() -> Path:
 ENGINE_HASH = engine_hash()
 CACHE_DIR = cache_dir()
 
+# Numba's type stubs know neither CACHE_DIR nor _nrt.
+_config: Any = numba.config
+_njit: Any = numba.njit
+
 
 def kernel(function: Function) -> Function:
     """Compile without the interpreter or its lock, cached on disk; IEEE arithmetic, no flag that reorders it.
 
-    Kernels allocate nothing, so numba's reference counts (``_nrt``) are off: with them every column taken out of a tuple
-    is counted up and down inside the loops, and a dense table ran five times slower.
+    Kernels allocate nothing, so numba's reference counts (``_nrt``) are off: with them every column taken out of a
+    tuple is counted up and down inside the loops, and a dense table ran five times slower.
     """
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE_DIR)
+    previous = _config.CACHE_DIR
+    _config.CACHE_DIR = str(CACHE_DIR)
     try:
-        compiled: Function = numba.njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
+        compiled: Function = _njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
     finally:
-        numba.config.CACHE_DIR = previous
+        _config.CACHE_DIR = previous
     return compiled
 
 

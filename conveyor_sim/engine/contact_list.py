@@ -31,7 +31,7 @@ def _pair_contacts(
     if pairs is None:
         return 0
     count = 0
-    for p in range(pairs.count[0]):
+    for p in range(pairs.used[0]):
         overlap, nx, ny, normal, tangential = pair_contact(p, settings, bottles, spin, pairs)
         if overlap > 0.0:
             if count < kind.size:
@@ -51,11 +51,9 @@ def _rail_contacts(
 ) -> int:
     if law is None:
         return count
-    found = world.rail_contacts
+    found: Any = world.rail_contacts
     for i in range(bottles.x.size):
-        here = find_rail_contacts(
-            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, found
-        )
+        here = find_rail_contacts(i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, found)
         for c in range(here):
             if found.share[c] > 0.0:
                 if count < kind.size:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from .arrays import Bottles, Load, Peaks, Stage, World
+from .arrays import Bottles, Load, Peaks, World
 from .compile import copy, kernel
 from .neighbours import moved_too_far, rebuild
 
@@ -36,7 +36,7 @@ def drift(bottles: Bottles, spin: Any, dt: float) -> None:
 
 
 @kernel
-def store_velocities(stage: Stage, bottles: Bottles, spin: Any) -> None:
+def store_velocities(stage: Any, bottles: Bottles, spin: Any) -> None:
     """Keep the velocities within a step."""
     copy(bottles.vx, stage.vx)
     copy(bottles.vy, stage.vy)
@@ -45,7 +45,7 @@ def store_velocities(stage: Stage, bottles: Bottles, spin: Any) -> None:
 
 
 @kernel
-def recall_velocities(stage: Stage, bottles: Bottles, spin: Any) -> None:
+def recall_velocities(stage: Any, bottles: Bottles, spin: Any) -> None:
     """Take the kept velocities back."""
     copy(stage.vx, bottles.vx)
     copy(stage.vy, bottles.vy)

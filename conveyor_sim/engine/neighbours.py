@@ -72,7 +72,7 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell
                             pairs.j[k] = j
                             pairs.i[count] = i
                         count += 1
-    pairs.count[0] = min(count, capacity)
+    pairs.used[0] = min(count, capacity)
     _fill(pairs.stiffness, law.stiffness, bottles, pairs)
     _fill(pairs.friction, law.friction, bottles, pairs)
     _fill(pairs.damping_paper, law.damping_paper, bottles, pairs)
@@ -84,7 +84,7 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell
 def _fill(column: Any, table: Any, bottles: Bottles, pairs: Any) -> None:
     if column is None:
         return
-    for p in range(pairs.count[0]):
+    for p in range(pairs.used[0]):
         column[p] = table[bottles.type[pairs.i[p]], bottles.type[pairs.j[p]]]
 
 
@@ -155,7 +155,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
 
 @kernel
 def list_belts(bottles: Bottles, grid: Any, belts: Any, floor: int, margin: float) -> int:
-    """Find for each bottle the belt that is certain within `margin`, else list candidates; return the entries needed."""
+    """Find for each bottle the belt that is certain within `margin`, else list candidates; return their number."""
     if belts is None:
         return 0
     count = 0
@@ -189,7 +189,7 @@ def list_belts(bottles: Bottles, grid: Any, belts: Any, floor: int, margin: floa
 def rebuild(world: World) -> tuple[int, int, int, int]:
     """Make all lists anew; return the entries that pairs, segments, arcs and belts need.
 
-    Where that is more than a list holds, the lists are incomplete and `neighbourhood.stale` stays set: grow, call again.
+    Where that is more than a list holds, the lists are incomplete and `neighbourhood.stale` is set: grow, call again.
     """
     bottles, hood = world.bottles, world.neighbourhood
     skin = world.settings.skin

@@ -57,7 +57,7 @@ def add_pair_forces(settings: Settings, bottles: Bottles, spin: Any, load: Load,
     """Add the forces and moments of all bottle pairs to `load` and `spin.moment`; every pair acts on both alike."""
     if pairs is None:
         return
-    for p in range(pairs.count[0]):
+    for p in range(pairs.used[0]):
         overlap, nx, ny, normal, tangential = pair_contact(p, settings, bottles, spin, pairs)
         if overlap > 0.0:
             i, j = pairs.i[p], pairs.j[p]

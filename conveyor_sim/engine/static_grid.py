@@ -47,6 +47,4 @@ def build_static_grid(
     segment_start, segment = fill(rails[:count], range(count))
     arc_start, arc = fill(rails[count:], range(len(arcs)))
     belt_start, belt = fill(carriers, range(len(belts) - 1, -1, -1))
-    return StaticGrid(
-        x, y, size, columns, rows, segment_start, segment, arc_start, arc, belt_start, belt
-    )
+    return StaticGrid(x, y, size, columns, rows, segment_start, segment, arc_start, arc, belt_start, belt)

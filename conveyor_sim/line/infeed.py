@@ -48,7 +48,8 @@ class InfeedState:
         entered = True
         self.blocked = False
         while entered and not self._empty():
-            entered = self._feed_packed(state, time, tick) if self.infeed.gap is not None else self._feed_rate(state, time)
+            packed = self.infeed.gap is not None
+            entered = self._feed_packed(state, time, tick) if packed else self._feed_rate(state, time)
         self.blocked_ticks += self.blocked
 
     def _empty(self) -> bool:
@@ -59,10 +60,11 @@ class InfeedState:
         pitch = 2.0 * float(state.model.type_radius[self.kind]) + (self.infeed.gap or 0.0)
         advance = self.infeed.speed * tick
         ahead = 0.0
-        previous = np.flatnonzero(state.world.bottles.id == self.last) if self.last >= 0 else ()
-        if len(previous):
-            x, y = state.world.bottles.x[previous[0]], state.world.bottles.y[previous[0]]
-            progress = (x - self.infeed.position[0]) * self.direction[0] + (y - self.infeed.position[1]) * self.direction[1]
+        previous = np.flatnonzero(state.world.bottles.id == max(self.last, 0))
+        if self.last >= 0 and previous.size:
+            dx = float(state.world.bottles.x[previous[0]]) - self.infeed.position[0]
+            dy = float(state.world.bottles.y[previous[0]]) - self.infeed.position[1]
+            progress = dx * self.direction[0] + dy * self.direction[1]
             ahead = progress - pitch - self.extra * self.infeed.speed
             if ahead < 0.0:
                 self.blocked = self._late(time, pitch)

@@ -31,9 +31,7 @@ def outfeed_states(outfeeds: dict[str, Outfeed]) -> dict[str, OutfeedState]:
     return {name: OutfeedState(np.array(outfeed.region)) for name, outfeed in outfeeds.items()}
 
 
-def in_polygon(
-    corners: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def in_polygon(corners: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether points (k,) lie in a simple polygon (n, 2), by the parity of edges crossed on the way to the right."""
     inside = np.zeros(x.shape, dtype=bool)
     for (x1, y1), (x2, y2) in zip(corners, np.roll(corners, -1, axis=0), strict=True):

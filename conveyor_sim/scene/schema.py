@@ -242,7 +242,9 @@ class Infeed(Part):
     rate: Positive | None = quantity("Bottles a second. Or give `gap`.", "1/s", default=None)
     start: NotNegative = quantity("When the first bottle enters.", "s", default=0.0)
     timing_jitter: NotNegative = quantity(
-        "Each bottle is early or late by up to this (with `gap`: late, up to this), drawn evenly from the seed.", "s", default=0.0
+        "Each bottle is early or late by up to this (with `gap`: late, up to this), drawn evenly from the seed.",
+        "s",
+        default=0.0,
     )
     lateral_jitter: NotNegative = quantity(
         "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0

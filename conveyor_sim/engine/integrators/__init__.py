@@ -1,7 +1,7 @@
 """Time integrators, one a file, each a function ``advance(world, steps, dt, phase) -> whole steps done``.
 
-``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set: a neighbour list did
-not fit. The caller then grows and rebuilds it and calls again with RESUME for the rest; the bits are those of an
+``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set: a neighbour list
+did not fit. The caller then grows and rebuilds it and calls again with RESUME for the rest; the bits are those of an
 uninterrupted tick.
 """
 

@@ -1,7 +1,7 @@
 """Velocity Verlet, second order in velocity-dependent forces too.
 
-v_half = v + a dt/2; r += dt v_half; a' = a(r, v_half + a dt/2); v = v_half + a' dt/2. Taking a' at v_half alone would be
-first order in damping; the prediction to the end of the step is second. Order 2 for undamped springs and smooth
+v_half = v + a dt/2; r += dt v_half; a' = a(r, v_half + a dt/2); v = v_half + a' dt/2. Taking a' at v_half alone would
+be first order in damping; the prediction to the end of the step is second. Order 2 for undamped springs and smooth
 damping; 1 through a dashpot that sets in with a jump at first touch. One force evaluation a step and one more a tick.
 """
 

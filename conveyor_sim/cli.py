@@ -1,0 +1,173 @@
+"""The command `conveyor-sim`: check, run, plot, replay and recover. Errors are one sentence, without a traceback."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.progress import ProgressBar
+from conveyor_sim.version import __version__
+
+# Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
+
+
+class _Group(click.Group):
+    """Turns errors meant for the user into one sentence and exit code 1."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except ConveyorError as error:
+            raise click.ClickException(str(error)) from error
+
+
+@click.group(cls=_Group)
+@click.version_option(__version__, prog_name="conveyor-sim")
+def main() -> None:
+    """Bottles on industrial conveyors, simulated by force."""
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
+def check(scene: str, out: Path) -> None:
+    """Validate SCENE (a file, or the name of a shipped one), tell what it comes to, and draw it."""
+    from conveyor_sim.model import build_model
+    from conveyor_sim.resources import scene_path
+    from conveyor_sim.scene import load_scene
+
+    path = scene_path(scene)
+    checked = load_scene(path)
+    model = build_model(checked)
+    console = Console()
+    console.print(_account(checked, model), highlight=False)
+    plot_scene = _plot_function("plot_scene")
+    if plot_scene is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        click.echo(f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
+@click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
+@click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
+def run(scene: str, out: Path | None, duration: float | None, no_record: bool) -> None:
+    """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
+    from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.resources import scene_path
+    from conveyor_sim.runner import run_scene
+    from conveyor_sim.scene import load_scene
+
+    loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration})
+    folder = None if no_record else out or new_run_folder()
+    with ProgressBar(loaded.name, loaded.duration) as bar:
+        done = run_scene(loaded, folder, bar.update)
+    if done.interrupted:
+        click.echo(f"interrupted at {done.simulated:.2f} s")
+    if done.bag is None:
+        factor = done.simulated / done.wall
+        click.echo(f"{done.simulated:.2f} s simulated in {done.wall:.2f} s, {factor:.3g} x real time")
+    else:
+        _report(done.bag, done.wall)
+
+
+def _report(bag: Path, wall: float) -> None:
+    """Summary and pictures of a run, on the terminal and into its folder."""
+    from conveyor_sim.summary import render, summarize, write_summary
+
+    summary = summarize(bag, wall)
+    Console().print(render(summary), highlight=False)
+    click.echo(f"summary: {write_summary(summary, bag)}")
+    plot_bag = _plot_function("plot_bag")
+    if plot_bag is not None:
+        for picture in plot_bag(bag, bag / "pictures"):
+            click.echo(f"picture: {picture}")
+
+
+@main.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+def recover(bag: Path) -> None:
+    """Make BAG whole again that was killed while it was written."""
+    from conveyor_sim.bag.recover import recover as recover_bag
+
+    report = recover_bag(bag)
+    if report.healthy:
+        click.echo(f"{bag}: is whole, nothing to do ({report.message_count} messages)")
+        return
+    for sentence in report.damage:
+        click.echo(sentence)
+    click.echo(f"{bag}: whole again with {report.message_count} messages up to {report.end_ns * 1e-9:.2f} s")
+    for file in report.kept:
+        click.echo(f"the damaged original is kept as {file} and may be deleted")
+
+
+@main.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+def replay(bag: Path) -> None:
+    """Run BAG again, with its commands at their ticks, and compare every recorded state."""
+    from conveyor_sim.bag.replay import replay as replay_bag
+
+    with ProgressBar(f"replay {bag}", 0.0) as bar:
+        report = replay_bag(bag, bar.update)
+    for sentence in report.environment:
+        click.echo(f"not the same as in the recording: {sentence}")
+    how = "bit for bit" if report.exact else "within the tolerance"
+    count = sum(report.compared.values())
+    if report.difference is not None:
+        raise click.ClickException(f"{bag}: the first difference ({how}) is at {report.difference}")
+    start = "" if report.first_tick == 0 else f" from tick {report.first_tick}"
+    click.echo(f"{bag}: {count} messages equal {how}{start} up to tick {report.last_tick} ({report.end:.2f} s)")
+
+
+@main.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/pictures).")
+@click.option("--time", "times", type=float, multiple=True, help="Simulated time to draw the plant at, s; repeatable.")
+@click.option("--bottle", "bottles", type=int, multiple=True, help="Id of a bottle to draw over time; repeatable.")
+def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[int, ...]) -> None:
+    """Draw BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces."""
+    plot_bag = _plot_function("plot_bag")
+    if plot_bag is None:
+        sys.exit(1)
+    folder = out or (bag if bag.is_dir() else bag.parent) / "pictures"
+    for picture in plot_bag(bag, folder, times=times or None, bottles=bottles or None):
+        click.echo(picture)
+
+
+def _plot_function(name: str) -> Any:
+    """A function of conveyor_sim.plot; None, and a sentence that says so, if matplotlib is not installed."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        click.echo("no pictures: matplotlib is not installed (pip install 'conveyor_sim[plot]')", err=True)
+        return None
+    import conveyor_sim.plot
+
+    return getattr(conveyor_sim.plot, name)
+
+
+def _account(scene: Any, model: Any) -> Table:
+    """What a scene comes to: contents, effects and why, time step and why."""
+    from conveyor_sim.scene import initial_bottles
+
+    table = Table.grid(padding=(0, 2))
+    fed = ["without end" if infeed.count is None else str(infeed.count) for infeed in scene.infeeds.values()]
+    table.add_row("scene", f"{model.name}: {scene.description}" if scene.description else model.name)
+    table.add_row("bottles", f"{len(initial_bottles(scene))} at the start; fed: {', '.join(fed) or 'none'}")
+    table.add_row("belts", ", ".join(model.belts) or "none")
+    table.add_row("rails", ", ".join(model.rails) or "none")
+    table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
+    table.add_row("time step", f"{model.dt:.3g} s, {model.steps_per_tick} steps a tick: {model.dt_reason}")
+    for bound in model.bounds:
+        table.add_row("", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")
+    table.add_row("integrator", model.integrator)
+    for effect in model.effects:
+        table.add_row("effect", f"{effect.name} {'on' if effect.on else 'off'}: {effect.why}")
+    return table
