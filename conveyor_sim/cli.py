@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.progress import ProgressBar
 from conveyor_sim.version import __version__
+
+if TYPE_CHECKING:
+    from conveyor_sim.model import Model
+    from conveyor_sim.scene import Scene
 
 # Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
 
@@ -45,8 +49,7 @@ def check(scene: str, out: Path) -> None:
     path = scene_path(scene)
     checked = load_scene(path)
     model = build_model(checked)
-    console = Console()
-    console.print(_account(checked, model), highlight=False)
+    _print(_account(checked, model))
     plot_scene = _plot_function("plot_scene")
     if plot_scene is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -83,12 +86,18 @@ def _report(bag: Path, wall: float) -> None:
     from conveyor_sim.summary import render, summarize, write_summary
 
     summary = summarize(bag, wall)
-    Console().print(render(summary), highlight=False)
+    _print(render(summary))
     click.echo(f"summary: {write_summary(summary, bag)}")
     plot_bag = _plot_function("plot_bag")
-    if plot_bag is not None:
-        for picture in plot_bag(bag, bag / "pictures"):
-            click.echo(f"picture: {picture}")
+    if plot_bag is None:
+        return
+    try:
+        pictures = plot_bag(bag, bag / "pictures")
+    except ConveyorError as error:  # such as a scene without bottles: nothing to draw, but a good run all the same
+        click.echo(f"no pictures: {error}", err=True)
+        return
+    for picture in pictures:
+        click.echo(f"picture: {picture}")
 
 
 @main.command()
@@ -112,13 +121,15 @@ def recover(bag: Path) -> None:
 @click.argument("bag", type=click.Path(path_type=Path))
 def replay(bag: Path) -> None:
     """Run BAG again, with its commands at their ticks, and compare every recorded state."""
+    from conveyor_sim.bag.compare import TOLERANCE
     from conveyor_sim.bag.replay import replay as replay_bag
 
     with ProgressBar(f"replay {bag}", 0.0) as bar:
         report = replay_bag(bag, bar.update)
     for sentence in report.environment:
         click.echo(f"not the same as in the recording: {sentence}")
-    how = "bit for bit" if report.exact else "within the tolerance"
+    near = f"{TOLERANCE['x']:g} m, {TOLERANCE['vx']:g} m/s and {TOLERANCE['peak_force']:g} N"
+    how = "bit for bit" if report.exact else f"within {near}"
     count = sum(report.compared.values())
     if report.difference is not None:
         raise click.ClickException(f"{bag}: the first difference ({how}) is at {report.difference}")
@@ -153,7 +164,12 @@ def _plot_function(name: str) -> Any:
     return getattr(conveyor_sim.plot, name)
 
 
-def _account(scene: Any, model: Any) -> Table:
+def _print(content: RenderableType) -> None:
+    """Prints to the terminal; brackets in names and paths mean nothing."""
+    Console(markup=False, highlight=False).print(content)
+
+
+def _account(scene: Scene, model: Model) -> Table:
     """What a scene comes to: contents, effects and why, time step and why."""
     from conveyor_sim.scene import initial_bottles
 

@@ -28,9 +28,7 @@ def rail_arrays(rails: Sequence[RailShape], materials: Sequence[str]) -> tuple[S
     pieces.sort(key=lambda entry: isinstance(entry[0], ArcPiece))
     if not pieces:
         return None, None
-    joints = find_joints(
-        np.array([piece.ends for piece, _ in pieces]), np.array([_inward(piece) for piece, _ in pieces])
-    )
+    joints = find_joints([piece for piece, _ in pieces], np.array([_inward(piece) for piece, _ in pieces]))
     straight = sum(isinstance(piece, SegmentPiece) for piece, _ in pieces)
     rail = np.array([index for _, index in pieces], dtype=np.uint32)
     material = np.array([materials.index(rails[index].material) for _, index in pieces], dtype=np.uint32)

@@ -19,16 +19,16 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __init__(self, what: str, total: float, console: Console | None = None) -> None:
         self._what = what
         self._total = total
-        self._console = console or Console(file=sys.stderr)
+        self._console = console or Console(file=sys.stderr, markup=False)
         self._start: tuple[float, float] | None = None
         self._next_line = PLAIN_SHARE * total
         self._bar: Progress | None = None
         if self._console.is_terminal:
             columns = (
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 BarColumn(bar_width=None),
                 TaskProgressColumn(),
-                TextColumn("{task.fields[state]}"),
+                TextColumn("{task.fields[state]}", markup=False),
                 TimeRemainingColumn(),
             )
             self._bar = Progress(*columns, console=self._console)

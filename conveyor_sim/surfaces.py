@@ -1,11 +1,13 @@
-"""Which rail pieces form one surface: those whose ends meet within JOINT_TOLERANCE, however they were listed."""
+"""Which rail pieces form one surface: those that meet within JOINT_TOLERANCE at an end, however they were listed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.joint import ANSWERS, FREE, SILENT
+from conveyor_sim.scene.geometry import Piece
 
 JOINT_TOLERANCE = 1e-6
 """m; well above the rounding of coordinates, well below anything a bottle can feel."""
@@ -23,34 +25,46 @@ class Joints:
     """(n,), equal for pieces of one surface."""
 
 
-def find_joints(ends: NDArray[np.float64], inward: NDArray[np.float64]) -> Joints:
-    """Join rail pieces end to end.
+def find_joints(pieces: Sequence[Piece], inward: NDArray[np.float64]) -> Joints:
+    """Join n rail pieces.
 
-    ends: (n, 2, 2), start and end points, m. inward: (n, 2, 2), unit vectors from each end into its piece. Where just
-    two ends meet, the first piece answers for the point; where more meet, each end stays free and the surface's shared
-    push keeps the point from pushing more than once.
+    inward: (n, 2, 2), unit vectors from each end into its piece. Where just two ends meet, the first piece answers for
+    the point; where more meet, or an end lies on another piece, ends stay free and the surface's shared push keeps the
+    point from pushing more than once.
     """
-    pieces = len(ends)
-    code = np.full((pieces, 2), FREE, dtype=np.int8)
-    neighbour = np.zeros((pieces, 2, 2))
-    parent = list(range(pieces))
+    ends = np.array([piece.ends for piece in pieces])
+    code = np.full((len(pieces), 2), FREE, dtype=np.int8)
+    neighbour = np.zeros((len(pieces), 2, 2))
+    parent = list(range(len(pieces)))
 
     def root(piece: int) -> int:
         while parent[piece] != piece:
             piece = parent[piece]
         return piece
 
+    def unite(piece: int, other: int) -> None:
+        low, high = sorted((root(piece), root(other)))
+        parent[high] = low
+
+    for piece, other in _ends_on_pieces(pieces, ends):
+        unite(piece, other)
     for meeting in _meeting_ends(ends):
-        first = root(meeting[0][0])
-        for piece, _ in meeting[1:]:
-            parent[max(root(piece), first)] = first = min(root(piece), first)
         if len(meeting) == 2:
             (a, end_a), (b, end_b) = meeting
             code[a, end_a], code[b, end_b] = ANSWERS, SILENT
             neighbour[a, end_a] = inward[b, end_b]
             neighbour[b, end_b] = inward[a, end_a]
-    surface = np.array([root(piece) for piece in range(pieces)], dtype=np.uint32)
+    surface = np.array([root(piece) for piece in range(len(pieces))], dtype=np.uint32)
     return Joints(code=code, neighbour=neighbour, surface=surface)
+
+
+def _ends_on_pieces(pieces: Sequence[Piece], ends: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Pairs (piece, other) where an end of `other` lies on `piece`, be it at an end or between."""
+    found = []
+    for index, piece in enumerate(pieces):
+        touching = (piece.distance(ends.reshape(-1, 2)) <= JOINT_TOLERANCE).reshape(-1, 2).any(axis=1)
+        found.extend((index, int(other)) for other in np.flatnonzero(touching) if other != index)
+    return found
 
 
 def _meeting_ends(ends: NDArray[np.float64]) -> list[list[tuple[int, int]]]:

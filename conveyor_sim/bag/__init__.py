@@ -1,0 +1,1 @@
+"""Recording and reading: columns to messages, messages to MCAP, and back. None of it needs a ROS installation."""

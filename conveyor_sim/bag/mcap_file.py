@@ -1,0 +1,83 @@
+"""One MCAP file of a rosbag2 bag as it is written: topics, messages, then the index and rosbag2's own metadata."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import IO, Any
+
+from mcap.writer import CompressionType, Writer
+
+from conveyor_sim.bag.metadata import (
+    RECORD_KEY,
+    RECORD_NAME,
+    FileInfo,
+    TopicInfo,
+    bag_information,
+    from_yaml,
+    to_yaml,
+)
+from conveyor_sim.version import __version__
+
+QOS_KEY = "offered_qos_profiles"
+HASH_KEY = "topic_type_hash"
+"""Keys of a channel's metadata."""
+
+
+@dataclass(frozen=True)
+class Schema:
+    """A message type as the file states it."""
+
+    name: str
+    encoding: str
+    text: bytes
+
+
+def topic_info(name: str, type_name: str, channel_metadata: dict[str, str], message_count: int) -> TopicInfo:
+    """A topic from what its channel in the file says."""
+    qos = from_yaml(channel_metadata.get(QOS_KEY, ""))
+    profiles: list[dict[str, Any]] = qos if isinstance(qos, list) else []
+    return TopicInfo(name, type_name, channel_metadata.get(HASH_KEY, ""), profiles, message_count)
+
+
+class McapFile:
+    """Writes to a binary stream, which stays the caller's to close. Every method may raise OSError."""
+
+    def __init__(self, stream: IO[bytes], name: str, distro: str) -> None:
+        self._distro = distro
+        self._writer = Writer(stream, compression=CompressionType.ZSTD)
+        self._schemas: dict[Schema, int] = {}
+        self._topics: dict[int, TopicInfo] = {}
+        self.info = FileInfo(name, 0, 0, 0)
+        self._writer.start(profile="ros2", library=f"conveyor_sim {__version__}")
+
+    def add_topic(self, name: str, schema: Schema, encoding: str, metadata: dict[str, str]) -> int:
+        """Registers a channel for messages of the schema's type; returns its number."""
+        if schema not in self._schemas:
+            self._schemas[schema] = self._writer.register_schema(schema.name, schema.encoding, schema.text)
+        channel = self._writer.register_channel(name, encoding, self._schemas[schema], metadata)
+        self._topics[channel] = topic_info(name, schema.name, metadata, 0)
+        return channel
+
+    def add_message(self, channel: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
+        """Appends a message; times in ns."""
+        self._writer.add_message(channel, log_time, data, publish_time, sequence)
+        info, topic = self.info, self._topics[channel]
+        start = min(info.start_ns, log_time) if info.message_count else log_time
+        self.info = FileInfo(info.path, start, max(info.end_ns, log_time), info.message_count + 1)
+        self._topics[channel] = replace(topic, message_count=topic.message_count + 1)
+
+    def add_metadata(self, name: str, content: dict[str, str]) -> None:
+        """Appends a metadata record."""
+        self._writer.add_metadata(name, content)
+
+    def flush(self) -> None:
+        """Ends the present chunk and hands everything to the operating system."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def finish(self) -> dict[str, Any]:
+        """Writes the metadata record, index and end; returns what belongs into metadata.yaml."""
+        self.flush()
+        information = bag_information(list(self._topics.values()), [self.info], self._distro)
+        self.add_metadata(RECORD_NAME, {RECORD_KEY: to_yaml(information)})
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        return information

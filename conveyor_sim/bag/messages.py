@@ -1,0 +1,141 @@
+"""Columns to messages: one function a message, each returning CDR bytes to publish and to record alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.bag.cdr import CdrWriter, pose_rows
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+
+if TYPE_CHECKING:
+    from conveyor_sim.line.commands import CommandOutcome
+    from conveyor_sim.simulation import Simulation
+
+BOTTLES = "conveyor_msgs/msg/Bottles"
+CONTACTS = "conveyor_msgs/msg/Contacts"
+BELTS = "conveyor_msgs/msg/Belts"
+SIGNALS = "conveyor_msgs/msg/Signals"
+OUTCOME = "conveyor_msgs/msg/CommandOutcome"
+LINE = "conveyor_msgs/msg/Line"
+POSES = "geometry_msgs/msg/PoseArray"
+MARKERS = "visualization_msgs/msg/MarkerArray"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What every message starts with."""
+
+    tick: int
+    stamp_ns: int
+    """Simulated time, ns, above zero."""
+    frame_id: str
+
+
+@lru_cache(maxsize=16)
+def _sequence_types(type_name: str) -> dict[str, np.dtype[Any]]:
+    """The element type of every numeric sequence of a message, by field."""
+    store = typestore()
+    kinds = {}
+    for name, (_, details) in store.fielddefs[type_name][1]:
+        if isinstance(details, tuple) and isinstance(details[0], tuple) and details[0][1][0] != "string":
+            kinds[name] = np.dtype(details[0][1][0])
+    return kinds
+
+
+def _ros_header(header: Header) -> Any:
+    types = typestore().types
+    seconds, nanoseconds = divmod(header.stamp_ns, 1_000_000_000)
+    stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
+    return types["std_msgs/msg/Header"](stamp=stamp, frame_id=header.frame_id)
+
+
+def _serialize(type_name: str, header: Header, values: dict[str, Any]) -> bytes:
+    # rosbags copies an array's bytes whatever its type, so each is brought to the field's type first.
+    for name, kind in _sequence_types(type_name).items():
+        values[name] = np.ascontiguousarray(values[name], dtype=kind)
+    store = typestore()
+    message = store.types[type_name](header=_ros_header(header), tick=header.tick, **values)
+    return bytes(store.serialize_cdr(message, type_name, little_endian=True))
+
+
+def _by_field(columns: Any) -> dict[str, Any]:
+    return {field.name: getattr(columns, field.name) for field in fields(columns)}
+
+
+def bottles_message(columns: BottleColumns, header: Header) -> bytes:
+    """conveyor_msgs/Bottles."""
+    return _serialize(BOTTLES, header, _by_field(columns))
+
+
+def contacts_message(columns: ContactColumns, header: Header) -> bytes:
+    """conveyor_msgs/Contacts."""
+    return _serialize(CONTACTS, header, _by_field(columns))
+
+
+def belts_message(columns: BeltColumns, header: Header) -> bytes:
+    """conveyor_msgs/Belts."""
+    return _serialize(BELTS, header, _by_field(columns))
+
+
+def signals_message(values: NDArray[np.float64], header: Header) -> bytes:
+    """conveyor_msgs/Signals: the process image, in the order of Line.signal_names."""
+    return _serialize(SIGNALS, header, {"values": values})
+
+
+def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
+    """conveyor_msgs/CommandOutcome; the header belongs to the tick at which it was applied or refused."""
+    values = {
+        "source": outcome.source,
+        "names": list(outcome.names),
+        "values": outcome.values,
+        "accepted": outcome.accepted,
+        "reason": outcome.reason,
+    }
+    return _serialize(OUTCOME, header, values)
+
+
+def poses_message(columns: BottleColumns, header: Header) -> bytes:
+    """geometry_msgs/PoseArray of the bottles' axes, ordered by id, at the height of the belts (z = 0)."""
+    writer = CdrWriter()
+    writer.header(header.stamp_ns, header.frame_id)
+    writer.double_rows(pose_rows(columns.x, columns.y, columns.theta))
+    return writer.finish()
+
+
+def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
+    """conveyor_msgs/Line: what the indices mean, and all that is needed to run the same line again."""
+    scene, model, image = sim.scene, sim.model, sim.process_image
+    values = {
+        "run_id": run_id,
+        "scene_name": scene.name,
+        "scene_text": scene.source_text,
+        "overrides": scene.overrides_text,
+        "seed": scene.seed,
+        "tick_ns": model.tick_ns,
+        "steps_per_tick": model.steps_per_tick,
+        "dt": model.dt,
+        "dt_reason": model.dt_reason,
+        "integrator": model.integrator,
+        "effects": [effect.name for effect in model.effects if effect.on],
+        "belts": list(model.belts),
+        "rails": list(model.rails),
+        "bottle_types": list(model.bottle_types),
+        "type_radius": model.type_radius,
+        "type_mass": model.type_mass,
+        "signal_names": list(image.signal_names),
+        "signal_units": list(image.signal_units),
+        "command_names": list(image.command_names),
+        "command_units": list(image.command_units),
+        "command_min": image.command_min,
+        "command_max": image.command_max,
+        "versions": list(model.versions),
+        "engine_hash": model.engine_hash,
+        "machine": model.machine,
+    }
+    return _serialize(LINE, header, values)

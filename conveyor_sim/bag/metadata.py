@@ -1,0 +1,120 @@
+"""metadata.yaml of a rosbag2 folder, version 9 (Jazzy, Kilted): what `ros2 bag info` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+FILE_NAME = "metadata.yaml"
+VERSION = 9
+RECORD_NAME = "rosbag2"
+RECORD_KEY = "serialized_metadata"
+"""Name and key of the MCAP metadata record that repeats this file's content."""
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """One recorded topic."""
+
+    name: str
+    """Absolute, with its leading slash."""
+    type: str
+    type_hash: str
+    qos: Sequence[Mapping[str, Any]]
+    """Offered profiles as rosbag2 writes them."""
+    message_count: int
+
+
+@dataclass(frozen=True)
+class FileInfo:
+    """One storage file of a bag, with the log times of its first and last message in ns (0 if it has none)."""
+
+    path: str
+    start_ns: int
+    end_ns: int
+    message_count: int
+
+
+def bag_information(topics: Sequence[TopicInfo], files: Sequence[FileInfo], distro: str) -> dict[str, Any]:
+    """The mapping under `rosbag2_bagfile_information`, in the order in which rosbag2 writes it."""
+    filled = [file for file in files if file.message_count]
+    start = min((file.start_ns for file in filled), default=0)
+    end = max((file.end_ns for file in filled), default=0)
+    return {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        "duration": {"nanoseconds": end - start},
+        "starting_time": {"nanoseconds_since_epoch": start},
+        "message_count": sum(file.message_count for file in files),
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": [dict(profile) for profile in topic.qos],
+                    "type_description_hash": topic.type_hash,
+                },
+                "message_count": topic.message_count,
+            }
+            for topic in topics
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.path for file in files],
+        "files": [
+            {
+                "path": file.path,
+                "starting_time": {"nanoseconds_since_epoch": file.start_ns},
+                "duration": {"nanoseconds": file.end_ns - file.start_ns},
+                "message_count": file.message_count,
+            }
+            for file in files
+        ],
+        "custom_data": None,
+        "ros_distro": distro,
+    }
+
+
+def to_yaml(value: Any) -> str:
+    """Block-style YAML text that keeps the order of keys."""
+    yaml = YAML()
+    yaml.default_flow_style = False
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml.width = 4096
+    # An alias would be valid YAML, but repeated profiles are easier to read written out.
+    yaml.representer.ignore_aliases = lambda _: True
+    stream = StringIO()
+    yaml.dump(value, stream)
+    return stream.getvalue()
+
+
+def from_yaml(text: str) -> Any:
+    """Parses YAML; None if it is none."""
+    try:
+        return YAML(typ="safe").load(text)
+    except YAMLError:
+        return None
+
+
+def write_metadata(folder: Path, information: Mapping[str, Any]) -> None:
+    """Writes metadata.yaml into the folder, whole or not at all."""
+    temporary = folder / f"{FILE_NAME}.tmp"
+    temporary.write_text(to_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
+    temporary.replace(folder / FILE_NAME)
+
+
+def read_metadata(folder: Path) -> dict[str, Any] | None:
+    """What metadata.yaml says under `rosbag2_bagfile_information`; None if it is missing or broken."""
+    try:
+        document = from_yaml((folder / FILE_NAME).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError):
+        return None
+    information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
+    return information if isinstance(information, dict) else None

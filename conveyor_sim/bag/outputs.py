@@ -1,0 +1,126 @@
+"""What a simulation tells: which topic at which tick, serialized once, handed to every sink that wants it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+from conveyor_sim.bag import messages
+from conveyor_sim.bag.markers import bottles_markers, plant_markers
+from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.qos import QOS, Qos
+
+if TYPE_CHECKING:
+    from conveyor_sim.line.commands import CommandOutcome
+    from conveyor_sim.observe.columns import BottleColumns
+    from conveyor_sim.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Output:
+    """One topic: its relative name, message type, and the scene output whose rate it follows."""
+
+    name: str
+    type: str
+    rate: str | None
+    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes)."""
+
+    @property
+    def qos(self) -> Qos:
+        """The quality of service offered for it."""
+        return QOS[self.name]
+
+
+OUTPUTS: dict[str, Output] = {
+    output.name: output
+    for output in (
+        Output("line", messages.LINE, None),
+        Output("plant", messages.MARKERS, None),
+        Output("outcomes", messages.OUTCOME, None),
+        Output("bottles", messages.BOTTLES, "bottles"),
+        Output("poses", messages.POSES, "poses"),
+        Output("markers", messages.MARKERS, "poses"),
+        Output("contacts", messages.CONTACTS, "contacts"),
+        Output("belts", messages.BELTS, "belts"),
+        Output("signals", messages.SIGNALS, "signals"),
+    )
+}
+"""By name; within a tick, messages are written in this order."""
+
+
+class Sink(Protocol):
+    """Takes serialized messages: the recorder, a node's publishers."""
+
+    def wants(self, topic: str) -> bool:
+        """Whether a message of this topic would be used now; nothing is computed that no sink wants."""
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        """Takes one message, with its simulated time in ns."""
+
+
+class Snapshot:
+    """A simulation at one tick: its bottles are observed at most once, however many topics show them."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self.sim = sim
+
+    @cached_property
+    def bottles(self) -> BottleColumns:
+        """The bottles present."""
+        return self.sim.bottles()
+
+
+SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
+    "bottles": lambda now, header: messages.bottles_message(now.bottles, header),
+    "poses": lambda now, header: messages.poses_message(now.bottles, header),
+    "markers": lambda now, header: bottles_markers(now.bottles, now.sim.model.type_radius, header),
+    "contacts": lambda now, header: messages.contacts_message(now.sim.contacts(), header),
+    "belts": lambda now, header: messages.belts_message(now.sim.belts(), header),
+    "signals": lambda now, header: messages.signals_message(now.sim.signals(), header),
+}
+"""The topics that have a rate."""
+
+
+class Outputs:
+    """Feeds sinks from a simulation: `start` once, then `after_tick` after every single tick."""
+
+    def __init__(self, sim: Simulation, sinks: Sequence[Sink], *, run_id: str, frame_id: str = "world") -> None:
+        self._sim = sim
+        self._sinks = sinks
+        self._run_id = run_id
+        self._frame_id = frame_id
+
+    def start(self) -> None:
+        """Writes what is latched (line, plant) and the state at the present tick."""
+        model, header = self._sim.model, self._header(self._sim.tick)
+        self._hand_out("line", header, messages.line_message, self._sim, self._run_id)
+        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rail_shapes)
+        self._write_state()
+
+    def after_tick(self) -> list[CommandOutcome]:
+        """Writes the outcomes of the tick's commands, then every topic that is due; returns the outcomes."""
+        outcomes = self._sim.take_outcomes()
+        for outcome in outcomes:
+            self._hand_out("outcomes", self._header(outcome.tick), messages.outcome_message, outcome)
+        self._write_state()
+        return outcomes
+
+    def _write_state(self) -> None:
+        header, now = self._header(self._sim.tick), Snapshot(self._sim)
+        for topic, serialize in SERIALIZERS.items():
+            rate = OUTPUTS[topic].rate
+            if rate is not None and self._sim.due(rate):
+                self._hand_out(topic, header, serialize, now)
+
+    def _hand_out(self, topic: str, header: Header, serialize: Callable[..., bytes], *what: object) -> None:
+        takers = [sink for sink in self._sinks if sink.wants(topic)]
+        if takers:
+            data = serialize(*what, header)
+            for sink in takers:
+                sink.write(topic, data, header.stamp_ns)
+
+    def _header(self, tick: int) -> Header:
+        # ROS reads a stamp of 0 as "not set", so tick 0 is stamped 1 ns, as Simulation.stamp_ns does.
+        return Header(tick, max(1, tick * self._sim.model.tick_ns), self._frame_id)

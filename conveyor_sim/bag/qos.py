@@ -1,0 +1,59 @@
+"""Quality of service of every topic, as data: the node offers it, and the bag's metadata states it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+INFINITE = {"sec": 9223372036, "nsec": 854775807}
+"""How ROS 2 writes a duration without end."""
+
+
+@dataclass(frozen=True)
+class Qos:
+    """History is always "keep last"; deadline, lifespan and lease are without end; liveliness is automatic."""
+
+    depth: int
+    reliability: Literal["reliable", "best_effort"] = "reliable"
+    durability: Literal["volatile", "transient_local"] = "volatile"
+
+    def as_rosbag2(self) -> dict[str, object]:
+        """The mapping that rosbag2 writes for one offered profile (metadata version 9)."""
+        return {
+            "history": "keep_last",
+            "depth": self.depth,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "deadline": dict(INFINITE),
+            "lifespan": dict(INFINITE),
+            "liveliness": "automatic",
+            "liveliness_lease_duration": dict(INFINITE),
+            "avoid_ros_namespace_conventions": False,
+        }
+
+
+DATA = Qos(depth=5)
+"""What is published at a rate."""
+LATCHED = Qos(depth=1, durability="transient_local")
+"""What is published once: a subscriber that joins late still gets it."""
+COMMANDS = Qos(depth=100)
+"""Commands and their outcomes: each one counts."""
+CLOCK = Qos(depth=1)
+"""Reliable, because that also matches subscribers that ask for best effort."""
+
+QOS = {
+    "bottles": DATA,
+    "poses": DATA,
+    "contacts": DATA,
+    "belts": DATA,
+    "signals": DATA,
+    "markers": DATA,
+    "line": LATCHED,
+    "plant": LATCHED,
+    "outcomes": COMMANDS,
+    "commands": COMMANDS,
+    "cmd_speed": COMMANDS,
+    "clock": CLOCK,
+    "diagnostics": DATA,
+}
+"""By topic; `cmd_speed` stands for every `belts/<belt>/cmd_speed`."""

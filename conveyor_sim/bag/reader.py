@@ -1,0 +1,207 @@
+"""Reads a bag back as columns: one recorded by this package, or by stock rosbag2 from the same topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.rosbag2 import ReaderError
+from rosbags.serde import SerdeError
+
+from conveyor_sim.bag import messages
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.errors import BagError
+from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Frame(Generic[T]):
+    """One recorded message, decoded."""
+
+    tick: int
+    time: float
+    """s, simulated."""
+    data: T
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One recorded CommandOutcome."""
+
+    source: str
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    accepted: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class BottleSeries:
+    """One bottle over time, for as long as it was on the line: 1-D arrays of equal length, the fields of Bottles."""
+
+    time: NDArray[np.float64]
+    """s"""
+    x: NDArray[np.float64]
+    """m"""
+    y: NDArray[np.float64]
+    """m"""
+    theta: NDArray[np.float64]
+    """rad"""
+    vx: NDArray[np.float64]
+    """m/s"""
+    vy: NDArray[np.float64]
+    """m/s"""
+    omega: NDArray[np.float64]
+    """rad/s"""
+    belt: NDArray[np.int32]
+    peak_force: NDArray[np.float64]
+    """N"""
+    impulse: NDArray[np.float64]
+    """N s"""
+
+
+class Bag(AbstractContextManager["Bag"]):
+    """An open bag; use `open_bag`, as a context manager.
+
+    `line` is the recorded conveyor_msgs/Line (its fields as attributes, arrays as NumPy, texts as lists of str).
+    """
+
+    def __init__(self, path: Path, reader: AnyReader) -> None:
+        self.path = path
+        self._reader = reader
+        line_topics = [c.topic for c in reader.connections if c.msgtype == messages.LINE and c.msgcount]
+        if not line_topics:
+            raise BagError(f"{path}: no message of type {messages.LINE}, expected the latched topic line")
+        self.namespace = line_topics[0].rpartition("/")[0]
+        self.line: Any = next(iter(self.messages("line"))).data
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the files; iterating afterwards is an error."""
+        self._reader.close()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Recorded messages by topic, names as in OUTPUTS (without the namespace and its slash)."""
+        return {self._relative(c.topic): c.msgcount for c in self._reader.connections}
+
+    @property
+    def types(self) -> dict[str, str]:
+        """Message type by topic, names as in OUTPUTS."""
+        return {self._relative(c.topic): c.msgtype for c in self._reader.connections}
+
+    def time(self, tick: int) -> float:
+        """Simulated time of a tick, s."""
+        return float(tick * self.line.tick_ns * 1e-9)
+
+    def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, log time (ns) and serialized bytes of every message in time order; of some topics, if given."""
+        chosen = [c for c in self._reader.connections if topics is None or self._relative(c.topic) in topics]
+        if not chosen:
+            return
+        try:
+            for connection, log_time, data in self._reader.messages(connections=chosen):
+                yield self._relative(connection.topic), log_time, data
+        except (AnyReaderError, ReaderError) as error:
+            raise BagError(f"{self.path}: {error} (damaged? `conveyor-sim recover` may help)") from error
+
+    def decode(self, topic: str, data: bytes) -> Any:
+        """A rosbags message object. Raises BagError if the bytes are not one of the topic's type."""
+        try:
+            return self._reader.deserialize(data, self.types[topic])
+        except (AnyReaderError, SerdeError, AssertionError) as error:
+            raise BagError(f"{self.path}: a message of topic {topic} can't be decoded: {error}") from error
+
+    def messages(self, topic: str) -> Iterator[Frame[Any]]:
+        """Every message of one topic that carries a tick, as a rosbags object."""
+        for _, _, data in self.raw({topic}):
+            message = self.decode(topic, data)
+            yield Frame(message.tick, message.tick * self._tick_ns(message) * 1e-9, message)
+
+    def bottles(self) -> Iterator[Frame[BottleColumns]]:
+        """Every recorded Bottles."""
+        return self._columns("bottles", lambda message: to_columns(BottleColumns, message))
+
+    def contacts(self) -> Iterator[Frame[ContactColumns]]:
+        """Every recorded Contacts."""
+        return self._columns("contacts", lambda message: to_columns(ContactColumns, message))
+
+    def belts(self) -> Iterator[Frame[BeltColumns]]:
+        """Every recorded Belts."""
+        return self._columns("belts", lambda message: to_columns(BeltColumns, message))
+
+    def signals(self) -> Iterator[Frame[NDArray[np.float64]]]:
+        """Every recorded process image, in the order of line.signal_names."""
+        return self._columns("signals", lambda message: message.values)
+
+    def outcomes(self) -> Iterator[Frame[Outcome]]:
+        """What became of every command, in order; the tick is the one at which it was applied or refused."""
+        return self._columns("outcomes", to_outcome)
+
+    def bottle_series(self, ids: Collection[int]) -> dict[int, BottleSeries]:
+        """The histories of some bottles, from one pass over the bag; ids that never occur are left out."""
+        wanted = np.array(sorted(ids), dtype=np.uint64)
+        names = [field.name for field in fields(BottleSeries)]
+        rows: dict[int, dict[str, list[Any]]] = {}
+        for frame in self.bottles():
+            for index in np.flatnonzero(np.isin(frame.data.id, wanted)):
+                row = rows.setdefault(int(frame.data.id[index]), {name: [] for name in names})
+                row["time"].append(frame.time)
+                for name in names[1:]:
+                    row[name].append(getattr(frame.data, name)[index])
+        return {bottle: BottleSeries(**{n: np.array(v) for n, v in row.items()}) for bottle, row in rows.items()}
+
+    def _columns(self, topic: str, convert: Callable[[Any], T]) -> Iterator[Frame[T]]:
+        for frame in self.messages(topic):
+            yield Frame(frame.tick, frame.time, convert(frame.data))
+
+    def _relative(self, topic: str) -> str:
+        return topic.removeprefix(self.namespace).removeprefix("/")
+
+    def _tick_ns(self, message: Any) -> int:
+        return int(message.tick_ns if message.__msgtype__ == messages.LINE else self.line.tick_ns)
+
+
+def to_columns(kind: type[T], message: Any) -> T:
+    """The columns dataclass that a message holds field by field."""
+    return kind(**{field.name: getattr(message, field.name) for field in fields(kind)})  # type: ignore[arg-type]
+
+
+def to_outcome(message: Any) -> Outcome:
+    """The outcome that a CommandOutcome message holds."""
+    values = tuple(float(value) for value in message.values)
+    return Outcome(message.source, tuple(message.names), values, bool(message.accepted), message.reason)
+
+
+def open_bag(path: str | Path) -> Bag:
+    """Opens a rosbag2 folder or a single .mcap file.
+
+    Raises BagError, in one sentence, if it is missing, cut short, or holds no `line`.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise BagError(f"{path}: no such bag; expected a rosbag2 folder or an .mcap file")
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        hint = "`conveyor-sim recover` makes it whole" if list(path.glob("*.mcap*")) else "expected a rosbag2 folder"
+        raise BagError(f"{path}: metadata.yaml is missing; {hint}")
+    try:
+        reader = AnyReader([path], default_typestore=typestore())
+        reader.open()
+    except (AnyReaderError, ReaderError, OSError) as error:
+        raise BagError(f"{path}: not a whole bag ({error}); `conveyor-sim recover` may make it whole") from error
+    try:
+        return Bag(path, reader)
+    except BagError:
+        with suppress(AnyReaderError):
+            reader.close()
+        raise

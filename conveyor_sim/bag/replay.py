@@ -1,0 +1,176 @@
+"""Runs a recorded line again, with the recorded commands at their ticks, and compares every recorded state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.bag.compare import COMPARERS, Difference, first_difference, outcome_difference
+from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.outputs import SERIALIZERS, Snapshot
+from conveyor_sim.bag.reader import Bag, Outcome, open_bag, to_outcome
+from conveyor_sim.errors import BagError, SceneError
+from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.simulation import Simulation
+
+WATCHDOG = "watchdog"
+"""Source of outcomes that the line itself brings about; they are compared, not commanded."""
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """What a replay found."""
+
+    path: Path
+    exact: bool
+    """Compared bit for bit, not within the tolerance."""
+    environment: tuple[str, ...]
+    """What differs from the recording's machine and versions, one sentence each; empty if nothing."""
+    first_tick: int
+    last_tick: int
+    """Ticks of the first and last recorded state."""
+    end: float
+    """s, simulated time up to which states were equal, or at which the first difference is."""
+    compared: dict[str, int]
+    """Messages compared, by topic."""
+    difference: Difference | None
+    """The first one; None: everything is equal."""
+
+
+class _Messages:
+    """The messages of one topic in the order of their ticks, each taken once."""
+
+    def __init__(self, bag: Bag, topic: str) -> None:
+        self.topic = topic
+        self._source: Iterator[Any] = (frame.data for frame in bag.messages(topic))
+        self._next = next(self._source, None)
+        self._several_runs = bag.counts.get("line", 0) > 1
+
+    @property
+    def next_tick(self) -> int | None:
+        """Tick of the message to come; None after the last."""
+        return None if self._next is None else int(self._next.tick)
+
+    def take(self, tick: int) -> Iterator[Any]:
+        """The messages up to a tick (an earlier tick than expected is a difference for the caller to find)."""
+        while self._next is not None and self._next.tick <= tick:
+            message = self._next
+            self._next = next(self._source, None)
+            if self._several_runs and self._next is not None and self._next.tick < message.tick:
+                self._next = None  # a reset: another run begins, which has a line of its own
+            yield message
+
+
+def replay(path: str | Path, progress: Callable[[float, float], None] | None = None) -> ReplayReport:
+    """Replays a bag (recorded by this package or, the same topics, by stock rosbag2) and compares.
+
+    Bottles, Contacts, Belts, Signals and CommandOutcomes are compared bit for bit where the engine, versions and
+    machine are those of the recording; elsewhere within compare.TOLERANCE, Contacts left out. Stops at the first
+    difference. progress(done, total) is told simulated times, s.
+    Raises BagError, and SceneError if the recorded scene is refused.
+    """
+    with open_bag(path) as bag:
+        simulation = _simulation(bag)
+        environment = _environment(bag, simulation)
+        return _Replay(bag, simulation, environment, progress).run()
+
+
+class _Replay:
+    def __init__(
+        self,
+        bag: Bag,
+        simulation: Simulation,
+        environment: tuple[str, ...],
+        progress: Callable[[float, float], None] | None,
+    ) -> None:
+        self._bag = bag
+        self._sim = simulation
+        self._environment = environment
+        self._exact = not environment
+        self._progress = progress
+        recorded = bag.counts
+        topics = [topic for topic in COMPARERS if recorded.get(topic) and (self._exact or topic != "contacts")]
+        self._states = [_Messages(bag, topic) for topic in topics]
+        self._outcomes = _Messages(bag, "outcomes") if recorded.get("outcomes") else None
+        self._compared = dict.fromkeys(topics, 0)
+        self._last_tick = -1
+        if not self._states:
+            raise BagError(f"{bag.path}: holds no message of topics {', '.join(COMPARERS)}; nothing can be compared")
+
+    def run(self) -> ReplayReport:
+        first_tick = min(tick for state in self._states if (tick := state.next_tick) is not None)
+        total = self._sim.scene.duration
+        difference = self._compare_states()
+        while difference is None and any(state.next_tick is not None for state in self._states):
+            commands = self._recorded_outcomes()
+            for outcome in commands:
+                if outcome.source != WATCHDOG:
+                    self._sim.command(outcome.names, outcome.values, outcome.source)
+            self._sim.advance(1)
+            difference = self._compare_outcomes(commands) or self._compare_states()
+            if self._progress is not None:
+                self._progress(self._sim.time, total)
+        return ReplayReport(
+            path=self._bag.path,
+            exact=self._exact,
+            environment=self._environment,
+            first_tick=first_tick,
+            last_tick=self._last_tick,
+            end=self._bag.time(self._sim.tick) if difference is None else difference.time,
+            compared=self._compared,
+            difference=difference,
+        )
+
+    def _recorded_outcomes(self) -> list[Outcome]:
+        if self._outcomes is None:
+            return []
+        return [to_outcome(message) for message in self._outcomes.take(self._sim.tick)]
+
+    def _compare_outcomes(self, recorded: list[Outcome]) -> Difference | None:
+        replayed = [Outcome(o.source, o.names, o.values, o.accepted, o.reason) for o in self._sim.take_outcomes()]
+        if self._outcomes is not None:
+            self._compared["outcomes"] = self._compared.get("outcomes", 0) + len(recorded)
+        tick = self._sim.tick - 1
+        return outcome_difference(tick, self._bag.time(tick), recorded, replayed)
+
+    def _compare_states(self) -> Difference | None:
+        now = Snapshot(self._sim)
+        for state in self._states:
+            for message in state.take(self._sim.tick):
+                self._compared[state.topic] += 1
+                self._last_tick = max(self._last_tick, self._sim.tick)
+                difference = self._compare(state.topic, message, now)
+                if difference is not None:
+                    return difference
+        return None
+
+    def _compare(self, topic: str, recorded: Any, now: Snapshot) -> Difference | None:
+        header = Header(self._sim.tick, self._sim.stamp_ns, recorded.header.frame_id)
+        replayed = self._bag.decode(topic, SERIALIZERS[topic](now, header))
+        return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
+
+
+def _simulation(bag: Bag) -> Simulation:
+    line = bag.line
+    name = f"{bag.path} (recorded scene)"
+    try:
+        return Simulation(parse_scene(line.scene_text, name, parse_overrides(line.overrides)))
+    except SceneError as error:
+        raise SceneError(f"{bag.path}: the recorded scene is refused by this version:\n{error}") from error
+
+
+def _environment(bag: Bag, simulation: Simulation) -> tuple[str, ...]:
+    """What differs between the recording and here in what can change a bit."""
+    line, model = bag.line, simulation.model
+    pairs: list[tuple[str, Any, Any]] = [
+        ("engine", line.engine_hash, model.engine_hash),
+        ("versions", ", ".join(line.versions), ", ".join(model.versions)),
+        ("machine", line.machine, model.machine),
+        ("integrator", line.integrator, model.integrator),
+        ("steps a tick", line.steps_per_tick, model.steps_per_tick),
+        ("dt", line.dt, model.dt),
+        ("seed", line.seed, simulation.scene.seed),
+    ]
+    return tuple(f"{what}: {then} recorded, {now} here" for what, then, now in pairs if then != now)

@@ -1,0 +1,59 @@
+"""Pictures of scenes and recordings, each as PNG and SVG; the only part of conveyor_sim that imports matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.plot import style
+from conveyor_sim.plot.data import Frame, Plant
+from conveyor_sim.plot.flow import flow_figure, force_figure
+from conveyor_sim.plot.recording import Recording
+from conveyor_sim.plot.series import velocity_figure
+from conveyor_sim.plot.views import plant_figure, scene_figure, table_figure
+
+if TYPE_CHECKING:
+    from conveyor_sim.scene import Scene
+
+__all__ = ["plot_bag", "plot_scene"]
+
+
+def plot_bag(
+    bag: str | Path, out_dir: str | Path, times: Sequence[float] | None = None, bottles: Sequence[int] | None = None
+) -> list[Path]:
+    """Draw a recording in the manner of the paper's Figs. 6 to 9; returns the files written.
+
+    `table` shows the widest belt at `times` (s; nearest recorded, default a quarter, half, three quarters and the end),
+    `plant` everything at the last of them, `velocity_bottle_ID` the `bottles` (ids; default the 1st and the 50th fed),
+    `flow` and `force` the whole run.
+    Raises BagError if the bag can't be read, ConveyorError for a time or bottle that it does not hold.
+    """
+    out = Path(out_dir)
+    with open_bag(bag) as opened, style.look():
+        recording = Recording(opened)
+        frames = recording.frames(times)
+        velocities = recording.velocities(bottles)
+        end = float(recording.flow.time[-1])
+        name = recording.scene.name
+        peak = float(recording.peak_force.largest.max())
+        figures = {
+            "table": table_figure(recording.plant, frames, name, peak),
+            "plant": plant_figure(recording.plant, frames[-1], name, peak),
+            **{f"velocity_bottle_{v.bottle}": velocity_figure(v, recording.belts, end) for v in velocities},
+            "flow": flow_figure(recording.flow, recording.belts),
+            "force": force_figure(recording.peak_force),
+        }
+        return [path for stem, figure in figures.items() for path in style.save(figure, out / stem)]
+
+
+def plot_scene(scene: Scene, path: str | Path) -> Path:
+    """Draw a scene before it runs, to `path` with the suffixes .png and .svg; returns the PNG.
+
+    Raises ConveyorError if the files can't be written.
+    """
+    path = Path(path)
+    stem = path.with_suffix("") if path.suffix in (".png", ".svg") else path
+    with style.look():
+        return style.save(scene_figure(Plant.of(scene), Frame.start_of(scene), scene.name), stem)[0]

@@ -1,0 +1,32 @@
+"""The small line of these tests, and a recording of it with commands of every kind."""
+
+from pathlib import Path
+
+from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+SMALL_LINE = Path(__file__).parent / "small_line.yaml"
+SPEED = "belts/straight/cmd_speed"
+TURN = "belts/turn/cmd_speed"
+COMMANDS = {
+    3: [((SPEED,), (0.3,))],
+    20: [((SPEED, TURN), (0.4, -0.2)), ((SPEED,), (float("nan"),))],
+    35: [(("belts/nowhere/cmd_speed",), (1.0,))],
+}
+"""By tick; the watchdog of `straight` stops it at tick 60."""
+
+
+def record(scene: Scene, folder: Path, ticks: int) -> Simulation:
+    """Runs a scene with COMMANDS and records it."""
+    simulation = Simulation(scene)
+    with Recorder(folder) as recorder:
+        outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
+        outputs.start()
+        while simulation.tick < ticks:
+            for names, values in COMMANDS.get(simulation.tick, []):
+                simulation.command(names, values)
+            simulation.advance()
+            outputs.after_tick()
+    return simulation

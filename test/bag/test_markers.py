@@ -1,0 +1,72 @@
+"""Markers that RViz2 and Foxglove can draw."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from bag.hand_made import HEADER, bottles
+from bag.ros_decode import assert_same, deserialize
+
+from conveyor_sim.bag.markers import ADD, DELETE, TRIANGLE_LIST, bottles_markers, plant_markers
+from conveyor_sim.bag.messages import MARKERS
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
+
+RADII = np.array([0.03, 0.05, 0.04, 0.06])
+
+
+def decode(data: bytes) -> list[Any]:
+    """The markers, as rosbags reads them; ROS must read the same."""
+    message: Any = typestore().deserialize_cdr(data, MARKERS)
+    assert_same(deserialize(MARKERS, data), message)
+    return list(message.markers)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 1000])
+def test_bottles_are_one_list_of_spheres_a_type(count: int) -> None:
+    columns = bottles(count)
+    markers = decode(bottles_markers(columns, RADII, HEADER))
+    assert [marker.id for marker in markers] == [0, 1, 2, 3]
+    for index, marker in enumerate(markers):
+        chosen = columns.type == index
+        assert [point.x for point in marker.points] == columns.x[chosen].tolist()
+        assert [point.y for point in marker.points] == columns.y[chosen].tolist()
+        assert marker.scale.x == marker.scale.y == 2.0 * RADII[index]
+        assert marker.action == (ADD if chosen.any() else DELETE)
+        assert marker.header.frame_id == "hall"
+
+
+def test_plant_shows_every_belt_rail_and_name(scene: Scene) -> None:
+    belts, rails = belt_shapes(scene), rail_shapes(scene)
+    markers = decode(plant_markers(belts, rails, HEADER))
+    by_space: dict[str, list[Any]] = {}
+    for marker in markers:
+        by_space.setdefault(marker.ns, []).append(marker)
+    assert len(by_space["belts"]) == len(belts)
+    assert len(by_space["rails"]) == len(rails)
+    assert [marker.text for marker in by_space["names"]] == ["straight", "turn"]
+    assert len({(marker.ns, marker.id) for marker in markers}) == len(markers)
+
+
+def test_belt_surface_has_the_belts_area(scene: Scene) -> None:
+    markers = decode(plant_markers(belt_shapes(scene), rail_shapes(scene), HEADER))
+    surfaces = [marker for marker in markers if marker.type == TRIANGLE_LIST]
+    quarter_ring = np.pi / 4 * (0.7**2 - 0.3**2)
+    for surface, area in zip(surfaces, [0.4, quarter_ring], strict=True):
+        corners = np.array([(point.x, point.y) for point in surface.points]).reshape(-1, 3, 2)
+        one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        signed = 0.5 * (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+        assert (signed > 0.0).all()  # every triangle faces up
+        assert signed.sum() == pytest.approx(area, rel=2e-3)
+
+
+def test_arrows_point_along_positive_speed(scene: Scene) -> None:
+    markers = decode(plant_markers(belt_shapes(scene), rail_shapes(scene), HEADER))
+    arrows = [marker for marker in markers if marker.ns == "directions"]
+    for arrow in arrows:
+        tail, tip = arrow.points
+        if tail.x < 0.99:  # on the straight belt
+            assert tip.x > tail.x
+            assert tip.y == pytest.approx(tail.y)
+        else:  # on the turn, which runs counter-clockwise from -90 to 0 degrees
+            assert tip.y > tail.y

@@ -1,0 +1,98 @@
+"""Columns become messages that rosbags and ROS decode to the same values."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from bag.hand_made import HEADER, bottles, contacts
+from bag.ros_decode import assert_same, deserialize
+
+from conveyor_sim.bag import messages
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.observe.columns import BeltColumns, BottleColumns
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(5), HEADER)),
+    "no bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(0), HEADER)),
+    "contacts": (messages.CONTACTS, lambda: messages.contacts_message(contacts(3), HEADER)),
+    "no contacts": (messages.CONTACTS, lambda: messages.contacts_message(contacts(0), HEADER)),
+    "belts": (messages.BELTS, lambda: messages.belts_message(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
+    "signals": (messages.SIGNALS, lambda: messages.signals_message(np.array([1.0, math.nan]), HEADER)),
+    "poses": (messages.POSES, lambda: messages.poses_message(bottles(7), HEADER)),
+    "no poses": (messages.POSES, lambda: messages.poses_message(bottles(0), HEADER)),
+    "outcome": (
+        messages.OUTCOME,
+        lambda: messages.outcome_message(
+            CommandOutcome(9, "commands", ("belts/a/cmd_speed",), (math.inf,), False, "not a number — really"), HEADER
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_ros_reads_what_rosbags_reads(case: str) -> None:
+    type_name, make = CASES[case]
+    data = make()
+    assert_same(deserialize(type_name, data), typestore().deserialize_cdr(data, type_name))
+
+
+def decode(case: str) -> Any:
+    """A case, decoded by rosbags."""
+    type_name, make = CASES[case]
+    return typestore().deserialize_cdr(make(), type_name)
+
+
+def test_bottles_keep_every_bit() -> None:
+    message, columns = decode("bottles"), bottles(5)
+    for name in BottleColumns.__dataclass_fields__:
+        sent, received = getattr(columns, name), getattr(message, name)
+        assert received.dtype == sent.dtype
+        assert received.tobytes() == sent.tobytes()
+
+
+def test_header_tells_simulated_time_tick_and_frame() -> None:
+    message = decode("contacts")
+    stamp = message.header.stamp
+    assert (stamp.sec, stamp.nanosec, message.tick, message.header.frame_id) == (12, 340_000_007, 1234, "hall")
+
+
+def test_pose_is_position_and_turn_about_the_vertical() -> None:
+    columns = bottles(7)
+    for index, pose in enumerate(decode("poses").poses):
+        assert (pose.position.x, pose.position.y, pose.position.z) == (columns.x[index], columns.y[index], 0.0)
+        turn = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
+        assert math.remainder(turn - columns.theta[index], 2.0 * math.pi) == pytest.approx(0.0, abs=1e-12)
+        assert pose.orientation.x == pose.orientation.y == 0.0
+
+
+def test_columns_of_another_type_or_layout_are_converted() -> None:
+    """rosbags alone would copy an int64 array's bytes as if they were doubles, and refuse a strided one."""
+    data = messages.signals_message(np.arange(6)[::2], HEADER)  # type: ignore[arg-type]
+    assert typestore().deserialize_cdr(data, messages.SIGNALS).values.tolist() == [0.0, 2.0, 4.0]  # type: ignore[attr-defined]
+
+
+def test_line_holds_all_that_a_replay_needs(scene: Scene) -> None:
+    simulation = Simulation(scene)
+    data = messages.line_message(simulation, "run-1", HEADER)
+    line: Any = typestore().deserialize_cdr(data, messages.LINE)
+    assert_same(deserialize(messages.LINE, data), line)
+    assert (line.run_id, line.scene_name, line.seed) == ("run-1", "small_line", 7)
+    assert line.scene_text == scene.source_text
+    assert line.belts == ["straight", "turn"]
+    assert line.rails == ["right", "left", "stop", "turn_inner", "turn_outer"]
+    assert dict(zip(line.bottle_types, line.type_radius.tolist(), strict=True)) == {"small": 0.03, "large": 0.05}
+    assert dict(zip(line.bottle_types, line.type_mass.tolist(), strict=True)) == {"small": 0.1, "large": 0.3}
+    assert line.dt == pytest.approx(line.tick_ns * 1e-9 / line.steps_per_tick)
+    assert len(line.signal_names) == len(line.signal_units) == len(simulation.signals())
+    assert line.command_names == ["belts/straight/cmd_speed", "belts/turn/cmd_speed"]
+    assert line.command_max.tolist() == [3.0, 3.0]
+    assert "curved_belts" in line.effects
+    assert "normal_damping" not in line.effects
+    assert any(version.startswith("numba=") for version in line.versions)
+    assert line.engine_hash
+    assert line.machine

@@ -1,0 +1,111 @@
+"""What is written when, and that nothing is written that nobody wants."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from bag.small_line import COMMANDS, SMALL_LINE, record
+
+from conveyor_sim.bag.outputs import OUTPUTS, Outputs
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.simulation import Simulation
+
+
+class Collector:
+    """A sink that keeps what it is given."""
+
+    def __init__(self, wanted: set[str]) -> None:
+        self.wanted = wanted
+        self.taken: list[tuple[str, bytes, int]] = []
+
+    def wants(self, topic: str) -> bool:
+        return topic in self.wanted
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        self.taken.append((topic, data, stamp_ns))
+
+
+def run(scene: Scene, sinks: list[Collector], ticks: int) -> Simulation:
+    """Runs a scene into sinks."""
+    simulation = Simulation(scene)
+    outputs = Outputs(simulation, sinks, run_id="run", frame_id="hall")
+    outputs.start()
+    for _ in range(ticks):
+        for names, values in COMMANDS.get(simulation.tick, []):
+            simulation.command(names, values)
+        simulation.advance()
+        outputs.after_tick()
+    return simulation
+
+
+def test_every_sink_gets_what_it_wants_and_the_same_bytes(scene: Scene) -> None:
+    everything, some, nothing = Collector(set(OUTPUTS)), Collector({"poses", "outcomes"}), Collector(set())
+    run(scene, [everything, some, nothing], 40)
+    assert nothing.taken == []
+    assert some.taken == [message for message in everything.taken if message[0] in some.wanted]
+
+
+def test_rates_are_those_of_the_scene(scene: Scene) -> None:
+    sink = Collector(set(OUTPUTS))
+    run(scene, [sink], 40)
+    counts = {name: sum(topic == name for topic, _, _ in sink.taken) for name in OUTPUTS}
+    every_other_tick = 21  # 50 Hz, tick 0 included
+    assert counts == {
+        "line": 1,
+        "plant": 1,
+        "outcomes": 4,
+        "bottles": every_other_tick,
+        "poses": every_other_tick,
+        "markers": every_other_tick,
+        "contacts": every_other_tick,
+        "belts": every_other_tick,
+        "signals": 41,
+    }
+
+
+def test_an_output_that_is_switched_off_is_not_written() -> None:
+    scene = load_scene(SMALL_LINE, {"outputs": {"poses": 0, "contacts": 0}})
+    sink = Collector(set(OUTPUTS))
+    run(scene, [sink], 10)
+    assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - {"poses", "markers", "contacts"}
+
+
+def test_stamps_are_simulated_time_above_zero_and_never_go_back(scene: Scene) -> None:
+    sink = Collector(set(OUTPUTS))
+    run(scene, [sink], 40)
+    stamps = [stamp for _, _, stamp in sink.taken]
+    assert stamps[0] == 1
+    assert stamps == sorted(stamps)
+    assert stamps[-1] == 400_000_000
+
+
+def test_outcomes_are_returned_and_stamped_with_the_tick_that_applied_them(scene: Scene, bag: Path) -> None:
+    simulation = Simulation(scene)
+    outputs = Outputs(simulation, [], run_id="run")
+    outputs.start()
+    simulation.command(["belts/turn/cmd_speed"], [0.1])
+    simulation.advance()
+    assert [outcome.accepted for outcome in outputs.after_tick()] == [True]
+    with open_bag(bag) as opened:
+        found = [(f.tick, f.data.source, f.data.accepted) for f in opened.outcomes()]
+    assert found == [
+        (3, "commands", True),
+        (20, "commands", True),
+        (20, "commands", False),
+        (35, "commands", False),
+        (60, "watchdog", True),
+    ]
+
+
+def test_two_runs_give_the_same_bytes(scene: Scene, record_line: Callable[[str, int], Path], tmp_path: Path) -> None:
+    """Of every message but Line, which names its run; here the names are equal, so of every message."""
+    first, second = record_line("first", 60), tmp_path / "second"
+    record(scene, second, 60)
+    with open_bag(first) as one, open_bag(second) as two:
+        assert list(one.raw()) == list(two.raw())
+
+
+def test_watching_changes_nothing(scene: Scene) -> None:
+    watched = run(scene, [Collector(set(OUTPUTS))], 80)
+    alone = run(scene, [], 80)
+    assert watched.state_hash() == alone.state_hash()

@@ -1,0 +1,182 @@
+"""Recorded lines run again to the same bits; where they do not, the first difference is found."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bag.editing import edited
+from bag.small_line import SMALL_LINE, record
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.errors import BagError, SceneError
+from conveyor_sim.scene import load_scene
+
+
+def test_recording_replays_bit_for_bit(bag: Path) -> None:
+    told: list[float] = []
+    report = replay(bag, lambda done, total: told.append(done / total))
+    assert report.difference is None
+    assert report.exact
+    assert report.environment == ()
+    assert (report.first_tick, report.last_tick) == (0, 100)
+    assert report.compared == {"bottles": 51, "contacts": 51, "belts": 51, "signals": 101, "outcomes": 5}
+    assert told[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("topic", "field", "tick", "entry", "part"),
+    [
+        ("bottles", "vy", 42, 3, "bottle 3"),
+        ("bottles", "x", 0, 1, "bottle 1"),
+        ("signals", "values", 77, 0, "signal belts/straight/speed"),
+        ("belts", "actual", 18, 1, "belt turn"),
+        ("contacts", "tangential_force", 60, 0, None),
+    ],
+)
+def test_one_flipped_bit_is_found(
+    bag: Path, tmp_path: Path, topic: str, field: str, tick: int, entry: int, part: str | None
+) -> None:
+    def flip(name: str, message: Any) -> None:
+        if name == topic and message.tick == tick:
+            values = getattr(message, field).copy()
+            values.view("u8")[entry] ^= 1
+            setattr(message, field, values)
+
+    difference = replay(edited(bag, tmp_path / "flipped", flip)).difference
+    assert difference is not None
+    assert (difference.tick, difference.topic, difference.field) == (tick, topic, field)
+    assert difference.recorded != difference.replayed
+    if part is not None:
+        assert difference.part == part
+    if topic == "bottles":
+        assert difference.bottle == entry
+
+
+def test_changed_command_is_found(bag: Path, tmp_path: Path) -> None:
+    """The speed that was commanded is replayed, so what differs is the motion that follows."""
+
+    def change(name: str, message: Any) -> None:
+        if name == "outcomes" and message.tick == 3:
+            message.values = message.values + 0.01
+
+    difference = replay(edited(bag, tmp_path / "changed", change)).difference
+    assert difference is not None
+    assert difference.tick == 4
+
+
+def test_outcome_that_can_not_be_is_found(bag: Path, tmp_path: Path) -> None:
+    def accept(name: str, message: Any) -> None:
+        if name == "outcomes" and message.tick == 35:
+            message.accepted = True
+
+    difference = replay(edited(bag, tmp_path / "accepted", accept)).difference
+    assert difference is not None
+    assert (difference.tick, difference.topic, difference.field) == (35, "outcomes", "accepted")
+
+
+def test_watchdog_is_compared_not_commanded(bag: Path, tmp_path: Path) -> None:
+    def later(name: str, message: Any) -> None:
+        if name == "outcomes" and message.source == "watchdog":
+            message.tick += 1
+
+    difference = replay(edited(bag, tmp_path / "later", later)).difference
+    assert difference is not None
+    assert (difference.tick, difference.field) == (60, "the number of outcomes")
+
+
+def test_other_machine_is_named_and_compared_within_the_tolerance(bag: Path, tmp_path: Path) -> None:
+    def elsewhere(name: str, message: Any) -> None:
+        if name == "line":
+            message.machine = "an abacus"
+            message.versions = ["numba=0.1"]
+        if name == "bottles":
+            message.x = message.x + 1e-9
+
+    report = replay(edited(bag, tmp_path / "elsewhere", elsewhere))
+    assert not report.exact
+    assert len(report.environment) == 2
+    assert "an abacus recorded" in report.environment[1]
+    assert report.difference is None
+    assert "contacts" not in report.compared
+
+
+def test_other_machine_that_went_another_way_is_found(bag: Path, tmp_path: Path) -> None:
+    def elsewhere(name: str, message: Any) -> None:
+        if name == "line":
+            message.machine = "an abacus"
+        if name == "bottles" and message.tick >= 50:
+            message.y = message.y + 1e-3
+
+    difference = replay(edited(bag, tmp_path / "elsewhere", elsewhere)).difference
+    assert difference is not None
+    assert (difference.tick, difference.field) == (50, "y")
+
+
+def test_overrides_are_replayed_too(tmp_path: Path) -> None:
+    folder = tmp_path / "faster"
+    record(load_scene(SMALL_LINE, {"belts": {"straight": {"speed": 0.8}}, "seed": 3}), folder, 30)
+    report = replay(folder)
+    assert report.difference is None
+    assert report.last_tick == 30
+
+
+def stock(bag: Path, folder: Path, messages: Iterator[tuple[str, int, bytes]]) -> Path:
+    """What stock rosbag2 makes of the topics of a node in the namespace /hall: stamped with the wall clock."""
+    store = typestore()
+    with open_bag(bag) as opened, Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connections = {
+            topic: writer.add_connection(f"/hall/{topic}", kind, typestore=store)
+            for topic, kind in opened.types.items()
+        }
+        for number, (topic, _, data) in enumerate(messages):
+            writer.write(connections[topic], 1_700_000_000_000_000_000 + number * 1_000_000, data)
+    return folder
+
+
+def test_stock_recording_replays(bag: Path, tmp_path: Path) -> None:
+    """Another storage, other log times, a namespace, topics in another order, and messages lost on the way."""
+    with open_bag(bag) as opened:
+        messages = [message for message in opened.raw() if message[0] not in ("markers", "plant")]
+    lost = [message for number, message in enumerate(messages) if message[0] in ("line", "outcomes") or number % 7]
+    shuffled = sorted(lost, key=lambda message: (message[1] // 100_000_000, message[0]))
+    report = replay(stock(bag, tmp_path / "stock", iter(shuffled)))
+    assert report.difference is None
+    assert report.exact
+    assert report.last_tick == 100
+    assert report.compared["outcomes"] == 5
+
+
+def test_stock_recording_across_a_reset_replays_its_first_run(bag: Path, tmp_path: Path) -> None:
+    with open_bag(bag) as opened:
+        messages = list(opened.raw())
+    report = replay(stock(bag, tmp_path / "stock", iter(messages + messages)))
+    assert report.difference is None
+    assert report.compared["signals"] == 101
+
+
+def test_stock_recording_that_began_late_replays_what_it_has(bag: Path, tmp_path: Path) -> None:
+    with open_bag(bag) as opened:
+        messages = [m for m in opened.raw() if m[1] > 400_000_000 or m[0] in ("line", "outcomes")]
+    report = replay(stock(bag, tmp_path / "stock", iter(messages)))
+    assert report.difference is None
+    assert report.first_tick == 41
+
+
+def test_scene_that_is_refused_today_is_said(bag: Path, tmp_path: Path) -> None:
+    def spoil(name: str, message: Any) -> None:
+        if name == "line":
+            message.scene_text = message.scene_text.replace("radius: 0.03", "radius: -0.03")
+
+    with pytest.raises(SceneError, match=r"the recorded scene is refused by this version:\n.*radius"):
+        replay(edited(bag, tmp_path / "spoilt", spoil))
+
+
+def test_bag_without_states_is_refused(bag: Path, tmp_path: Path) -> None:
+    with open_bag(bag) as opened:
+        messages = [message for message in opened.raw() if message[0] == "line"]
+    with pytest.raises(BagError, match="nothing can be compared"):
+        replay(stock(bag, tmp_path / "stock", iter(messages)))

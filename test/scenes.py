@@ -1,0 +1,106 @@
+"""Scenes from Python: a test writes what it is about, the rest is left out. SI units."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.scene import Scene, parse_scene
+from conveyor_sim.simulation import Simulation
+
+RADIUS = 0.065
+MASS = 0.2
+NO_FLOOR: dict[str, Any] = {"floor": "none"}
+NO_OUTPUTS = {topic: 0 for topic in Scene.TOPICS}
+
+
+def scene(**fields: Any) -> Scene:
+    """A scene with one bottle type, `bottle` of `glass` (the paper's radius and mass), and no outputs.
+
+    Peaks then add up from the start. The duration is a thousand ticks, which binds nobody here.
+    """
+    duration = 1000 * fields.get("tick", 0.01)
+    defaults = {"name": "test", "duration": duration, "bottle_types": {"bottle": kind()}, "outputs": NO_OUTPUTS}
+    return parse_scene(json.dumps({**defaults, **fields}))
+
+
+def simulation(**fields: Any) -> Simulation:
+    """The scene of these fields, ready to run."""
+    return Simulation(scene(**fields))
+
+
+def kind(radius: float = RADIUS, mass: float = MASS, material: str = "glass", **more: Any) -> dict[str, Any]:
+    """A bottle type."""
+    return {"radius": radius, "mass": mass, "material": material, **more}
+
+
+def bottle(x: float, y: float, vx: float = 0.0, vy: float = 0.0, **more: Any) -> dict[str, Any]:
+    """A bottle that is there at the start."""
+    return {"type": "bottle", "position": [x, y], "velocity": [vx, vy], **more}
+
+
+def contact(
+    stiffness: float, other: str = "glass", damping: tuple[str, float] | None = None, friction: float = 0.0
+) -> dict[str, Any]:
+    """Contact of glass with glass or another material."""
+    law, coefficient = damping or ("none", 0.0)
+    return {
+        "between": ["glass", other],
+        "stiffness": stiffness,
+        "damping": {"law": law, "coefficient": coefficient},
+        "friction": friction,
+    }
+
+
+def segment(start: tuple[float, float], end: tuple[float, float]) -> dict[str, Any]:
+    """A straight rail of steel."""
+    return {"kind": "segment", "from": start, "to": end, "material": "steel"}
+
+
+def polyline(points: Any, closed: bool = False) -> dict[str, Any]:
+    """A polyline of steel."""
+    return {"kind": "polyline", "points": [list(map(float, p)) for p in points], "closed": closed, "material": "steel"}
+
+
+def arc(centre: tuple[float, float], radius: float, start_angle: float, span: float) -> dict[str, Any]:
+    """An arc rail of steel."""
+    return {"kind": "arc", "centre": centre, "radius": radius, "start_angle": start_angle, "span": span,
+            "material": "steel"}  # fmt: skip
+
+
+def belt(
+    speed: float, start: tuple[float, float] = (-5.0, -5.0), length: float = 10.0, width: float = 10.0, **more: Any
+) -> dict[str, Any]:
+    """A straight belt of chain along x, large enough that little leaves it."""
+    more = {"angle": 0.0, "speed_limits": [-10.0, 10.0], **more}
+    return {"kind": "straight", "start": start, "length": length, "width": width, "material": "chain", "speed": speed,
+            **more}  # fmt: skip
+
+
+def base(friction: float) -> list[dict[str, Any]]:
+    """Friction of glass on chain."""
+    return [{"between": ["glass", "chain"], "friction": friction}]
+
+
+def stiffness_for(contact_time: float, reduced_mass: float) -> float:
+    """Stiffness (N/m) of an undamped contact that lasts `contact_time`: pi sqrt(m_r / k)."""
+    return reduced_mass * (math.pi / contact_time) ** 2
+
+
+def phases(count: int) -> NDArray[np.float64]:
+    """Points spread evenly over [0, 1) at every scale, (count,): multiples of the golden ratio."""
+    return np.mod(np.arange(count) * (math.sqrt(5.0) - 1.0) / 2.0, 1.0)
+
+
+def rms(values: Any) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def order(steps: Any, errors: Any) -> float:
+    """Order of convergence: minus the slope of log error over log number of steps."""
+    return float(-np.polyfit(np.log(np.asarray(steps, float)), np.log(np.asarray(errors, float)), 1)[0])

@@ -1,0 +1,134 @@
+"""The commands, as a user types them."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from bag.small_line import SMALL_LINE
+from click.testing import CliRunner, Result
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.cli import main
+
+Command = Callable[..., Result]
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Runs `conveyor-sim` with some arguments in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def assert_refused(result: Result, words: str) -> None:
+    """One sentence, exit code 1, no traceback."""
+    assert result.exit_code == 1
+    assert result.output.startswith("Error: ")
+    assert re.search(words, result.output)
+    assert "Traceback" not in result.output
+
+
+def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
+    result = command("check", SMALL_LINE)
+    assert result.exit_code == 0, result.output
+    words = " ".join(result.output.split())
+    for phrase in (
+        "7 at the start",
+        "straight, turn",
+        "turn_outer",
+        "100 steps a tick",
+        "normal_damping off: no contact with damping law normal",
+        "arc_rails on: rails.turn_inner",
+    ):
+        assert phrase in words
+    assert (tmp_path / "small_line.png").stat().st_size > 1000
+
+
+def test_check_takes_the_name_of_a_shipped_scene(command: Command, tmp_path: Path) -> None:
+    result = command("check", "two_bottles", "--out", "pictures")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "pictures" / "two_bottles.png").exists()
+
+
+def test_check_refuses_a_wrong_scene_by_line_and_field(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "wrong.yaml").write_text(SMALL_LINE.read_text().replace("mass: 0.1", "mass: -0.1"))
+    assert_refused(command("check", "wrong.yaml"), r"wrong\.yaml:\d+: bottle_types\.small\.mass: -0\.1 given, expected")
+
+
+def test_run_records_sums_up_and_draws(command: Command, tmp_path: Path) -> None:
+    result = command("run", SMALL_LINE, "--duration", "0.4")
+    assert result.exit_code == 0, result.output
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert re.fullmatch(r"\d{8}T\d{6}Z", folder.name)
+    with open_bag(folder) as bag:
+        assert bag.counts["signals"] == 41
+    assert json.loads((folder / "summary.json").read_text())["simulated"] == pytest.approx(0.4)
+    assert list((folder / "pictures").glob("*.png"))
+    assert "real-time factor" in result.output
+    assert str(folder.relative_to(tmp_path)) in result.output
+
+
+def test_run_with_nothing_to_draw_is_a_good_run(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "quiet.yaml").write_text(SMALL_LINE.read_text().replace("{bottles: 50,", "{bottles: 0,"))
+    result = command("run", "quiet.yaml", "--out", "bag", "--duration", "0.1")
+    assert result.exit_code == 0, result.output
+    assert "no pictures: " in result.output
+    assert (tmp_path / "bag" / "summary.json").exists()
+
+
+def test_run_into_a_folder_that_is_taken_is_refused(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    assert_refused(command("run", SMALL_LINE, "--out", "mine"), "mine: is not empty")
+
+
+def test_run_of_a_duration_that_is_no_number_of_ticks_is_refused(command: Command) -> None:
+    assert_refused(command("run", SMALL_LINE, "--duration", "0.005"), r"duration.*0\.005")
+
+
+def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
+    result = command("run", SMALL_LINE, "--no-record", "--duration", "0.1")
+    assert result.exit_code == 0, result.output
+    assert "0.10 s simulated in" in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path) -> None:
+    command("run", SMALL_LINE, "--out", "bag", "--duration", "0.6")
+    assert "nothing to do" in command("recover", "bag").output
+    replayed = command("replay", "bag")
+    assert replayed.exit_code == 0, replayed.output
+    assert "equal bit for bit up to tick 60 (0.60 s)" in replayed.output
+    file = tmp_path / "bag" / "bag_0.mcap"
+    file.write_bytes(file.read_bytes()[:-50])
+    assert_refused(command("replay", "bag"), "conveyor-sim recover")
+    recovered = command("recover", "bag")
+    assert recovered.exit_code == 0, recovered.output
+    assert "whole again with" in recovered.output
+    assert "bag_0.mcap.damaged and may be deleted" in recovered.output
+    assert command("replay", "bag").exit_code == 0
+
+
+def test_plot_draws_into_a_folder(command: Command, tmp_path: Path) -> None:
+    command("run", SMALL_LINE, "--out", "bag", "--duration", "0.4")
+    result = command("plot", "bag", "--out", "drawn", "--time", "0.2", "--bottle", "0")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "drawn" / "velocity_bottle_0.png").exists()
+    assert_refused(command("plot", "bag", "--time", "99"), "99")
+
+
+@pytest.mark.parametrize("name", ["replay", "plot", "recover"])
+def test_bag_that_is_not_there_is_refused(command: Command, name: str) -> None:
+    assert_refused(command(name, "gone"), "gone: no ")
+
+
+def test_scene_that_is_not_there_is_refused(command: Command) -> None:
+    assert_refused(command("run", "gone.yaml"), "gone.yaml")
+
+
+def test_help_names_the_commands(command: Command) -> None:
+    result = command("--help")
+    for name in ("check", "run", "plot", "replay", "recover"):
+        assert re.search(rf"^  {name} ", result.output, re.MULTILINE)

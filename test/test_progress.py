@@ -1,0 +1,26 @@
+"""Progress on terminals and elsewhere."""
+
+import io
+
+from rich.console import Console
+
+from conveyor_sim.progress import ProgressBar
+
+
+def test_plain_lines_where_there_is_no_terminal() -> None:
+    out = io.StringIO()
+    with ProgressBar("line", 2.0, Console(file=out, force_terminal=False)) as bar:
+        for tick in range(201):
+            bar.update(tick * 0.01)
+    lines = out.getvalue().splitlines()
+    assert len(lines) == 10
+    assert lines[-1].startswith("line: 2.0 of 2.0 s, ")
+    assert lines[-1].endswith(" x real time")
+
+
+def test_bar_on_a_terminal_ends_at_the_whole() -> None:
+    out = io.StringIO()
+    with ProgressBar("line", 0.0, Console(file=out, force_terminal=True, width=100)) as bar:
+        bar.update(0.5, total=1.0)
+        bar.update(1.0, total=1.0)
+    assert "100%" in out.getvalue()

@@ -1,0 +1,125 @@
+"""What a run amounts to, counted from its bag."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bag.editing import edited
+from bag.small_line import SMALL_LINE, record
+from rich.console import Console
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.summary import render, summarize, write_summary
+
+TICKS = 100
+
+THREE_BELTS = """
+name: ring
+duration: 0.6
+tick: 0.01
+base:
+  - {between: [glass, belt], friction: 0.4}
+bottle_types:
+  plain: {radius: 0.05, mass: 0.1, material: glass}
+belts:
+  a: {kind: straight, start: [0, 0], angle: 0, length: 1, width: 0.3, material: belt}
+  b: {kind: straight, start: [1, 0], angle: 0, length: 1, width: 0.3, material: belt}
+  c: {kind: straight, start: [2, 0], angle: 0, length: 1, width: 0.3, material: belt}
+bottles:
+  - {type: plain, position: [0.5, 0.15]}
+outputs: {bottles: 100, signals: 0}
+"""
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small line."""
+    folder = tmp_path_factory.mktemp("summary") / "small"
+    record(load_scene(SMALL_LINE), folder, TICKS)
+    return folder
+
+
+def test_counts_are_those_of_the_simulation(tmp_path: Path) -> None:
+    simulation = record(load_scene(SMALL_LINE), tmp_path / "bag", TICKS)
+    summary = summarize(tmp_path / "bag", wall=0.5)
+    assert summary.simulated == pytest.approx(1.0)
+    assert summary.real_time_factor == pytest.approx(2.0)
+    assert summary.fed == simulation.counts.fed > 0
+    assert summary.removed == simulation.counts.removed > 0
+    assert summary.present == simulation.counts.present
+    on_belts = sum(flow.bottles for flow in summary.belts.values())
+    assert on_belts + summary.on_floor == summary.present
+    assert (summary.commands, summary.refused) == (5, 2)
+
+
+def test_forces_are_of_all_recorded_peaks(bag: Path) -> None:
+    with open_bag(bag) as opened:
+        peaks = np.concatenate([frame.data.peak_force for frame in opened.bottles()])
+    summary = summarize(bag)
+    assert summary.peak_force == peaks.max() > 0.0
+    assert summary.peak_force_99 == np.percentile(peaks[peaks > 0.0], 99.0)
+
+
+def test_messages_and_bytes_are_counted_by_topic(bag: Path) -> None:
+    with open_bag(bag) as opened:
+        sizes = [len(data) for topic, _, data in opened.raw() if topic == "contacts"]
+    count = summarize(bag).topics["contacts"]
+    assert (count.messages, count.bytes) == (len(sizes), sum(sizes))
+
+
+def ring(scene: Scene, tmp_path: Path, belt_of: Any) -> Path:
+    """A recording of one bottle in which `belt_of(tick)` says on which belt it is."""
+    record(scene, tmp_path / "still", 60)
+
+    def move(topic: str, message: Any) -> None:
+        if topic == "bottles":
+            message.belt = np.array([belt_of(message.tick)], dtype=np.int32)
+
+    return edited(tmp_path / "still", tmp_path / "moving", move)
+
+
+def test_rounds_of_a_loop_are_counted_where_bottles_return(tmp_path: Path) -> None:
+    """Once round in 15 ticks: it comes back to `a` at ticks 15, 30, 45 and 60, the last two in the second half."""
+    summary = summarize(ring(parse_scene(THREE_BELTS), tmp_path, lambda tick: tick // 5 % 3))
+    assert summary.loop is not None
+    assert (summary.loop.belt, summary.loop.returns) == ("a", 4)
+    assert summary.loop.per_minute == pytest.approx(400.0)
+    assert summary.loop.per_minute_second_half == pytest.approx(400.0)
+    assert summary.belts["b"].per_minute == pytest.approx(400.0)
+    assert summary.fed == 0
+
+
+def test_to_and_fro_between_two_belts_is_no_loop(tmp_path: Path) -> None:
+    summary = summarize(ring(parse_scene(THREE_BELTS), tmp_path, lambda tick: tick // 5 % 2))
+    assert summary.loop is None
+    assert summary.belts["a"].per_minute == pytest.approx(600.0)
+
+
+def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
+    record(load_scene(SMALL_LINE, {"outputs": {"signals": 0}}), tmp_path / "bag", 10)
+    summary = summarize(tmp_path / "bag")
+    assert summary.fed is None
+    assert summary.wall is None
+    assert summary.real_time_factor is None
+
+
+def test_summary_is_written_as_json(bag: Path, tmp_path: Path) -> None:
+    summary = summarize(bag, wall=2.0)
+    content = json.loads(write_summary(summary, tmp_path).read_text())
+    assert content["real_time_factor"] == pytest.approx(0.5)
+    assert content["topics"]["bottles"]["messages"] == 51
+    assert content["belts"].keys() == {"straight", "turn"}
+
+
+def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
+    summary = summarize(bag, wall=2.0)
+    console = Console(width=100)
+    with console.capture() as captured:
+        console.print(render(summary))
+    text = captured.get()
+    bottles = f"{summary.fed} fed, {summary.removed} removed, {summary.present} present"
+    for words in ("small_line", "real-time factor", "0.50", bottles, "straight", "signals", "2 refused"):
+        assert words in text
