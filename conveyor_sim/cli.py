@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -154,9 +155,7 @@ def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[i
 
 def _plot_function(name: str) -> Any:
     """A function of conveyor_sim.plot; None, and a sentence that says so, if matplotlib is not installed."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
+    if find_spec("matplotlib") is None:
         click.echo("no pictures: matplotlib is not installed (pip install 'conveyor_sim[plot]')", err=True)
         return None
     import conveyor_sim.plot
@@ -180,7 +179,7 @@ def _account(scene: Scene, model: Model) -> Table:
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    table.add_row("time step", f"{model.dt:.3g} s, {model.steps_per_tick} steps a tick: {model.dt_reason}")
+    table.add_row("time step", f"{model.dt:.3g} s: {model.dt_reason}")
     for bound in model.bounds:
         table.add_row("", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")
     table.add_row("integrator", model.integrator)

@@ -97,6 +97,8 @@ def _rotation(scene: Scene) -> str | None:
     for index, bottle in enumerate(scene.bottles):
         if isinstance(bottle, Single) and bottle.spin != 0.0:
             return f"bottles.{index}.spin: {bottle.spin:g} rad/s"
+        if isinstance(bottle, Single) and bottle.angle != 0.0:
+            return f"bottles.{index}.angle: {bottle.angle:g} rad"
     return None
 
 
@@ -141,7 +143,7 @@ EFFECTS: tuple[Effect, ...] = (
         "J alpha = M",
         "(1)",
         _rotation,
-        "nothing turns a bottle: no contact friction, no paper damping, no spin",
+        "nothing turns a bottle: no contact friction, no paper damping, no spin, no angle",
     ),
     Effect(
         "base_friction", "mu m g p(s), at the axis", "(7)-(10), (15)", _base_friction, "no friction under the bottles"

@@ -22,11 +22,11 @@ def rail_law(scene: Scene, rail_materials: Sequence[str]) -> RailLaw:
 
 def base_friction(scene: Scene) -> F8:
     """Coefficient of friction of each belt and, last, the floor on each bottle type, (H + 1, T)."""
-    given = {frozenset(base.between): base.friction for base in scene.base}
+    given = {base.between: base.friction for base in scene.base}
     types = list(scene.bottle_types.values())
     table = np.zeros((len(scene.belts) + 1, len(types)))
     for row, belt in enumerate(scene.belts.values()):
-        table[row] = [given[frozenset((kind.material, belt.material))] for kind in types]
+        table[row] = [given[kind.material, belt.material] for kind in types]
     if isinstance(scene.floor, Floor):
         if scene.floor.friction is not None:
             table[-1] = scene.floor.friction

@@ -60,7 +60,7 @@ def find_joints(pieces: Sequence[Piece], inward: NDArray[np.float64]) -> Joints:
 
 def _ends_on_pieces(pieces: Sequence[Piece], ends: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Pairs (piece, other) where an end of `other` lies on `piece`, be it at an end or between."""
-    found = []
+    found: list[tuple[int, int]] = []
     for index, piece in enumerate(pieces):
         touching = (piece.distance(ends.reshape(-1, 2)) <= JOINT_TOLERANCE).reshape(-1, 2).any(axis=1)
         found.extend((index, int(other)) for other in np.flatnonzero(touching) if other != index)

@@ -15,7 +15,7 @@ from conveyor_sim.simulation import Simulation
 RADIUS = 0.065
 MASS = 0.2
 NO_FLOOR: dict[str, Any] = {"floor": "none"}
-NO_OUTPUTS = {topic: 0 for topic in Scene.TOPICS}
+NO_OUTPUTS = dict.fromkeys(Scene.TOPICS, 0)
 
 
 def scene(**fields: Any) -> Scene:
@@ -104,3 +104,60 @@ def rms(values: Any) -> float:
 def order(steps: Any, errors: Any) -> float:
     """Order of convergence: minus the slope of log error over log number of steps."""
     return float(-np.polyfit(np.log(np.asarray(steps, float)), np.log(np.asarray(errors, float)), 1)[0])
+
+
+def line(**fields: Any) -> dict[str, Any]:
+    """Fields of a little line with one of everything, that fills up: a feeder, a bend, a slow end, a side belt."""
+    types = {"bottle": kind(), "small": kind(0.03, 0.05, "pet", inertia=3e-5)}
+
+    def pair(a: str, b: str, stiffness: float, law: str, coefficient: float, friction: float) -> dict[str, Any]:
+        damping = {"law": law, "coefficient": coefficient}
+        return {"between": [a, b], "stiffness": stiffness, "damping": damping, "friction": friction}
+
+    parts: dict[str, Any] = {
+        "seed": 7,
+        "tick": 0.01,
+        "step": {"per_tick": 50},
+        "bottle_types": types,
+        "contacts": [
+            pair("glass", "glass", 5000.0, "paper", 0.5, 0.1),
+            pair("glass", "pet", 3000.0, "normal", 0.7, 0.2),
+            pair("pet", "pet", 2000.0, "none", 0.0, 0.3),
+            pair("glass", "steel", 8000.0, "normal", 1.0, 0.1),
+            pair("pet", "steel", 4000.0, "paper", 0.1, 0.15),
+        ],
+        "base": [{"between": [material, "chain"], "friction": mu} for material, mu in (("glass", 0.4), ("pet", 0.25))],
+        "belts": {
+            "feeder": belt(0.8, (-1.0, -0.1), 1.5, 0.2, watchdog=0.7),
+            "bend": {
+                "kind": "curved", "centre": [0.5, 0.4], "inner_radius": 0.3, "width": 0.2, "start_angle": "-90 deg",
+                "span": "90 deg", "material": "chain", "speed": 0.7,
+                "rails": {"inner": True, "outer": True, "material": "steel"},
+            },
+            "end": belt(0.15, (1.0, 0.4), 0.6, 0.2, angle="90 deg"),
+            "side": belt(0.6, (-1.0, 1.9), 1.2, 0.2),
+        },
+        "rails": {
+            "right": segment((-1.0, -0.1), (0.5, -0.1)),
+            "left": polyline([(-1.0, 0.1), (-0.7, 0.1), (-0.5, 0.05), (0.2, 0.05), (0.5, 0.1)]),
+            "outer": segment((1.0, 0.4), (1.0, 1.0)),
+            "inner": segment((0.8, 1.0), (0.8, 0.4)),
+            "fence": polyline([(-0.85, 1.9), (-0.3, 1.97), (0.1, 1.98)]),
+        },
+        "infeeds": {
+            "packed": {
+                "bottle": "bottle", "position": [-0.9, 0.0], "direction": 0.0, "speed": 0.8, "gap": 0.004,
+                "timing_jitter": 0.01, "lateral_jitter": 0.01,
+            },
+            "timed": {
+                "bottle": "small", "position": [-0.95, 2.0], "direction": -0.05, "speed": 0.3, "rate": 6.0,
+                "timing_jitter": 0.05, "lateral_jitter": 0.04, "count": 40,
+            },
+        },
+        "outfeeds": {
+            "end": {"region": [[0.7, 0.95], [1.1, 0.95], [1.1, 1.2], [0.7, 1.2]]},
+            "side": {"region": [[0.15, 1.8], [0.5, 1.8], [0.5, 2.2], [0.15, 2.2]]},
+        },
+        "bottles": [{"grid": {"type": "small", "origin": [0.2, -0.06], "rows": 2, "columns": 3, "pitch": 0.061}}],
+    }  # fmt: skip
+    return {**parts, **fields}

@@ -9,8 +9,8 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
-    ["errors", "version", "resources"],
-    ["engine", "scene", "timestep"],
+    ["errors", "version"],
+    ["engine", "scene", "timestep", "resources"],
     ["surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["plant", "effects"],
     ["model"],

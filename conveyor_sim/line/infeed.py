@@ -88,9 +88,10 @@ class InfeedState:
             return False
         if not self._enter(state, 0.0):
             self.blocked = True
+            # A bottle that has to wait shifts the ones behind it: a line does not catch up by itself.
+            self.due = time - self.extra
             return False
-        # A bottle that had to wait shifts the ones behind it: a line does not catch up by itself.
-        self.due = max(self.due + 1.0 / rate, time - abs(self.infeed.timing_jitter))
+        self.due += 1.0 / rate
         return True
 
     def _enter(self, state: State, ahead: float) -> bool:

@@ -1,0 +1,42 @@
+# make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., DISTRO=kilted)
+# make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
+# make lint    style and types
+# make clean   removes what set-up and builds made, never runs/
+
+DISTRO ?= jazzy
+SCENE ?= config/paper_plant.yaml
+VENV := $(if $(filter jazzy,$(DISTRO)),.venv,.venv-$(DISTRO))
+PYTHON := $(VENV)/bin/python
+
+# The environment is private: nothing of a sourced ROS, nor of another environment of ROS wheels, may reach it.
+ifneq ($(AMENT_PREFIX_PATH)$(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+unexport LD_LIBRARY_PATH
+endif
+unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURRENT_PREFIX CMAKE_PREFIX_PATH
+unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
+unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: help run test lint clean set-up set-up-test
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+run: set-up
+	@$(PYTHON) -m conveyor_sim.ros.main_job "$(SCENE)"
+
+test: set-up-test
+	@$(PYTHON) -m pytest $(ARGS)
+
+lint: set-up-test
+	@$(PYTHON) -m ruff check .
+	@$(PYTHON) -m ruff format --check .
+	@$(PYTHON) -m mypy
+
+set-up:
+	@sh tools/set_up.sh "$(DISTRO)"
+
+set-up-test:
+	@sh tools/set_up.sh "$(DISTRO)" test
+
+clean:
+	rm -rf .venv .venv-kilted build install log dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

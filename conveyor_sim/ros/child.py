@@ -1,0 +1,65 @@
+"""A ROS node as a child process: its output goes to a log file, and it ends when asked to."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+PATIENCE = 20.0  # s of wall time that a process has for an orderly end
+TAIL = 15  # lines of a log shown when its process fails
+
+
+class Child:
+    """One process, from its start until stop()."""
+
+    def __init__(
+        self, name: str, parameters: Mapping[str, object], environment: Mapping[str, str], log_folder: Path
+    ) -> None:
+        """Runs `conveyor_sim.ros.<name>` with ROS parameters; its output goes to `<log_folder>/<name>.log`."""
+        self.name = name
+        self.log = log_folder / f"{name}.log"
+        command = [sys.executable, "-m", f"conveyor_sim.ros.{name}", "--ros-args"]
+        for parameter, value in parameters.items():
+            command += ["-p", f"{parameter}:={_yaml(value)}"]
+        with self.log.open("wb") as output:
+            # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children in order.
+            self._process = subprocess.Popen(
+                command,
+                env=dict(environment),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while it runs."""
+        return self._process.poll()
+
+    def stop(self) -> None:
+        """End it if it still runs, orderly if it lets itself be."""
+        if self.exit_code is None:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def obituary(self) -> str:
+        """How it ended, and the end of its log."""
+        code = self.exit_code
+        how = f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
+        lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()[-TAIL:]
+        return "\n".join([f"{self.name} {how}; the end of its log:", *(f"  {line}" for line in lines or ["(empty)"])])
+
+
+def _yaml(value: object) -> str:
+    """As `-p name:=value` reads it: texts quoted, so that a scene named `on` stays a text."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, (int, float)) else "'" + str(value).replace("'", "''") + "'"

@@ -1,0 +1,28 @@
+"""/clock: simulated time for every node that runs with use_sim_time."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+
+from conveyor_sim.bag.qos import QOS
+from conveyor_sim.ros.pacing import RateCap
+from conveyor_sim.ros.publishers import ros_qos
+
+NS = 1_000_000_000
+
+
+class ClockPublisher:
+    """Publishes simulated time, at most `rate` times a wall second; it is asked after each tick, and while paused."""
+
+    def __init__(self, node: Node, rate: float) -> None:
+        self._publisher = node.create_publisher(Clock, "/clock", ros_qos(QOS["clock"]))
+        self._cap = RateCap(rate)
+
+    def beat(self, stamp_ns: int, now: float) -> None:
+        """`stamp_ns`: simulated time in ns, above 0. `now`: s of a steady wall clock."""
+        if self._cap.ready(now):
+            self._cap.sent(now)
+            message = Clock()
+            message.clock.sec, message.clock.nanosec = divmod(stamp_ns, NS)
+            self._publisher.publish(message)

@@ -1,0 +1,87 @@
+"""/diagnostics: how the simulation fares, once a second of wall time."""
+
+from __future__ import annotations
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+
+from conveyor_sim.bag.qos import QOS
+from conveyor_sim.ros.lockstep_service import to_time
+from conveyor_sim.ros.publishers import RosSink, ros_qos
+from conveyor_sim.ros.stepper import State, Stepper
+
+PERIOD = 1.0  # s of wall time
+TICK = "tick"
+WALL = "wall time from first to last tick (s)"
+
+
+class Diagnostics:
+    """Level WARN after a second with overruns or refused commands, ERROR while the simulation can't go on."""
+
+    def __init__(self, node: Node, stepper: Stepper, sink: RosSink) -> None:
+        self._stepper = stepper
+        self._sink = sink
+        self._name = f"{node.get_name()}: simulation"
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", ros_qos(QOS["diagnostics"]))
+        self._last_wall = time.monotonic()
+        self._last_tick = 0
+        self._last_overruns = 0
+        self._last_refused = 0
+        # A steady clock: with use_sim_time the node's own would stand still while paused.
+        node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _publish(self) -> None:
+        stepper = self._stepper
+        session, pacer = stepper.session, stepper.pacer
+        simulation = session.simulation
+        tick, counts = simulation.tick, simulation.counts
+        overruns = pacer.overruns - self._last_overruns
+        refused = stepper.refused_commands - self._last_refused
+        status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
+        status.level, status.message = _verdict(stepper, overruns, refused)
+        values = {
+            "state": stepper.state.name,
+            "run_id": session.run_id,
+            TICK: tick,
+            "simulated time (s)": f"{simulation.time:.9g}",
+            "end of run (s)": f"{session.last_tick * pacer.tick:.9g}",
+            "real_time_factor": f"{pacer.factor:g}",
+            "real_time_factor measured": f"{self._measured(tick, pacer.tick):.4g}",
+            WALL: f"{session.wall:.3f}",
+            "dt (s)": f"{simulation.model.dt:.9g}",
+            "steps per tick": simulation.model.steps_per_tick,
+            "overruns": pacer.overruns,
+            "wall time given up (s)": f"{pacer.lost:.3f}",
+            "refused commands": stepper.refused_commands,
+            "lockstep owner": stepper.lockstep.owner,
+            "bottles present": counts.present,
+            "bottles fed": counts.fed,
+            "bottles removed": counts.removed,
+            "recording": session.bag or "",
+        }
+        values |= {f"published {topic}": count for topic, count in sorted(self._sink.published.items())}
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = to_time(simulation.stamp_ns)
+        self._publisher.publish(message)
+        self._last_overruns, self._last_refused = pacer.overruns, stepper.refused_commands
+
+    def _measured(self, tick: int, tick_s: float) -> float:
+        """Simulated seconds per wall second since the last message; 0 after a reset."""
+        now = time.monotonic()
+        factor = max(0, tick - self._last_tick) * tick_s / (now - self._last_wall)
+        self._last_wall, self._last_tick = now, tick
+        return factor
+
+
+def _verdict(stepper: Stepper, overruns: int, refused: int) -> tuple[bytes, str]:
+    if stepper.failure:
+        return DiagnosticStatus.ERROR, f"stopped: {stepper.failure}"
+    told = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
+    if told:
+        return DiagnosticStatus.WARN, f"{' and '.join(told)} since the last message"
+    return DiagnosticStatus.OK, State(stepper.state).name

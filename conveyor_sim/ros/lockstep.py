@@ -1,0 +1,107 @@
+"""The lockstep protocol: one owner advances the simulation to absolute ticks, and may repeat a request safely.
+
+A request says everything (who, to which tick, with which commands), so the same request again can only mean that its
+answer was lost: it gets the stored answer. Anything else that does not lead on from the present tick is refused, with
+the reason. No rule looks at wall time.
+"""
+
+from __future__ import annotations
+
+import struct
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.commands import CommandOutcome
+
+
+class Refused(ConveyorError):
+    """What was asked can't be done now; the text is the reason."""
+
+
+@dataclass(frozen=True)
+class LockstepRequest:
+    """What a controller asks: as Lockstep.srv."""
+
+    run_id: str
+    target_tick: int
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    release: bool
+
+    def same_as(self, other: LockstepRequest | None) -> bool:
+        """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
+        return other is not None and self._key() == other._key()
+
+    def _key(self) -> tuple[object, ...]:
+        bits = struct.pack(f"<{len(self.values)}d", *self.values)
+        return self.run_id, self.target_tick, self.names, bits, self.release
+
+
+@dataclass(frozen=True)
+class LockstepAnswer:
+    """What the simulation was at the target tick."""
+
+    tick: int
+    stamp_ns: int
+    signals: npt.NDArray[np.float64]
+    state_hash: int
+    outcomes: tuple[CommandOutcome, ...]  # since the last answer
+
+
+class Lockstep:
+    """Who owns the simulation, and the answer to the last request that was accepted."""
+
+    def __init__(self, max_ticks: int) -> None:
+        """`max_ticks`: the longest advance that one request may ask for."""
+        self._max_ticks = max_ticks
+        self._owner = ""
+        self._last: LockstepRequest | None = None
+        self._answer: Future[LockstepAnswer] | None = None
+
+    @property
+    def owner(self) -> str:
+        """The run_id that owns the simulation, empty if none does."""
+        return self._owner
+
+    def repeated(self, request: LockstepRequest) -> Future[LockstepAnswer] | None:
+        """The answer, given or still to come, if this is the last accepted request once more."""
+        return self._answer if request.same_as(self._last) else None
+
+    def accept(self, request: LockstepRequest, tick: int, last_tick: int) -> Future[LockstepAnswer]:
+        """Take a new request at the present `tick` of a run that ends at `last_tick`; its answer is to be set later.
+
+        Raises Refused.
+        """
+        reason = self._refusal(request, tick, last_tick)
+        if reason:
+            raise Refused(reason)
+        self._owner = "" if request.release else request.run_id
+        self._last = request
+        self._answer = Future()
+        return self._answer
+
+    def clear(self) -> None:
+        """Forget the owner and its last request: the simulation was reset."""
+        self._owner, self._last, self._answer = "", None, None
+
+    def _refusal(self, request: LockstepRequest, tick: int, last_tick: int) -> str:
+        if not request.run_id:
+            return "run_id is empty; expected the caller's name for its run"
+        if self._owner and request.run_id != self._owner:
+            return f"the simulation is owned by run {self._owner!r}; expected its release, or a reset"
+        if self._answer is not None and not self._answer.done():
+            return f"the advance to tick {self._last.target_tick if self._last else tick} is still under way"
+        if request.target_tick <= tick:
+            return f"stale: target_tick {request.target_tick} given, expected more than the present tick {tick}"
+        if request.target_tick > last_tick:
+            return f"target_tick {request.target_tick} given, but the run ends at tick {last_tick}"
+        if request.target_tick - tick > self._max_ticks:
+            return (
+                f"target_tick {request.target_tick} is {request.target_tick - tick} ticks away, "
+                f"expected at most {self._max_ticks} (parameter lockstep_max_ticks)"
+            )
+        return ""

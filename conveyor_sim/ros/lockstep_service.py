@@ -1,0 +1,84 @@
+"""The service `lockstep`: conveyor_msgs/srv/Lockstep to the protocol of lockstep.py and back."""
+
+from __future__ import annotations
+
+import array
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from builtin_interfaces.msg import Time
+from conveyor_msgs.msg import CommandOutcome as OutcomeMessage
+from conveyor_msgs.srv import Lockstep
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import Executor
+from rclpy.node import Node
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest
+from conveyor_sim.ros.services import settled
+from conveyor_sim.ros.stepper import Stepper
+
+NS = 1_000_000_000
+
+
+class LockstepService:
+    """Serves one controller's scans."""
+
+    def __init__(self, node: Node, executor: Executor, stepper: Stepper, frame_id: str) -> None:
+        self._executor = executor
+        self._stepper = stepper
+        self._frame_id = frame_id
+        node.create_service(Lockstep, "lockstep", self._serve, callback_group=ReentrantCallbackGroup())
+
+    async def _serve(self, request: Any, response: Any) -> Any:
+        asked = LockstepRequest(
+            request.run_id, request.target_tick, tuple(request.names), tuple(request.values), request.release
+        )
+        try:
+            coming = await settled(self._executor, self._stepper.call(lambda: self._stepper.advance_lockstep(asked)))
+            answer = await settled(self._executor, coming)
+        except ConveyorError as error:
+            response.reason = str(error)
+            response.tick = self._stepper.session.simulation.tick
+            response.time = to_time(self._stepper.session.simulation.stamp_ns)
+            return response
+        self._fill(response, answer)
+        return response
+
+    def _fill(self, response: Any, answer: LockstepAnswer) -> None:
+        response.accepted = True
+        response.tick = answer.tick
+        response.time = to_time(answer.stamp_ns)
+        response.signals.header.stamp = response.time
+        response.signals.header.frame_id = self._frame_id
+        response.signals.tick = answer.tick
+        response.signals.values = _doubles(answer.signals)
+        response.state_hash = answer.state_hash
+        tick_ns = self._stepper.session.simulation.model.tick_ns
+        response.outcomes = [_outcome(outcome, tick_ns, self._frame_id) for outcome in answer.outcomes]
+
+
+def to_time(stamp_ns: int) -> Time:
+    """Nanoseconds as ROS writes them."""
+    sec, nanosec = divmod(stamp_ns, NS)
+    return Time(sec=sec, nanosec=nanosec)
+
+
+def _outcome(outcome: CommandOutcome, tick_ns: int, frame_id: str) -> OutcomeMessage:
+    message = OutcomeMessage()
+    message.header.stamp = to_time(max(1, outcome.tick * tick_ns))
+    message.header.frame_id = frame_id
+    message.tick = outcome.tick
+    message.source = outcome.source
+    message.names = list(outcome.names)
+    message.values = _doubles(np.asarray(outcome.values, dtype=np.float64))
+    message.accepted = outcome.accepted
+    message.reason = outcome.reason
+    return message
+
+
+def _doubles(values: npt.NDArray[np.float64]) -> array.array[float]:
+    """As rclpy takes them fastest."""
+    return array.array("d", values.tobytes())

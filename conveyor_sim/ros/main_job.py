@@ -1,0 +1,111 @@
+"""The main job (`make run`): the node and the PLC-like controller as two processes in lockstep, recorded and drawn."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from conveyor_sim.bag.recorder import new_run_folder
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.plot import plot_bag
+from conveyor_sim.progress import ProgressBar
+from conveyor_sim.resources import scene_path
+from conveyor_sim.ros.child import Child
+from conveyor_sim.ros.domain import private_domain
+from conveyor_sim.ros.observer import Observer
+from conveyor_sim.scene import load_scene
+from conveyor_sim.summary import render, summarize, write_summary
+
+LOOK = 0.05  # s of wall time between two looks at the processes
+PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent once a second
+
+
+def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -> float | None:
+    """Run node and controller to the end of `duration` (s; None: the scene's), recorded to `bag`.
+
+    Returns the wall time in s from the first tick to the last, if the node could tell it.
+    Raises ConveyorError if one of them ends before that. Either way nothing is left running.
+    """
+    file = scene_path(scene_name).resolve()
+    scene = load_scene(file, {"duration": duration} if duration is not None else None)
+    with ExitStack() as stack:
+        stack.enter_context(private_domain())
+        logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_")))
+        stack.callback(_keep_logs, logs, bag)
+        observer = stack.enter_context(Observer(scene.duration_ticks))
+        environment = {**os.environ, "ROS_LOG_DIR": str(logs / "ros"), "PYTHONUNBUFFERED": "1"}
+        node_parameters = {
+            "scene": file,
+            "duration": scene.duration,
+            "start_paused": True,
+            "real_time_factor": 0.0,
+            "record": bag.resolve(),
+        }
+        node = Child("sim_node", node_parameters, environment, logs)
+        stack.callback(node.stop)
+        plc = Child("plc_node", {}, environment, logs)
+        stack.callback(plc.stop)
+        while not observer.started and _both_run(node, plc):
+            observer.wait(LOOK)
+        with ProgressBar(scene.name, scene.duration) as progress:
+            while _both_run(node, plc):
+                observer.wait(LOOK)
+                progress.update(observer.time)
+        if plc.exit_code is None or node.exit_code is not None:
+            raise ConveyorError(node.obituary())
+        if plc.exit_code != 0:
+            raise ConveyorError(plc.obituary())
+        patience = time.monotonic() + PATIENCE
+        while observer.wall is None and time.monotonic() < patience:
+            observer.wait(LOOK)
+        node.stop()
+        if node.exit_code != 0:
+            raise ConveyorError(node.obituary())
+        return observer.wall
+
+
+def _both_run(node: Child, plc: Child) -> bool:
+    return node.exit_code is None and plc.exit_code is None
+
+
+def _keep_logs(logs: Path, bag: Path) -> None:
+    """Beside the recording, if there is one."""
+    if bag.is_dir():
+        (bag / "logs").mkdir(exist_ok=True)
+        for log in logs.glob("*.log"):
+            shutil.copy(log, bag / "logs")
+
+
+@click.command()
+@click.argument("scene", default="paper_plant")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
+@click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
+def main(scene: str, out: Path | None, duration: float | None) -> None:
+    """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
+    # Ended by a supervisor, it ends its processes as after Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    bag = out or new_run_folder()
+    try:
+        wall = run_in_lockstep(scene, bag, duration)
+        summary = summarize(bag, wall)
+        Console().print(render(summary), highlight=False)
+        click.echo(f"summary: {write_summary(summary, bag)}")
+        for picture in plot_bag(bag, bag / "pictures"):
+            click.echo(f"picture: {picture}")
+    except ConveyorError as error:
+        sys.exit(f"main job: {error}")
+    except KeyboardInterrupt:
+        sys.exit(f"interrupted; what was recorded is in {bag}")
+
+
+if __name__ == "__main__":
+    main()

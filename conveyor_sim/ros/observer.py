@@ -1,0 +1,62 @@
+"""Watches a simulation from another process: how far it is (/clock), and how long it took (/diagnostics)."""
+
+from __future__ import annotations
+
+import time
+from contextlib import AbstractContextManager
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
+
+from conveyor_sim.bag.qos import QOS
+from conveyor_sim.ros.diagnostics import TICK, WALL
+from conveyor_sim.ros.publishers import ros_qos
+
+START = 1e-6  # s, between the stamps of tick 0 and of any other
+
+
+class Observer(AbstractContextManager["Observer"]):
+    """A node in the ROS domain that the environment names, for as long as the context lasts."""
+
+    def __init__(self, last_tick: int) -> None:
+        """`last_tick`: at which the run ends."""
+        self.time = 0.0  # s, simulated
+        self.wall: float | None = None  # s from the first tick to the last one, once that has passed
+        self._last_tick = last_tick
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node("observer")
+        self._node.create_subscription(Clock, "/clock", self._on_clock, ros_qos(QOS["clock"]))
+        self._node.create_subscription(
+            DiagnosticArray, "/diagnostics", self._on_diagnostics, ros_qos(QOS["diagnostics"])
+        )
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+
+    @property
+    def started(self) -> bool:
+        """Whether the first tick has passed."""
+        return self.time > START
+
+    def wait(self, seconds: float) -> None:
+        """Let so much wall time pass, listening."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def _on_clock(self, message: Clock) -> None:
+        self.time = message.clock.sec + message.clock.nanosec * 1e-9
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {item.key: item.value for item in status.values}
+            if values.get(TICK) == str(self._last_tick):
+                self.wall = float(values[WALL])
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.shutdown()

@@ -1,0 +1,88 @@
+"""The node's side of the outputs: a Sink that publishes the bytes that are also recorded."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from conveyor_sim.bag.outputs import OUTPUTS
+from conveyor_sim.bag.qos import Qos
+from conveyor_sim.bag.typestore import type_hash
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.pacing import RateCap
+
+
+def ros_qos(qos: Qos) -> QoSProfile:
+    """rclpy's profile for one of ours."""
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+    )
+
+
+def message_class(name: str) -> Any:
+    """The class of a message type such as "std_msgs/msg/Float64"."""
+    package, kind, short_name = name.split("/")
+    return getattr(import_module(f"{package}.{kind}"), short_name)
+
+
+class RosSink:
+    """Publishes what a subscriber wants, thinned in wall time where `caps` says so.
+
+    Written to by the stepping thread; `published` may be read by any.
+    """
+
+    def __init__(self, node: Node, distro: str, caps: Mapping[str, RateCap]) -> None:
+        """Creates a publisher for each output.
+
+        Raises ConveyorError if ROS knows a message type by another definition than the one serialized here.
+        """
+        self.published: Counter[str] = Counter()
+        self._caps = caps
+        self._publishers: dict[str, Publisher] = {}
+        self._latched = {name for name, output in OUTPUTS.items() if output.qos.durability == "transient_local"}
+        for name, output in OUTPUTS.items():
+            publisher = node.create_publisher(message_class(output.type), name, ros_qos(output.qos))
+            check_type(node, publisher.topic_name, output.type, distro)
+            self._publishers[name] = publisher
+
+    def wants(self, topic: str) -> bool:
+        """Latched topics always: whoever subscribes later still gets them."""
+        if topic in self._latched:
+            return True
+        if not self._publishers[topic].get_subscription_count():
+            return False
+        cap = self._caps.get(topic)
+        return cap is None or cap.ready(time.monotonic())
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        """Publish one serialized message."""
+        if cap := self._caps.get(topic):
+            cap.sent(time.monotonic())
+        self._publishers[topic].publish(data)
+        self.published[topic] += 1
+
+
+def check_type(node: Node, topic: str, type_name: str, distro: str) -> None:
+    """Raises ConveyorError unless the type that `node` publishes on `topic` hashes as the definition used here.
+
+    Serialized bytes are published unchecked, so a message package built from other definitions would only show as
+    garbage at the subscribers.
+    """
+    ours = type_hash(type_name, distro)
+    for endpoint in node.get_publishers_info_by_topic(topic):
+        if endpoint.node_name != node.get_name() or endpoint.node_namespace != node.get_namespace():
+            continue
+        if str(endpoint.topic_type_hash) != ours:
+            raise ConveyorError(
+                f"{type_name}: the installed message package was built from another definition "
+                f"({endpoint.topic_type_hash}) than msg_defs ({ours}); rebuild it from msg_defs"
+            )

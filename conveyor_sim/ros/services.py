@@ -1,0 +1,161 @@
+"""Services with simulation_interfaces' names and meaning, plus pause and resume.
+
+Each is served with conveyor_msgs' own type, and beside it, under `simulation_interfaces/`, with the real type where
+that package is installed: a service's type must not depend on what is installed. The two kinds of types have the same
+fields, so one handler serves both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
+from importlib import import_module
+from types import ModuleType
+from typing import Any, TypeVar
+
+from conveyor_msgs import srv as own_srv
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.task import Future as RosFuture
+from std_srvs.srv import Trigger
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.lockstep import Refused
+from conveyor_sim.ros.stepper import State, Stepper
+from conveyor_sim.version import __version__
+
+T = TypeVar("T")
+
+# simulation_interfaces/msg/Result
+UNSUPPORTED, OK, INCORRECT_STATE, OPERATION_FAILED = 0, 1, 3, 4
+# simulation_interfaces/srv/SetSimulationState
+ALREADY_IN_TARGET_STATE, STATE_TRANSITION_ERROR = 101, 102
+# simulation_interfaces/msg/SimulatorFeatures: reset (of time, of state), state getting, setting and pausing, stepping
+FEATURES = (20, 21, 22, 24, 25, 26, 31, 32)
+# simulation_interfaces/srv/ResetSimulation
+SCOPE_DEFAULT, SCOPE_TIME, SCOPE_STATE = 0, 1, 2
+
+PREFIX = "simulation_interfaces/"
+
+
+async def settled(executor: Executor, future: Future[T]) -> T:
+    """Result of a future that another thread sets, awaited in a callback of `executor`."""
+    arrived = RosFuture(executor=executor)
+
+    def wake(_: Future[T]) -> None:
+        arrived.set_result(None)
+        executor.wake()  # it would sleep on otherwise: nothing else tells it that the callback can go on
+
+    future.add_done_callback(wake)
+    await arrived
+    return future.result()
+
+
+class Services:
+    """Answers requests by asking the stepper."""
+
+    def __init__(self, node: Node, executor: Executor, stepper: Stepper, quit_soon: Callable[[], None]) -> None:
+        """`quit_soon`: ends the node once the answer has been sent."""
+        self._executor = executor
+        self._stepper = stepper
+        self._quit_soon = quit_soon
+        # Reentrant: a service that waits for its ticks must not hold up the others.
+        group = ReentrantCallbackGroup()
+        real_srv = _real_types()
+        for name, handler in (
+            ("GetSimulatorFeatures", self._get_features),
+            ("GetSimulationState", self._get_state),
+            ("SetSimulationState", self._set_state),
+            ("StepSimulation", self._step),
+            ("ResetSimulation", self._reset),
+        ):
+            topic = _snake_case(name)
+            node.create_service(getattr(own_srv, name), topic, handler, callback_group=group)
+            if real_srv is not None:
+                node.create_service(getattr(real_srv, name), PREFIX + topic, handler, callback_group=group)
+        node.create_service(Trigger, "pause", self._pause, callback_group=group)
+        node.create_service(Trigger, "resume", self._resume, callback_group=group)
+
+    async def _ask(self, function: Callable[[], T]) -> T:
+        return await settled(self._executor, self._stepper.call(function))
+
+    def _get_features(self, _: Any, response: Any) -> Any:
+        # conveyor_msgs' response is flat; the real one keeps its fields in `features`.
+        features = response if isinstance(response, own_srv.GetSimulatorFeatures.Response) else response.features
+        features.features = FEATURES
+        features.custom_info = f"conveyor_sim {__version__}; also offers lockstep, see docs/ros.md"
+        return response
+
+    def _get_state(self, _: Any, response: Any) -> Any:
+        response.state.state = int(self._stepper.state)
+        response.result.result = OK
+        return response
+
+    async def _set_state(self, request: Any, response: Any) -> Any:
+        stepper, wanted = self._stepper, request.state.state
+        actions = {State.STOPPED: stepper.stop, State.PLAYING: stepper.play, State.PAUSED: stepper.pause}
+        if wanted == State.QUITTING:
+            stepper.state = State.QUITTING
+            self._quit_soon()
+            return _set(response, OK)
+        if wanted not in actions:
+            text = f"state: {wanted} given, expected STOPPED (0), PLAYING (1), PAUSED (2) or QUITTING (3)"
+            return _set(response, UNSUPPORTED, text)
+        if wanted == stepper.state:
+            return _set(response, ALREADY_IN_TARGET_STATE, f"the simulation is {State(wanted).name} already")
+        return await self._carry_out(response, self._ask(actions[State(wanted)]), STATE_TRANSITION_ERROR)
+
+    async def _step(self, request: Any, response: Any) -> Any:
+        async def step() -> None:
+            await settled(self._executor, await self._ask(lambda: self._stepper.step(request.steps)))
+
+        return await self._carry_out(response, step(), OPERATION_FAILED)
+
+    async def _reset(self, request: Any, response: Any) -> Any:
+        both = SCOPE_TIME | SCOPE_STATE
+        if request.scope != SCOPE_DEFAULT and request.scope & both != both:
+            text = f"scope: {request.scope} given, expected 0 or 255 (all): time and state are reset together"
+            return _set(response, UNSUPPORTED, text)
+        return await self._carry_out(response, self._ask(self._stepper.reset), OPERATION_FAILED)
+
+    async def _pause(self, _: Any, response: Any) -> Any:
+        return await self._trigger(response, self._stepper.pause)
+
+    async def _resume(self, _: Any, response: Any) -> Any:
+        return await self._trigger(response, self._stepper.play)
+
+    async def _trigger(self, response: Any, function: Callable[[], None]) -> Any:
+        try:
+            await self._ask(function)
+        except ConveyorError as error:
+            response.message = str(error)
+            return response
+        response.success = True
+        return response
+
+    async def _carry_out(self, response: Any, what: Awaitable[None], code: int) -> Any:
+        try:
+            await what
+        except Refused as error:
+            return _set(response, OPERATION_FAILED if code == OPERATION_FAILED else INCORRECT_STATE, str(error))
+        except ConveyorError as error:
+            return _set(response, code, str(error))
+        return _set(response, OK)
+
+
+def _set(response: Any, code: int, text: str = "") -> Any:
+    response.result.result = code
+    response.result.error_message = text
+    return response
+
+
+def _real_types() -> ModuleType | None:
+    try:
+        return import_module("simulation_interfaces.srv")
+    except ImportError:
+        return None
+
+
+def _snake_case(name: str) -> str:
+    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("_")

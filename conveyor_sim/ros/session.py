@@ -1,0 +1,57 @@
+"""One run of a scene, from tick 0 to its end: the simulation, what it publishes and what it records."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from pathlib import Path
+
+from conveyor_sim.bag.outputs import Outputs, Sink
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+
+class Session:
+    """A simulation with its sinks. Not for several threads: whoever steps it owns it."""
+
+    def __init__(self, scene: Scene, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
+        """Starts the run; `bag` is the folder to record to, if any.
+
+        Raises SceneError, and BagError if the folder can't be written.
+        """
+        self.run_id = uuid.uuid4().hex
+        self.bag = bag
+        self.wall = 0.0  # s of wall time from the start of the first tick to the end of the last one
+        self._first_tick_at: float | None = None
+        self.simulation = Simulation(scene)
+        self._recorder = Recorder(bag, distro=distro) if bag else None
+        sinks = [sink] if self._recorder is None else [self._recorder, sink]
+        self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
+        self.outputs.start()
+
+    @property
+    def last_tick(self) -> int:
+        """The tick at which the run ends."""
+        return self.simulation.scene.duration_ticks
+
+    def tick(self) -> list[CommandOutcome]:
+        """Advance by one tick and write what is due; what became of the commands. Raises SimulationError, BagError."""
+        if self._first_tick_at is None:
+            self._first_tick_at = time.monotonic()
+        self.simulation.advance(1)
+        outcomes = self.outputs.after_tick()
+        self.wall = time.monotonic() - self._first_tick_at
+        return outcomes
+
+    def flush(self) -> None:
+        """Hand what was recorded to the operating system. Raises BagError."""
+        if self._recorder is not None:
+            self._recorder.flush()
+
+    def close(self) -> None:
+        """End the recording; nothing more is recorded. Raises BagError if it can't be completed."""
+        if self._recorder is not None:
+            recorder, self._recorder = self._recorder, None
+            recorder.close()

@@ -1,0 +1,31 @@
+"""Executable `sim_node`: runs the node until Ctrl-C, SIGTERM, or a request to quit."""
+
+from __future__ import annotations
+
+import sys
+
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.node import SimNode
+from conveyor_sim.ros.stop_request import StopRequest
+
+
+def main() -> None:
+    """Exits with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
+    stop = StopRequest()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = SimNode(on_stop=stop.request)
+    except ConveyorError as error:
+        sys.exit(f"sim_node: {error}")
+    stop.wait()
+    node.close()
+    rclpy.shutdown()
+    if node.error is not None:
+        sys.exit(f"sim_node: {type(node.error).__name__}: {node.error}")
+
+
+if __name__ == "__main__":
+    main()

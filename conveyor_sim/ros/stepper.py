@@ -1,0 +1,342 @@
+"""The thread that steps the simulation. It alone touches the session; others ask it, and get a future.
+
+The simulated time may run as fast as it can without holding up the ROS executor: the kernels release the GIL, and
+nothing here waits for a callback.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol, TypeVar
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.ros.pacing import Pacer
+from conveyor_sim.ros.session import Session
+
+T = TypeVar("T")
+IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens
+REST = 1.0  # s of wall time without a tick after which the recording is flushed: no tick will do it
+
+
+class State(IntEnum):
+    """As simulation_interfaces/msg/SimulationState."""
+
+    STOPPED = 0
+    PLAYING = 1
+    PAUSED = 2
+    QUITTING = 3
+
+
+class Log(Protocol):
+    """Where the stepper tells what happened; a ROS logger or one of `logging`."""
+
+    def info(self, message: str) -> object: ...
+    def warning(self, message: str) -> object: ...
+    def error(self, message: str) -> object: ...
+
+
+@dataclass
+class _Advance:
+    """Ticks that were asked for by number; `paced` ones keep to the real-time factor."""
+
+    target: int
+    paced: bool
+    done: Callable[[], None]
+    failed: Callable[[Exception], None]
+
+
+class Stepper:
+    """Steps one session after another: while PLAYING, or up to a tick that step or lockstep asked for.
+
+    The methods under "from any thread" may be called from anywhere; the others only through `call`.
+    """
+
+    def __init__(
+        self,
+        open_session: Callable[[int], Session],
+        *,
+        real_time_factor: float,
+        playing: bool,
+        lockstep_max_ticks: int,
+        beat: Callable[[int, float], None],
+        died: Callable[[Exception], None],
+        log: Log,
+    ) -> None:
+        """`open_session`: opens the run with the given number of resets before it. `beat`: called after each tick and
+        while idle, with the simulated time in ns and the wall time in s. `died`: called if the thread can't go on.
+
+        Raises what `open_session` raises.
+        """
+        self._open_session = open_session
+        self._beat = beat
+        self._died = died
+        self._log = log
+        self.session = open_session(0)
+        self.resets = 0
+        self.state = State.PLAYING if playing else State.PAUSED
+        self.failure = ""  # why it can't go on before a reset
+        self.refused_commands = 0
+        self.lockstep = Lockstep(lockstep_max_ticks)
+        self.pacer = Pacer(real_time_factor, self.session.simulation.model.tick_ns * 1e-9)
+        self._outcomes: list[CommandOutcome] = []  # for the next lockstep answer
+        self._advance: _Advance | None = None
+        self._ended = False
+        self._last_tick_at: float | None = None  # s of wall time; None once the recording has been flushed since
+        self._calls: deque[Callable[[], None]] = deque()
+        self._wake = threading.Condition()
+        self._quit = False
+        self._thread = threading.Thread(target=self._run, name="stepper", daemon=True)
+
+    # From any thread
+
+    def start(self) -> None:
+        """Begin to step."""
+        self._thread.start()
+
+    def shutdown(self) -> None:
+        """Finish the tick under way, complete the recording, and return when both are done."""
+        with self._wake:
+            self._quit = True
+            self._wake.notify()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def call(self, function: Callable[[], T]) -> Future[T]:
+        """Have `function` called between two ticks; calls and commands are taken in the order of their arrival."""
+        future: Future[T] = Future()
+
+        def run() -> None:
+            try:
+                future.set_result(function())
+            except Exception as error:
+                future.set_exception(error)
+
+        self._enqueue(run)
+        return future
+
+    def command(self, names: tuple[str, ...], values: tuple[float, ...], source: str) -> None:
+        """Hand a command to the simulation, which applies or refuses it at the start of the next tick."""
+
+        def hand_over() -> None:
+            if self.failure or self._ended:  # there is no next tick, so there would be no outcome
+                self._refused(source, f"since {self._standstill()}; expected a reset")
+            else:
+                self.session.simulation.command(names, values, source)
+
+        self._enqueue(hand_over)
+
+    def set_real_time_factor(self, factor: float) -> None:
+        """From the next tick on."""
+        self.call(lambda: setattr(self.pacer, "factor", factor))
+
+    def _enqueue(self, function: Callable[[], None]) -> None:
+        with self._wake:
+            self._calls.append(function)
+            self._wake.notify()
+
+    # In the stepping thread, through `call`
+
+    def play(self) -> None:
+        """Run free. Raises Refused."""
+        if self.state is not State.PLAYING:
+            self._require_free()
+            self.pacer.restart()
+            self.state = State.PLAYING
+
+    def pause(self) -> None:
+        """Stop running free; the time stands still."""
+        self.state = State.PAUSED
+
+    def stop(self) -> None:
+        """Reset, and be STOPPED. Raises ConveyorError if the new run can't be opened."""
+        self.reset()
+        self.state = State.STOPPED
+
+    def reset(self) -> None:
+        """Close this run and its recording and open the next at tick 0; a run that was playing goes on playing.
+
+        Raises ConveyorError if the next run can't be opened; there is none to step then, until a reset succeeds.
+        """
+        self._abandon("the simulation was reset")
+        self.lockstep.clear()
+        self._outcomes.clear()
+        self._close_recording()
+        self.resets += 1
+        try:
+            self.session = self._open_session(self.resets)
+        except ConveyorError as error:
+            self._fail(error)
+            raise
+        self.failure, self._ended = "", False
+        self.pacer.restart()
+        self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
+
+    def step(self, ticks: int) -> Future[None]:
+        """Advance by `ticks` at full speed. Raises Refused."""
+        self._require_paused()
+        self._require_free()
+        tick, last = self.session.simulation.tick, self.session.last_tick
+        if ticks < 1:
+            raise Refused("steps: 0 given, expected at least 1")
+        if tick + ticks > last:
+            raise Refused(f"steps: {ticks} given, but the run ends in {last - tick} ticks, at tick {last}")
+        future: Future[None] = Future()
+        self._advance = _Advance(
+            tick + ticks, paced=False, done=lambda: future.set_result(None), failed=future.set_exception
+        )
+        return future
+
+    def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
+        """Advance as a controller asks; a repeated request gets the same answer. Raises Refused."""
+        repeated = self.lockstep.repeated(request)
+        if repeated is not None:
+            return repeated
+        self._require_paused()
+        self._require_able()
+        if self._advance is not None and not self.lockstep.owner:
+            raise Refused(f"an advance to tick {self._advance.target} is still under way")
+        simulation = self.session.simulation
+        answer = self.lockstep.accept(request, simulation.tick, self.session.last_tick)
+        if request.names or request.values:
+            simulation.command(request.names, request.values, "lockstep")
+        self.pacer.catch_breath(time.monotonic())
+
+        def done() -> None:
+            outcomes, self._outcomes = tuple(self._outcomes), []
+            answer.set_result(
+                LockstepAnswer(
+                    simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes
+                )
+            )
+
+        self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
+        return answer
+
+    def _require_paused(self) -> None:
+        if self.state is not State.PAUSED:
+            raise Refused(f"the simulation is {self.state.name}, expected PAUSED")
+
+    def _require_able(self) -> None:
+        if self.failure or self._ended:
+            raise Refused(f"{self._standstill()}; expected a reset")
+
+    def _standstill(self) -> str:
+        if self.failure:
+            return f"the simulation has stopped: {self.failure}"
+        return f"the run has ended at tick {self.session.last_tick}"
+
+    def _require_free(self) -> None:
+        self._require_able()
+        if self._advance is not None:
+            raise Refused(f"an advance to tick {self._advance.target} is still under way")
+        if self.lockstep.owner:
+            raise Refused(f"run {self.lockstep.owner!r} owns the simulation; expected its release, or a reset")
+
+    # The loop
+
+    def _run(self) -> None:
+        try:
+            self._loop()
+        except Exception as error:
+            self._died(error)
+        finally:
+            self._abandon("the simulation is shutting down")
+            self._close_recording()
+
+    def _loop(self) -> None:
+        while not self._quit:
+            while self._calls:
+                self._calls.popleft()()
+            now = time.monotonic()
+            wait = self._seconds_to_tick(now)
+            if wait == 0.0:
+                self._tick()
+            else:
+                self._rest(now)
+                with self._wake:
+                    if not self._calls and not self._quit:
+                        self._wake.wait(wait)
+
+    def _rest(self, now: float) -> None:
+        self._beat(self.session.simulation.stamp_ns, now)
+        if self._last_tick_at is not None and now > self._last_tick_at + REST:
+            self._last_tick_at = None
+            try:
+                self.session.flush()
+            except ConveyorError as error:
+                self._fail(error)
+
+    def _seconds_to_tick(self, now: float) -> float:
+        if self._advance is None and self.state is not State.PLAYING:
+            return IDLE
+        if self._advance is not None and not self._advance.paced:
+            return 0.0
+        return min(self.pacer.wait(now), IDLE)
+
+    def _tick(self) -> None:
+        try:
+            outcomes = self.session.tick()
+        except Exception as error:
+            self._fail(error)
+            return
+        self._note(outcomes)
+        now = self._last_tick_at = time.monotonic()
+        if self._advance is None or self._advance.paced:
+            self.pacer.ticked(now)
+        simulation = self.session.simulation
+        self._beat(simulation.stamp_ns, now)
+        if simulation.tick >= self.session.last_tick:
+            self._end()
+        if self._advance is not None and simulation.tick >= self._advance.target:
+            advance, self._advance = self._advance, None
+            advance.done()
+
+    def _note(self, outcomes: list[CommandOutcome]) -> None:
+        for outcome in outcomes:
+            if not outcome.accepted:
+                self._refused(outcome.source, f"at tick {outcome.tick}: {outcome.reason}")
+        if self._advance is not None or self.lockstep.owner:
+            self._outcomes += outcomes
+
+    def _refused(self, source: str, reason: str) -> None:
+        self.refused_commands += 1
+        self._log.warning(f"{source} refused {reason}")
+
+    def _end(self) -> None:
+        self.state, self._ended = State.PAUSED, True
+        self._close_recording()
+        self._log.info(f"end of the run at {self.session.simulation.time:g} s" + _to_bag(self.session))
+
+    def _fail(self, error: Exception) -> None:
+        """What is known stays published; only a reset leads on."""
+        known = isinstance(error, ConveyorError)
+        self.failure = str(error) if known else f"{type(error).__name__}: {error}"
+        self.state = State.PAUSED
+        self._log.error(f"stopped: {self.failure}" if known else traceback.format_exc())
+        self._abandon(f"the simulation has stopped: {self.failure}")
+        self._close_recording()
+
+    def _abandon(self, reason: str) -> None:
+        if self._advance is not None:
+            advance, self._advance = self._advance, None
+            advance.failed(Refused(reason))
+
+    def _close_recording(self) -> None:
+        try:
+            self.session.close()
+        except ConveyorError as error:
+            self.failure = str(error)
+            self._log.error(f"the recording may be incomplete: {error}")
+
+
+def _to_bag(session: Session) -> str:
+    return f", recorded to {session.bag}" if session.bag else ""

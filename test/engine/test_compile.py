@@ -1,0 +1,97 @@
+"""Compiled kernels: kept on disk, and never served to sources that have changed."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import conveyor_sim
+
+FORCE = """
+from conveyor_sim.engine.contact import contact_force
+print(contact_force(0.002, 1.0, 0.0, 1.0, 5000.0, 0.3, None, None, 0.01)[1])
+stats = contact_force.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+RUN = """
+import importlib, pkgutil
+from numba.core.dispatcher import Dispatcher
+import conveyor_sim.engine
+from conveyor_sim.scene import parse_scene
+from conveyor_sim.simulation import Simulation
+sim = Simulation(parse_scene('''
+name: one
+duration: 1.0
+floor: none
+bottle_types: {bottle: {radius: 0.065, mass: 0.2, material: glass}}
+bottles: [{type: bottle, position: [0, 0], velocity: [1, 0]}]
+'''))
+sim.advance(2)
+sim.contacts()
+names = [module.name for module in pkgutil.walk_packages(conveyor_sim.engine.__path__, "conveyor_sim.engine.")]
+found = [value for name in names for value in vars(importlib.import_module(name)).values()]
+kernels = {id(value): value for value in found if isinstance(value, Dispatcher)}
+print(sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels.values()))
+print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels.values()))
+"""
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    """A folder with a copy of the package, to edit."""
+    source = Path(conveyor_sim.__file__).parent
+    shutil.copytree(source, tmp_path / "conveyor_sim", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def python(folder: Path, code: str, **variables: str) -> list[str]:
+    """Output of a new interpreter that imports from a folder, with its cache there unless said otherwise."""
+    kept = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
+    environment = {**kept, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache"), **variables}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
+    """The cache of `contact.py` would hold, by numba's own rule, when only `friction.py` changes."""
+    assert python(copied, FORCE) == ["-3.0", "0", "1"]
+    assert python(copied, FORCE) == ["-3.0", "1", "0"]
+    friction = copied / "conveyor_sim" / "engine" / "friction.py"
+    text = friction.read_text()
+    friction.write_text(text.replace("return 1.0 / slip", "return 2.0 / slip"))
+    assert python(copied, FORCE) == ["-6.0", "0", "1"]
+    friction.write_text(text)
+    assert python(copied, FORCE) == ["-3.0", "1", "0"]
+    assert len(list((copied / "cache" / "conveyor_sim").iterdir())) == 2
+
+
+def test_a_second_process_compiles_nothing(copied: Path) -> None:
+    first, second = python(copied, RUN), python(copied, RUN)
+    assert int(first[1]) > 0
+    assert int(second[0]) >= 3
+    assert int(second[1]) == 0
+
+
+def test_where_the_cache_is(copied: Path) -> None:
+    """NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else the home's cache; a temporary folder if that can't be written."""
+    code = "from conveyor_sim.engine.compile import CACHE_DIR, ENGINE_HASH; print(CACHE_DIR.parent, ENGINE_HASH)"
+    numba, digest = python(copied, code)
+    assert numba == str(copied / "cache" / "conveyor_sim")
+    assert len(digest) == 16
+    xdg = python(copied, code, NUMBA_CACHE_DIR="", XDG_CACHE_HOME=str(copied / "xdg"))
+    assert xdg == [str(copied / "xdg" / "conveyor_sim"), digest]
+    home = python(copied, code, NUMBA_CACHE_DIR="", HOME=str(copied))
+    assert home == [str(copied / ".cache" / "conveyor_sim"), digest]
+    file = copied / "file"
+    file.write_text("")
+    temporary = copied / "temporary"
+    temporary.mkdir()
+    fallback = python(copied, code, NUMBA_CACHE_DIR=str(file / "cache"), TMPDIR=str(temporary))
+    assert fallback[0].startswith(str(temporary / "conveyor_sim-"))
+    assert fallback[1] == digest

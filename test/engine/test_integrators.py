@@ -1,0 +1,98 @@
+"""Integrators, one step and many, on forces whose motion is known."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes import MASS, RADIUS, bottle, contact, order, scene
+from worlds import FAR, state_of
+
+from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.state import State
+
+K, C = 5000.0, 8.0
+DEPTH = 0.01
+
+
+def squeezed(integrator: str, speed: float = 0.0) -> State:
+    """Two bottles pressed into each other, with the paper's damping; they spin alike, so their rims slip."""
+    fields = {"contacts": [contact(K, damping=("paper", C))], "floor": "none", "lever_arm": "radius"}
+    given = scene(step={"integrator": integrator}, bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)], **fields)
+    apart = 2.0 * RADIUS - DEPTH
+    return state_of(given, [(0.0, 0.0), (apart, 0.0)], [(speed / 2, 0.0), (-speed / 2, 0.0)], [3.0, 3.0])
+
+
+def closed_form(t: float) -> tuple[float, float]:
+    """Overlap and its rate after t, in contact all along: m_r x'' = -k x - c x' from x = DEPTH, x' = 0."""
+    m_r = MASS / 2.0
+    w, zeta = math.sqrt(K / m_r), C / (2.0 * math.sqrt(K * m_r))
+    wd = w * math.sqrt(1.0 - zeta**2)
+    decay, angle = math.exp(-zeta * w * t), wd * t
+    x = DEPTH * decay * (math.cos(angle) + zeta * w / wd * math.sin(angle))
+    return x, -DEPTH * decay * w**2 / wd * math.sin(angle)
+
+
+@pytest.mark.parametrize(("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0)])
+def test_order_within_a_lasting_damped_contact(integrator: str, expected: float) -> None:
+    """No jump: velocity Verlet is second order in velocity-dependent forces too, semi-implicit Euler first."""
+    end = 0.2 * math.pi * math.sqrt(MASS / 2.0 / K)
+    numbers = [16, 32, 64, 128]
+    errors = []
+    for n in numbers:
+        state = squeezed(integrator)
+        state.world.spin.omega[:] = 0.0
+        INTEGRATORS[integrator](state.world, n, end / n, START)
+        bottles = state.world.bottles
+        x, rate = closed_form(end)
+        overlap = 2.0 * RADIUS - (bottles.x[1] - bottles.x[0])
+        errors.append(math.hypot((overlap - x) / DEPTH, (bottles.vx[0] - bottles.vx[1] - rate) / rate))
+    assert order(numbers, errors) == pytest.approx(expected, abs=0.1)
+
+
+@pytest.mark.parametrize("integrator", list(INTEGRATORS))
+def test_one_step_in_free_flight(integrator: str) -> None:
+    """r += v dt, theta += omega dt, exactly; free slots stay where they are."""
+    state = squeezed(integrator)
+    bottles, spin = state.world.bottles, state.world.spin
+    bottles.x[1], bottles.vx[1], bottles.vy[1] = 5.0, 0.25, -0.5
+    state.world.neighbourhood.stale[0] = 1
+    state.make_lists()
+    assert INTEGRATORS[integrator](state.world, 1, 0.5, START) == 1
+    assert (bottles.x[1], bottles.y[1]) == (5.125, -0.25)
+    assert spin.theta[1] == 1.5
+    assert not bottles.x[2:].any()
+
+
+@pytest.mark.parametrize("integrator", list(INTEGRATORS))
+def test_resuming_within_a_tick_leaves_no_trace(integrator: str) -> None:
+    """A stale list interrupts after any step; going on with RESUME gives the bits of an uninterrupted run."""
+    whole, parts = squeezed(integrator, 1.0), squeezed(integrator, 1.0)
+    steps, dt = 40, 1e-4
+    assert INTEGRATORS[integrator](whole.world, steps, dt, START) == steps
+    done, phase, calls = 0, START, 0
+    while done < steps:
+        parts.world.neighbourhood.stale[0] = 1
+        done += INTEGRATORS[integrator](parts.world, steps - done, dt, phase)
+        parts.make_lists()
+        phase = RESUME
+        calls += 1
+        if calls > steps:
+            break
+    assert calls > 10
+    for column in ("x", "y", "vx", "vy"):
+        np.testing.assert_array_equal(getattr(parts.world.bottles, column), getattr(whole.world.bottles, column))
+    np.testing.assert_array_equal(parts.world.spin.omega, whole.world.spin.omega)
+    np.testing.assert_array_equal(parts.world.peaks.impulse, whole.world.peaks.impulse)
+
+
+@pytest.mark.parametrize("integrator", list(INTEGRATORS))
+def test_a_bottle_at_rest_comes_to_rest(integrator: str) -> None:
+    """Speeds that decay for ever end at zero rather than at denormal numbers."""
+    state = squeezed(integrator)
+    bottles = state.world.bottles
+    bottles.x[1] = 5.0
+    bottles.vx[1] = 1e-101
+    state.world.neighbourhood.stale[0] = 1
+    state.make_lists()
+    INTEGRATORS[integrator](state.world, 1, 1e-3, START)
+    assert bottles.vx[1] == 0.0

@@ -1,0 +1,240 @@
+"""Rails: nearest point of the piece, end points included; pieces that join push once; no ghost past an end."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scenes import RADIUS, arc, polyline, segment
+from worlds import (
+    STIFFNESS,
+    nearest_of,
+    nearest_on_arc,
+    nearest_on_segment,
+    push,
+    rail_forces,
+)
+
+RANDOM = np.random.default_rng(20240229)
+ROUNDING = 1e-9
+"""N: of forces of up to 65 N whose overlap is a difference of coordinates of some metres."""
+
+
+def around(low: tuple[float, float], high: tuple[float, float], count: int = 3000) -> np.ndarray:
+    """Points all over a box."""
+    return RANDOM.uniform(low, high, (count, 2))
+
+
+def test_a_segment_pushes_from_its_nearest_point() -> None:
+    start, end = (-0.3, 0.1), (0.4, 0.35)
+    points = around((-0.5, -0.1), (0.6, 0.6))
+    expected = push(nearest_on_segment(start, end, points), points)
+    np.testing.assert_allclose(rail_forces({"rail": segment(start, end)}, points), expected, atol=ROUNDING)
+
+
+def test_there_is_no_ghost_past_an_end() -> None:
+    """On the infinite line through a segment, beyond its end by more than R: the paper's distance would push."""
+    beyond = np.array([[1.0 + RADIUS + 1e-12, 0.0], [1.2, 0.01], [-RADIUS - 1e-12, 1e-9], [1.0 + RADIUS, 0.03]])
+    assert not rail_forces({"rail": segment((0.0, 0.0), (1.0, 0.0))}, beyond).any()
+    around_arc = np.array([[0.5 * math.cos(a), 0.5 * math.sin(a)] for a in (-0.14, 1.14, 3.0)])
+    assert not rail_forces({"rail": arc((0.0, 0.0), 0.5, 0.0, 1.0)}, around_arc).any()
+
+
+@pytest.mark.parametrize("start", [-3.0, 0.7, 2.9])
+@pytest.mark.parametrize("span", [0.4, math.pi, 4.0, 2.0 * math.pi - 0.3, 2.0 * math.pi])
+@pytest.mark.parametrize("radius", [0.05, 0.5])
+def test_an_arc_pushes_from_its_nearest_point(start: float, span: float, radius: float) -> None:
+    """From inside and outside, spans across +-pi, over half a turn and full; tighter than the bottle, too."""
+    centre = (0.2, -0.1)
+    reach = radius + 1.5 * RADIUS
+    points = around((centre[0] - reach, centre[1] - reach), (centre[0] + reach, centre[1] + reach))
+    expected = push(nearest_on_arc(centre, radius, start, span, points), points)
+    forces = rail_forces({"rail": arc(centre, radius, start, span)}, points)
+    np.testing.assert_allclose(forces, expected, atol=ROUNDING)
+
+
+def test_collinear_pieces_push_as_one_segment() -> None:
+    """However a straight rail is cut up, and whichever way its pieces are listed."""
+    start, end = np.array([-0.4, -0.2]), np.array([0.5, 0.3])
+    points = around((-0.6, -0.4), (0.7, 0.5))
+    whole = rail_forces({"rail": segment(tuple(start), tuple(end))}, points)
+    shares = np.sort(RANDOM.uniform(0.0, 1.0, 30))
+    corners = start + np.concatenate([[0.0], shares, [1.0]])[:, None] * (end - start)
+    np.testing.assert_allclose(rail_forces({"rail": polyline(corners)}, points), whole, atol=ROUNDING)
+    order = RANDOM.permutation(len(corners) - 1)
+    loose = {
+        f"r{n}": segment(*(tuple(corners[i + side]) for side in ((0, 1) if n % 2 else (1, 0))))
+        for n, i in enumerate(order)
+    }
+    np.testing.assert_allclose(rail_forces(loose, points), whole, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("turn", [0.02, 0.5, math.pi / 2, 2.5])
+def test_a_convex_corner_pushes_once(turn: float) -> None:
+    """Outside of a corner the force is that of the nearest point of both pieces, through the fan at the corner too."""
+    first, corner, last = (-1.0, 0.0), (0.0, 0.0), (math.cos(turn), -math.sin(turn))
+    points = around((-0.3, -0.3), (0.3, 0.3))
+    # Above both lines, or between their normals at the corner.
+    outside = (points[:, 1] > 0.0) & (points @ [math.sin(turn), math.cos(turn)] > 0.0)
+    points = points[outside]
+    both = [nearest_on_segment(first, corner, points), nearest_on_segment(corner, last, points)]
+    expected = push(nearest_of(both, points), points)
+    np.testing.assert_allclose(rail_forces({"r": polyline([first, corner, last])}, points), expected, atol=ROUNDING)
+    two_rails = {"a": segment(corner, first), "b": segment(corner, last)}
+    np.testing.assert_allclose(rail_forces(two_rails, points), expected, atol=ROUNDING)
+
+
+def test_a_concave_right_angle_is_two_walls() -> None:
+    points = around((0.01, 0.01), (0.3, 0.3))
+    walls = [nearest_on_segment((0, 0), (1, 0), points), nearest_on_segment((0, 0), (0, 1), points)]
+    expected = sum(push(wall, points) for wall in walls)
+    forces = rail_forces({"corner": polyline([(1, 0), (0, 0), (0, 1)])}, points)
+    np.testing.assert_allclose(forces, expected, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("inside", [0.2, 0.5, 1.0, 1.5])
+def test_an_acute_wedge_is_two_walls(inside: float) -> None:
+    """Between walls at an angle of less than 90 degrees each pushes as if alone."""
+    wall_a, wall_b = (1.0, 0.0), (math.cos(inside), math.sin(inside))
+    along = RANDOM.uniform(0.05, 0.9, 2000)
+    within = RANDOM.uniform(0.05, 0.95, 2000) * inside
+    points = np.column_stack([along * np.cos(within), along * np.sin(within)])
+    # Both nearest points on the pieces, none at the tip.
+    expected = sum(push(nearest_on_segment((0, 0), wall, points), points) for wall in (wall_a, wall_b))
+    forces = rail_forces({"wedge": polyline([wall_a, (0, 0), wall_b])}, points)
+    np.testing.assert_allclose(forces, expected, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("turn", [1e-6, 1e-3, 0.03, 0.2, 1.0, 1.5])
+def test_a_shallow_concave_corner_neither_jumps_nor_pushes_twice(turn: float) -> None:
+    """Sliding 5 mm deep along one wall, then along the other, which rises by `turn`: (x, h), then its mirror image.
+
+    The push grows from k delta to that of the shortest way out in the corner, k delta / cos(turn / 2), and no faster
+    than k per metre of the way. Rounding of the cosine between the walls is divided by its distance from 1.
+    """
+    rounding = 1e-9 + 4e-16 / turn**2
+    depth, count = 0.005, 4000
+    height = RADIUS - depth
+    before = np.column_stack([np.linspace(-0.2, -height * math.tan(turn / 2.0), count), np.full(count, height)])
+    turned = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    path = np.concatenate([before, (before * [-1.0, 1.0])[::-1] @ turned])
+    forces = rail_forces({"r": polyline([(-1, 0), (0, 0), (math.cos(turn), math.sin(turn))])}, path)
+    size = np.hypot(*forces.T)
+    np.testing.assert_allclose(size.min(), STIFFNESS * depth, rtol=1e-9)
+    np.testing.assert_allclose(size.max(), STIFFNESS * depth / math.cos(turn / 2.0), rtol=rounding)
+    changed, moved = np.hypot(*np.diff(forces, axis=0).T), np.hypot(*np.diff(path, axis=0).T)
+    assert np.all(changed <= STIFFNESS * (moved + depth * rounding))
+
+
+def shortest_way_out(normals: np.ndarray, overlaps: np.ndarray) -> np.ndarray:
+    """The shortest d with n . d >= overlap for all: over all pairs of active walls, by trial."""
+    best = None
+    count = len(overlaps)
+    for a in range(count):
+        for b in range(a, count):
+            d = overlaps[a] * normals[a] if a == b else np.linalg.solve(normals[[a, b]], overlaps[[a, b]])
+            if np.all(normals @ d >= overlaps - 1e-12) and (best is None or d @ d < best @ best):
+                best = d
+    assert best is not None
+    return best
+
+
+@pytest.mark.parametrize("turns", [(0.5, 0.5), (0.2, 0.9), (0.05, 0.02), (0.4, 0.3, 0.5)])
+def test_several_pieces_at_once_push_by_the_shortest_way_out(turns: tuple[float, ...]) -> None:
+    """A concave chain of short pieces, so short that a bottle touches up to four of them."""
+    heading = -sum(turns) / 2.0 + np.concatenate([[0.0], np.cumsum(turns)])
+    pieces = np.column_stack([np.cos(heading), np.sin(heading)]) * 0.02
+    pieces[[0, -1]] *= 20.0
+    corners = np.concatenate([[[0.0, 0.0]], np.cumsum(pieces, axis=0)])
+    corners -= corners[1:-1].mean(axis=0)
+    points = around((-0.05, RADIUS - 0.03), (0.05, RADIUS + 0.01), 1000)
+    forces = rail_forces({"r": polyline(corners)}, points)
+    most = 0
+    for point, force in zip(points, forces, strict=True):
+        touching, depth = [], []
+        for start, end in pairwise(corners):
+            along = (end - start) / np.hypot(*(end - start))
+            normal = np.array([-along[1], along[0]])
+            overlap = RADIUS - (point - start) @ normal
+            if 0.0 < (point - start) @ along < np.hypot(*(end - start)) and overlap > 0.0:
+                touching.append(normal)
+                depth.append(overlap)
+        most = max(most, len(depth))
+        expected = shortest_way_out(np.array(touching), np.array(depth)) if touching else np.zeros(2)
+        # Projected Gauss-Seidel is cut off after 64 sweeps.
+        np.testing.assert_allclose(force / STIFFNESS, expected, atol=1e-6 if len(depth) > 2 else 1e-9)
+    assert most >= 2
+
+
+def test_an_arc_and_a_segment_that_join_smoothly_push_as_one() -> None:
+    """A stadium's half: straight, half circle, straight; from inside and outside the nearest point of all pushes."""
+    rails = {
+        "top": segment((-1.0, 0.3), (0.0, 0.3)),
+        "bend": arc((0.0, 0.0), 0.3, -math.pi / 2, math.pi),
+        "bottom": segment((0.0, -0.3), (-1.0, -0.3)),
+    }
+    points = around((-0.3, -0.5), (0.5, 0.5))
+    expected = push(
+        nearest_of(
+            [
+                nearest_on_segment((-1.0, 0.3), (0.0, 0.3), points),
+                nearest_on_arc((0.0, 0.0), 0.3, -math.pi / 2, math.pi, points),
+                nearest_on_segment((0.0, -0.3), (-1.0, -0.3), points),
+            ],
+            points,
+        ),
+        points,
+    )
+    np.testing.assert_allclose(rail_forces(rails, points), expected, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("arms", [3, 5])
+def test_pieces_that_meet_at_a_point_push_once_from_it(arms: int) -> None:
+    """A star: where the nearest point of the star is its middle or one arm alone, the push is that of one contact."""
+    angles = 0.3 + np.array([0.0, 0.5, 1.0, 1.4, 1.7])[:arms]
+    tips = np.column_stack([np.cos(angles), np.sin(angles)])
+    points = around((-0.2, -0.2), (0.2, 0.2))
+    # Behind all arms.
+    behind = points[np.all(points @ tips.T < 0.0, axis=1)]
+    forces = rail_forces({f"arm{i}": segment((0, 0), tuple(tip)) for i, tip in enumerate(tips)}, behind)
+    np.testing.assert_allclose(forces, push(np.zeros((len(behind), 2)), behind), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("stem", [(0.0, -1.0), (0.4, -1.0)])
+def test_a_rail_is_smooth_opposite_a_t_junction(stem: tuple[float, float]) -> None:
+    """A stem that ends on a rail from below is not felt from above (at overlaps of less than half the radius)."""
+    rails = {"through": segment((-1.0, 0.0), (1.0, 0.0)), "stem": segment((0.0, 0.0), stem)}
+    points = around((-0.2, 0.51 * RADIUS), (0.2, 0.1))
+    expected = push(nearest_on_segment((-1, 0), (1, 0), points), points)
+    np.testing.assert_allclose(rail_forces(rails, points), expected, atol=ROUNDING)
+
+
+def test_a_stem_is_a_wall_at_a_t_junction() -> None:
+    """From the stem's side both push, as in a corner."""
+    rails = {"through": segment((-1.0, 0.0), (1.0, 0.0)), "stem": segment((0.0, 0.0), (0.0, -1.0))}
+    points = around((0.005, -0.1), (0.1, -0.005))
+    walls = [nearest_on_segment((-1, 0), (1, 0), points), nearest_on_segment((0, 0), (0, -1), points)]
+    expected = sum(push(wall, points) for wall in walls)
+    np.testing.assert_allclose(rail_forces(rails, points), expected, atol=ROUNDING)
+
+
+def test_a_stem_that_ends_on_an_arc_is_not_felt_from_the_other_side() -> None:
+    rails = {"bend": arc((0.0, 0.0), 0.5, 0.0, math.pi), "stem": segment((0.0, 0.5), (0.1, 1.0))}
+    points = around((-0.2, 0.35), (0.2, 0.5))
+    points = points[np.hypot(*points.T) < 0.5 - 0.55 * RADIUS]
+    expected = push(nearest_on_arc((0, 0), 0.5, 0.0, math.pi, points), points)
+    np.testing.assert_allclose(rail_forces(rails, points), expected, atol=ROUNDING)
+
+
+def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
+    """Anywhere on it: on the piece, a joint, a free end; on an arc, its ends, its centre: finite, and k R at most."""
+    rails = {
+        "line": polyline([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 1.0)]),
+        "bend": arc((5.0, 0.0), 0.05, 0.0, 1.5 * math.pi),
+    }
+    on_line = [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (2.0, 0.0), (2.5, 0.5), (3.0, 1.0)]
+    on_bend = [(5.05, 0.0), (5.0, 0.05), (5.0 + 0.05 * math.cos(1.5 * math.pi), 0.05 * math.sin(1.5 * math.pi))]
+    size = np.hypot(*rail_forces(rails, on_line + on_bend + [(5.0, 0.0)]).T)
+    assert np.all(np.isfinite(size))
+    np.testing.assert_allclose(size[:-1], STIFFNESS * RADIUS, rtol=1e-6)
+    assert 0.0 < size[-1] <= STIFFNESS * RADIUS

@@ -1,0 +1,114 @@
+"""Commands: applied together at the next tick, or refused together with the reason."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes import base, belt, bottle, simulation
+
+from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.process_image import process_image
+from conveyor_sim.simulation import Simulation
+
+IMAGE = process_image([("one", -1.0, 1.0), ("two", 0.0, 2.0)], ["feed"], ["out"])
+
+
+UNKNOWN = "no such command, expected one of belts/one/cmd_speed, belts/two/cmd_speed"
+
+
+def two_belts() -> Simulation:
+    return simulation(
+        tick=0.01,
+        step={"per_tick": 10},
+        base=base(0.4),
+        belts={
+            "one": belt(0.2, (0.0, 0.0), 1.0, 1.0, speed_limits=[-1.0, 1.0]),
+            "two": belt(0.3, (2.0, 0.0), 1.0, 1.0, speed_limits=[0.0, 2.0]),
+        },
+        bottles=[bottle(0.5, 0.5)],
+    )
+
+
+def test_the_tables_of_the_process_image() -> None:
+    assert IMAGE.command_names == ("belts/one/cmd_speed", "belts/two/cmd_speed")
+    assert (IMAGE.command_min, IMAGE.command_max) == ((-1.0, 0.0), (1.0, 2.0))
+    assert IMAGE.command_units == ("m/s", "m/s")
+    assert IMAGE.signal_names == (
+        "belts/one/speed", "belts/two/speed", "belts/one/bottles", "belts/two/bottles", "infeeds/feed/fed",
+        "infeeds/feed/blocked", "outfeeds/out/removed",
+    )  # fmt: skip
+    assert len(IMAGE.signal_units) == len(IMAGE.signal_names)
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "reason"),
+    [
+        (["belts/three/cmd_speed"], [0.1], f"belts/three/cmd_speed: {UNKNOWN}"),
+        (["belts/one/speed"], [0.1], f"belts/one/speed: {UNKNOWN}"),
+        (["belts/one/cmd_speed"], [math.nan], "belts/one/cmd_speed: nan given, expected -1 to 1 m/s"),
+        (["belts/one/cmd_speed"], [math.inf], "belts/one/cmd_speed: inf given, expected -1 to 1 m/s"),
+        (["belts/one/cmd_speed"], [-math.inf], "belts/one/cmd_speed: -inf given, expected -1 to 1 m/s"),
+        (["belts/one/cmd_speed"], [1.01], "belts/one/cmd_speed: 1.01 given, expected -1 to 1 m/s"),
+        (["belts/two/cmd_speed"], [-0.01], "belts/two/cmd_speed: -0.01 given, expected 0 to 2 m/s"),
+        (["belts/one/cmd_speed"] * 2, [0.1, 0.2], "belts/one/cmd_speed: given twice"),
+        (["belts/one/cmd_speed"], [0.1, 0.2], "1 names and 2 values given, expected as many of both"),
+        (["belts/one/cmd_speed"], [], "1 names and 0 values given, expected as many of both"),
+    ],
+)  # fmt: skip
+def test_what_is_refused_and_why(names: list[str], values: list[float], reason: str) -> None:
+    """And the belts keep their speeds, also the one whose own value was good."""
+    assert refusal(IMAGE, names, values) == reason
+    sim = two_belts()
+    if names != ["belts/two/cmd_speed"]:
+        names, values = ["belts/two/cmd_speed", *names], [0.7, *values]
+    sim.command(names, values, source="test")
+    sim.advance()
+    (outcome,) = sim.take_outcomes()
+    assert not outcome.accepted
+    assert outcome.reason.split(":")[0] == reason.split(":")[0] or "names and" in outcome.reason
+    assert (outcome.tick, outcome.source, outcome.names) == (0, "test", tuple(names))
+    np.testing.assert_array_equal(outcome.values, values)
+    assert sim.belts().commanded.tolist() == [0.2, 0.3]
+    assert sim.belts().actual.tolist() == [0.2, 0.3]
+
+
+def test_the_limits_themselves_are_accepted() -> None:
+    assert refusal(IMAGE, IMAGE.command_names, IMAGE.command_min) == ""
+    assert refusal(IMAGE, IMAGE.command_names, IMAGE.command_max) == ""
+    assert refusal(IMAGE, [], []) == ""
+
+
+def test_a_command_takes_effect_at_the_next_tick_and_says_at_which() -> None:
+    """Queued, nothing changes; the scan from tick n to n + 1 runs with it, and the outcome names n."""
+    sim = two_belts()
+    sim.advance(3)
+    sim.command(["belts/one/cmd_speed", "belts/two/cmd_speed"], [-0.5, 1.0], source="plc")
+    assert sim.belts().commanded.tolist() == [0.2, 0.3]
+    assert sim.take_outcomes() == []
+    before = sim.bottles().vx[0]
+    sim.advance()
+    assert sim.belts().commanded.tolist() == sim.belts().actual.tolist() == [-0.5, 1.0]
+    (outcome,) = sim.take_outcomes()
+    assert (outcome.tick, outcome.source, outcome.accepted, outcome.reason) == (3, "plc", True, "")
+    assert sim.take_outcomes() == []
+    # Full friction against the travel it had: -mu g for the whole tick.
+    assert sim.bottles().vx[0] - before == pytest.approx(-0.4 * 9.81 * 0.01)
+
+
+def test_commands_apply_in_their_order() -> None:
+    """The last one stands; a refused one between them changes nothing; each has its outcome."""
+    sim = two_belts()
+    for value in (0.4, 5.0, 0.6):
+        sim.command(["belts/one/cmd_speed"], [value])
+    sim.advance()
+    assert sim.belts().commanded[0] == 0.6
+    assert [(outcome.values, outcome.accepted) for outcome in sim.take_outcomes()] == [
+        ((0.4,), True), ((5.0,), False), ((0.6,), True),
+    ]  # fmt: skip
+
+
+def test_without_belts_there_is_nothing_to_command() -> None:
+    sim = simulation(bottles=[bottle(0.0, 0.0)])
+    sim.command(["belts/one/cmd_speed"], [0.1])
+    sim.advance()
+    assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected one of none: no belts"

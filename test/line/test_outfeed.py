@@ -1,0 +1,71 @@
+"""Outfeeds: bottles whose axis is in the region leave; their slots are used again, their ids never."""
+
+import numpy as np
+from scenes import RADIUS, base, belt, contact, segment, simulation
+from worlds import FAR
+
+from conveyor_sim.line.outfeed import in_polygon
+
+STAR = np.array([[0.0, 1.0], [0.2, 0.3], [1.0, 0.2], [0.3, -0.1], [0.6, -0.9], [0.0, -0.3], [-0.7, -0.8], [-0.3, 0.0],
+                 [-1.0, 0.4], [-0.2, 0.3]])  # fmt: skip
+
+
+def winding(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether the polygon winds around each point: another method than the one in use."""
+    a = corners[None] - points[:, None]
+    b = np.roll(corners, -1, axis=0)[None] - points[:, None]
+    angle = np.arctan2(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=-1))
+    return np.abs(angle.sum(axis=1)) > np.pi
+
+
+def test_points_in_a_concave_polygon() -> None:
+    """Either way around."""
+    points = np.random.default_rng(2).uniform(-1.2, 1.2, (5000, 2))
+    expected = winding(STAR, points)
+    assert 500 < expected.sum() < 4500
+    np.testing.assert_array_equal(in_polygon(STAR, *points.T), expected)
+    np.testing.assert_array_equal(in_polygon(STAR[::-1], *points.T), expected)
+
+
+def test_points_on_shared_edges_belong_to_one_polygon() -> None:
+    """Regions side by side: a point on the edge or corner between them is in one of them, never in both or none."""
+    x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 2.0, 9), np.linspace(0.0, 2.0, 9)))
+    inner = (x > 0.0) & (x < 2.0) & (y > 0.0) & (y < 2.0)
+    tiles = [np.array([[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]]) for i in (0.0, 1.0) for j in (0.0, 1.0)]
+    count = sum(in_polygon(tile, x, y).astype(int) for tile in tiles)
+    np.testing.assert_array_equal(count[inner], 1)
+    halves = [np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]), np.array([[0.0, 0.0], [2.0, 2.0], [0.0, 2.0]])]
+    count = sum(in_polygon(half, x, y).astype(int) for half in halves)
+    np.testing.assert_array_equal(count[inner], 1)
+
+
+def test_bottles_leave_in_the_region_and_ids_are_not_used_again() -> None:
+    """An endless stream through a short line: few slots, growing ids, mass in equals mass out."""
+    sim = simulation(
+        tick=0.01,
+        step={"per_tick": 20},
+        base=base(0.4),
+        contacts=[contact(5000.0, damping=("normal", 2.0)), contact(5000.0, "steel", damping=("normal", 2.0))],
+        belts={"belt": belt(1.0)},
+        rails={"far": segment((4.0, -1.0), (4.0, 1.0))},
+        infeeds={"in": {"bottle": "bottle", "position": [0.0, 0.0], "direction": 0.0, "speed": 1.0, "gap": 0.01}},
+        outfeeds={
+            # A concave region: the line enters the notch's mouth at x = 1, its bottom at x = 1.2.
+            "out": {"region": [[1.0, -0.5], [2.0, -0.5], [2.0, 0.5], [1.0, 0.5], [1.2, 0.0]]},
+            "unused": {"region": [[0.0, 1.0], [1.0, 1.0], [0.5, 2.0]]},
+        },
+    )
+    removed = sim.process_image.signal_names.index("outfeeds/out/removed")
+    unused = sim.process_image.signal_names.index("outfeeds/unused/removed")
+    slots = sim._state.world.bottles.id.size
+    furthest = 0.0
+    for _ in range(700):
+        sim.advance()
+        furthest = max(furthest, sim.bottles().x.max())
+    assert 1.2 - 0.01 <= furthest < 1.2 + 1e-9
+    assert sim.counts.fed > 45
+    assert sim.signals()[removed] == sim.counts.removed > 40
+    assert sim.signals()[unused] == 0
+    assert sim.bottles().id.tolist() == list(range(sim.counts.removed, sim.counts.fed))
+    assert sim._state.world.bottles.id.size == slots
+    assert sim.bottles().x.max() + RADIUS < FAR

@@ -1,0 +1,95 @@
+"""A bottle on a turn-table (a curved belt of a full turn): friction must hold it on its circle, Omega^2 r < mu g.
+
+The regularised law holds only with slip, so the bottle creeps outward at s with mu g p(s) = Omega^2 r:
+    dr/dt = v_lim (1 - sqrt(1 - Omega^2 r / (mu g)))
+Coriolis turns the slip by 2 s / (Omega r), which changes the rate by that squared.
+"""
+
+import math
+
+import pytest
+from scenes import base, bottle, simulation
+from scipy.integrate import solve_ivp
+
+from conveyor_sim.simulation import Simulation
+
+MU, G, SLIP_LIMIT = 0.4, 9.81, 0.01
+TABLE = 1.0
+"""m, radius of the table."""
+CENTRE = (0.3, -0.2)
+
+
+def turntable(omega: float, radius: float, inner: float = 0.0) -> Simulation:
+    """A bottle that turns with a table at `omega` (rad/s), `radius` (m) away from its centre."""
+    width = TABLE - inner
+    return simulation(
+        tick=0.01,
+        step={"per_tick": 50, "integrator": "velocity_verlet"},
+        gravity=G,
+        slip_limit=SLIP_LIMIT,
+        base=base(MU),
+        belts={
+            "table": {
+                "kind": "curved", "centre": CENTRE, "inner_radius": inner, "width": width, "start_angle": 1.0,
+                "span": 2.0 * math.pi, "material": "chain",
+                "speed": omega * (inner + width / 2), "speed_limits": [-9, 9],
+            }
+        },
+        floor={"friction": 0.0},
+        bottles=[bottle(CENTRE[0] + radius, CENTRE[1], 0.0, omega * radius)],
+    )  # fmt: skip
+
+
+def distance(sim: Simulation) -> float:
+    state = sim.bottles()
+    return math.hypot(state.x[0] - CENTRE[0], state.y[0] - CENTRE[1])
+
+
+@pytest.mark.parametrize("inner", [0.0, 0.2], ids=["disc", "ring"])
+@pytest.mark.parametrize("share", [0.2, 0.5, -0.8])
+def test_it_creeps_outward(share: float, inner: float) -> None:
+    """`share` = Omega^2 r / (mu g), its sign that of Omega; after the slip has set in, against the rate integrated."""
+    radius = 0.5
+    omega = math.copysign(math.sqrt(abs(share) * MU * G / radius), share)
+    sim = turntable(omega, radius, inner)
+    sim.advance(50)
+    start, duration = distance(sim), 4.0
+    sim.advance(round(duration / 0.01))
+
+    def rate(t: float, r: list[float]) -> list[float]:
+        return [SLIP_LIMIT * (1.0 - math.sqrt(1.0 - omega**2 * r[0] / (MU * G)))]
+
+    expected = solve_ivp(rate, (0.0, duration), [start], rtol=1e-10).y[0, -1] - start
+    coriolis = (2.0 * SLIP_LIMIT / (abs(omega) * radius)) ** 2
+    assert distance(sim) - start == pytest.approx(expected, rel=2.0 * coriolis + 1e-3)
+
+
+def test_it_slides_away_beyond_mu_g_over_omega_squared() -> None:
+    """Just inside the limit it stays within a creep of at most v_lim; just beyond it leaves, faster than v_lim."""
+    omega = 2.5
+    limit = MU * G / omega**2
+    held, lost = turntable(omega, 0.95 * limit), turntable(omega, 1.02 * limit)
+    held.advance(50)
+    lost.advance(50)
+    before = distance(held), distance(lost)
+    held.advance(50)
+    lost.advance(50)
+    assert (distance(held) - before[0]) / 0.5 < SLIP_LIMIT
+    assert (distance(lost) - before[1]) / 0.5 > SLIP_LIMIT
+    lost.advance(200)
+    assert distance(lost) > TABLE
+    assert lost.bottles().belt[0] == -1
+
+
+def test_the_speed_of_a_curved_belt_holds_at_its_centre_line() -> None:
+    """A bottle set down at R + b/2 is brought to the belt's speed, counter-clockwise."""
+    inner = 0.2
+    middle = inner + (TABLE - inner) / 2
+    sim = turntable(0.5, middle, inner)
+    assert sim.belts().commanded[0] == pytest.approx(0.5 * middle)
+    sim.advance(100)
+    state = sim.bottles()
+    turned = math.atan2(state.y[0] - CENTRE[1], state.x[0] - CENTRE[0])
+    # It creeps and lags by 2 s / (Omega r) of the slip: within v_lim of the surface.
+    assert turned == pytest.approx(0.5 * sim.time, abs=SLIP_LIMIT * sim.time / middle)
+    assert math.hypot(state.vx[0], state.vy[0]) == pytest.approx(0.5 * middle, abs=SLIP_LIMIT)

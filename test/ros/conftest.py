@@ -1,0 +1,69 @@
+"""Nodes under test are processes of their own, in a ROS domain that each test module has for itself."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+from ros.line_client import LineClient, until
+from std_srvs.srv import Trigger
+
+from conveyor_sim.ros.child import Child
+from conveyor_sim.ros.domain import private_domain
+
+SMALL_LINE = Path(__file__).with_name("small_line.yaml")
+
+
+@pytest.fixture(scope="module")
+def domain() -> Iterator[int]:
+    """A ROS domain for this module's processes."""
+    with private_domain() as number:
+        yield number
+
+
+@pytest.fixture(scope="module")
+def start_node(client: LineClient, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Child]]:
+    """Starts `sim_node` with ROS parameters: unless they say else on the small line, paused, as fast as possible.
+
+    One at a time: the one before must have been stopped.
+    """
+    children: list[Child] = []
+
+    def start(**parameters: object) -> Child:
+        assert all(child.exit_code is not None for child in children)
+        until(lambda: not client.node.count_services("lockstep"), "the end of the node before")
+        given = {"scene": SMALL_LINE, "start_paused": True, "real_time_factor": 0.0, **parameters}
+        logs = tmp_path_factory.mktemp("logs")
+        children.append(Child("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs))
+        return children[-1]
+
+    yield start
+    for child in children:
+        child.stop()
+
+
+@pytest.fixture(scope="module")
+def client(domain: int) -> Iterator[LineClient]:
+    """Another participant of the domain."""
+    line_client = LineClient()
+    yield line_client
+    line_client.close()
+
+
+@pytest.fixture(scope="module")
+def shared_node(start_node: Callable[..., Child]) -> Child:
+    """One node for many tests of a module, with ticks enough for all."""
+    return start_node(duration=1000.0)
+
+
+@pytest.fixture
+def line(shared_node: Child, client: LineClient) -> LineClient:
+    """The shared node, paused at tick 0."""
+    client.call(Trigger, "pause")
+    client.reset()
+    return client

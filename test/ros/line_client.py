@@ -1,0 +1,145 @@
+"""A ROS node for tests: asks the node under test, and listens to it, over real DDS."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from conveyor_msgs import srv
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from conveyor_sim.bag.qos import QOS
+from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.spinner import Spinner
+
+PATIENCE = 60.0  # s of wall time; only a failing test waits so long (kernels may have to be compiled)
+
+
+def until(condition: Callable[[], Any], what: str) -> Any:
+    """Wait for something that will happen; its value."""
+    end = time.monotonic() + PATIENCE
+    while not (value := condition()):
+        assert time.monotonic() < end, f"in vain: {what}"
+        time.sleep(0.002)
+    return value
+
+
+class LineClient:
+    """Calls services, and collects messages in lists that fill in the background."""
+
+    def __init__(self) -> None:
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = Node("line_client", context=self._context)
+        self._spinner = Spinner(self._context)
+        self._spinner.start(self.node)
+        self._clients: dict[str, Any] = {}
+
+    def close(self) -> None:
+        self._spinner.close()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+    def client(self, kind: Any, name: str) -> Any:
+        """A client whose service is there."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+        until(self._clients[name].service_is_ready, f"the service {name}")
+        return self._clients[name]
+
+    def call(self, kind: Any, name: str, **fields: Any) -> Any:
+        """The response of a service."""
+        response = self.client(kind, name).call(kind.Request(**fields), timeout_sec=PATIENCE)
+        assert response is not None, f"no response of {name}"
+        return response
+
+    def step(self, ticks: int = 1) -> None:
+        """Advance, and see that it was done."""
+        result = self.call(srv.StepSimulation, "step_simulation", steps=ticks).result
+        assert result.result == result.RESULT_OK, result.error_message
+
+    def step_in_background(self, ticks: int) -> Callable[[], None]:
+        """Begin to advance; what is returned waits for the end."""
+        future = self.client(srv.StepSimulation, "step_simulation").call_async(srv.StepSimulation.Request(steps=ticks))
+
+        def wait() -> None:
+            result = until(future.result, "the end of a step").result
+            assert result.result == result.RESULT_OK, result.error_message
+
+        return wait
+
+    def reset(self) -> None:
+        """Back to tick 0."""
+        result = self.call(srv.ResetSimulation, "reset_simulation").result
+        assert result.result == result.RESULT_OK, result.error_message
+
+    def reset_until(self, *listeners: Listener) -> None:
+        """Reset until each listener has heard of tick 0: from then on the node knows that they listen."""
+
+        def heard() -> bool:
+            self.reset()
+            time.sleep(0.05)
+            return all(listener.messages for listener in listeners)
+
+        until(heard, "messages of tick 0")
+        for listener in listeners:
+            listener.messages.clear()
+        self.reset()
+
+    def state(self) -> int:
+        """The state's number."""
+        return int(self.call(srv.GetSimulationState, "get_simulation_state").state.state)
+
+    def lockstep(self, target: int, run_id: str = "test", **fields: Any) -> Any:
+        """The response of one scan."""
+        return self.call(srv.Lockstep, "lockstep", run_id=run_id, target_tick=target, **fields)
+
+    def listen(self, kind: Any, topic: str, qos: str | None = None) -> Listener:
+        """Collect messages, from now on."""
+        return Listener(self.node, kind, topic, qos or topic)
+
+    def publisher(self, kind: Any, topic: str, qos: str) -> Any:
+        """A publisher to which the node under test has subscribed."""
+        publisher = self.node.create_publisher(kind, topic, ros_qos(QOS[qos]))
+        until(publisher.get_subscription_count, f"a subscription to {topic}")
+        return publisher
+
+    def diagnostics(self) -> tuple[Any, dict[str, str]]:
+        """The next diagnostic status, and its values by key."""
+        with self.listen(DiagnosticArray, "/diagnostics", "diagnostics") as heard:
+            heard.first()
+            count = len(heard.messages)
+            # Not the first one: it may have been on its way before what is to be seen in it.
+            status = until(lambda: heard.messages[count:], "diagnostics")[0].status[0]
+        return status, {item.key: item.value for item in status.values}
+
+
+class Listener:
+    """Messages of one topic, in the order of their arrival."""
+
+    def __init__(self, node: Node, kind: Any, topic: str, qos: str) -> None:
+        self.messages: list[Any] = []
+        self._node = node
+        self._topic = topic
+        self._subscription = node.create_subscription(kind, topic, self.messages.append, ros_qos(QOS[qos]))
+        until(self._subscription.get_publisher_count, f"a publisher of {topic}")
+
+    def first(self) -> Any:
+        """The first message, awaited."""
+        return until(lambda: self.messages, f"a message of {self._topic}")[0]
+
+    def at_tick(self, tick: int) -> Any:
+        """The message of a tick, awaited."""
+        return until(
+            lambda: [message for message in self.messages if message.tick == tick], f"{self._topic} of tick {tick}"
+        )[0]
+
+    def __enter__(self) -> Listener:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._node.destroy_subscription(self._subscription)

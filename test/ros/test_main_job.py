@@ -1,0 +1,83 @@
+"""The main job: node and controller as two processes in lockstep."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ros.conftest import SMALL_LINE
+from ros.line_client import until
+from ros.test_recording import messages
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recover import recover
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.main_job import run_in_lockstep
+
+
+def children_of(process: int) -> list[int]:
+    """Process ids."""
+    return [int(number) for number in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def command_of(process: int) -> str:
+    return Path(f"/proc/{process}/cmdline").read_text().replace("\0", " ")
+
+
+def start_main_job(bag: Path) -> tuple[subprocess.Popen[str], dict[str, int]]:
+    """A main job that will not end soon, and the process ids of its node and its controller, once both are at work."""
+    command = [sys.executable, "-m", "conveyor_sim.ros.main_job", str(SMALL_LINE), "--out", str(bag)]
+    command += ["--duration", "100000"]
+    job = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    until(lambda: bag.is_dir() and sum(file.stat().st_size for file in bag.glob("*.mcap")) > 100_000, "a recording")
+    names = {
+        name: child for child in children_of(job.pid) for name in ("sim_node", "plc_node") if name in command_of(child)
+    }
+    return job, names
+
+
+def test_two_runs_give_the_same_bytes_and_the_controller_its_commands(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        run_in_lockstep(str(SMALL_LINE), tmp_path / name)
+    one = messages(tmp_path / "one")
+    assert one == messages(tmp_path / "two")
+    assert len(one["signals"]) == 401
+    assert len(one["outcomes"]) == 39  # a scan every 10 ticks, but for the first, which reads only
+    with open_bag(tmp_path / "one") as bag:
+        assert bag.line.overrides == "duration: 4.0\n"
+    assert {path.name for path in (tmp_path / "one" / "logs").iterdir()} == {"sim_node.log", "plc_node.log"}
+    assert children_of(os.getpid()) == []
+
+
+def test_a_controller_that_cannot_go_on_is_told_with_its_reason(tmp_path: Path) -> None:
+    with pytest.raises(ConveyorError) as caught:
+        run_in_lockstep("two_bottles", tmp_path / "bag")
+    assert "plc_node ended with exit code 1; the end of its log:" in str(caught.value)
+    assert "belt 'feeder': not on the line two_bottles" in str(caught.value)
+    assert children_of(os.getpid()) == []
+
+
+@pytest.mark.parametrize("victim", ["sim_node", "plc_node"])
+def test_a_process_that_is_killed_ends_the_job_with_its_name(tmp_path: Path, victim: str) -> None:
+    job, processes = start_main_job(tmp_path / "bag")
+    os.kill(processes[victim], signal.SIGKILL)
+    output, _ = job.communicate(timeout=60)
+    assert job.returncode == 1
+    assert f"main job: {victim} was killed by signal 9; the end of its log:" in output
+    assert not any(Path(f"/proc/{process}").exists() for process in processes.values())
+    assert recover(tmp_path / "bag").healthy == (victim == "plc_node")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_job_leaves_a_whole_bag_and_no_process(tmp_path: Path, number: signal.Signals) -> None:
+    job, processes = start_main_job(tmp_path / "bag")
+    job.send_signal(number)
+    output, _ = job.communicate(timeout=60)
+    assert job.returncode == 1
+    assert f"interrupted; what was recorded is in {tmp_path / 'bag'}" in output
+    assert not any(Path(f"/proc/{process}").exists() for process in processes.values())
+    assert recover(tmp_path / "bag").healthy

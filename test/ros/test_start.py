@@ -1,0 +1,55 @@
+"""Parameters at start: what they switch off, and what can't be started."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+from conveyor_msgs.msg import SimulationState
+from conveyor_msgs.srv import SetSimulationState
+from ros.conftest import SMALL_LINE
+from ros.line_client import LineClient, until
+
+from conveyor_sim.ros.child import Child
+
+
+def test_the_clock_can_be_switched_off(start_node: Callable[..., Child], client: LineClient) -> None:
+    node = start_node(publish_clock=False)
+    client.diagnostics()
+    assert not client.node.count_publishers("/clock")
+    node.stop()
+
+
+def test_a_request_to_quit_is_answered_and_followed(start_node: Callable[..., Child], client: LineClient) -> None:
+    node = start_node()
+    quitting = SimulationState(state=SimulationState.STATE_QUITTING)
+    result = client.call(SetSimulationState, "set_simulation_state", state=quitting).result
+    assert result.result == result.RESULT_OK
+    until(lambda: node.exit_code is not None, "the end of the node")
+    assert node.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"record": "/proc/no_such_folder/bag"}, "/proc/no_such_folder/bag: can't be created"),
+        ({"scene": "no_such_scene"}, "no_such_scene: no such scene file"),
+        ({"real_time_factor": -2.0}, "parameter real_time_factor: -2.0 given, expected a number from 0"),
+        ({"rates.bottles": 33.0}, "outputs.bottles: 33"),
+    ],
+    ids=["record", "scene", "parameter", "rate"],
+)
+def test_a_start_that_cannot_be_ends_with_one_sentence(
+    domain: int, parameters: dict[str, object], sentence: str
+) -> None:
+    command = [sys.executable, "-m", "conveyor_sim.ros.sim_node", "--ros-args"]
+    for name, value in {"scene": SMALL_LINE, **parameters}.items():
+        command += ["-p", f"{name}:={value}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("sim_node: ")
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,173 @@
+"""Scene to model: tables, bounds and the time step that follows, with its reason."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, line, polyline, scene, segment
+
+from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.laws import base_friction
+from conveyor_sim.model import build_model
+
+TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]
+
+
+def bounds(**fields: Any) -> dict[str, float]:
+    return {bound.name: bound.dt for bound in build_model(scene(**fields)).bounds}
+
+
+def test_bounds_of_the_papers_test_case() -> None:
+    """k = 5 / 10 kN/m, c = 0.1 kg/s, mu 0.4 / 0.1, v_lim = 10 mm/s, a hundred bottles."""
+    found = bounds(
+        contacts=[contact(5e3, damping=("paper", 0.1), friction=0.1), contact(10e3, "steel", ("paper", 0.1), 0.1)],
+        base=base(0.4),
+        belts={"table": belt(0.2)},
+        rails={"edge": segment((0.0, 6.0), (1.0, 6.0))},
+        bottles=[{"grid": {"type": "bottle", "origin": [0.0, 0.0], "rows": 10, "columns": 10, "pitch": 0.14}}],
+    )
+    # The rail's contact is as long as the pair's: twice the stiffness, twice the reduced mass.
+    assert found == {
+        "contact time": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
+        "lattice stability": pytest.approx(2.0 / math.sqrt(6.0 * 5e3 / MASS)),
+        "base friction": pytest.approx(0.01 / (0.4 * 9.81)),
+        "contact friction": pytest.approx(MASS * 0.01 / (4 * 0.1 * (100 * 0.4 * MASS * 9.81))),
+    }
+
+
+def test_bounds_take_the_tightest_of_types_and_materials() -> None:
+    """The lighter bottle, the stiffer contact, the higher friction."""
+    types = {"heavy": kind(), "light": kind(0.03, 0.02, inertia=1e-5)}
+    fields: dict[str, Any] = {
+        "bottle_types": types,
+        "contacts": [contact(4e3, friction=0.1), contact(90e3, "steel", friction=0.3)],
+        "base": base(0.4),
+        "belts": {"table": belt(0.2)},
+        "floor": {"friction": 0.7},
+        "bottles": [bottle(0.0, 0.0, type="heavy"), bottle(1.0, 0.0, type="light")],
+    }
+    without = bounds(**fields)
+    assert without["contact time"] == pytest.approx(math.pi * math.sqrt(0.01 / 4e3) / 20)
+    assert without["lattice stability"] == pytest.approx(2.0 / math.sqrt(6.0 * 4e3 / 0.02))
+    assert without["base friction"] == pytest.approx(0.01 / (0.7 * 9.81))
+    railed = bounds(**fields, rails={"edge": segment((0.0, 6.0), (1.0, 6.0))})
+    assert railed["contact time"] == pytest.approx(math.pi * math.sqrt(0.02 / 90e3) / 20)
+    # Two bottles press with 2 mu m g; the light one turns more easily, 1/m + R^2/J = 50 + 90.
+    force = 2 * 0.7 * 0.02 * 9.81
+    assert railed["contact friction"] == pytest.approx(0.01 / (2 * 0.3 * (50 + 90) * force))
+
+
+def test_what_is_absent_does_not_bound() -> None:
+    assert bounds(bottles=TWO[:1], floor="none") == {}
+    assert set(bounds(bottles=TWO, contacts=[contact(1e3)], floor="none")) == {"contact time", "lattice stability"}
+    frictionless = bounds(bottles=TWO, contacts=[contact(1e3, friction=0.2)], floor="none")
+    assert set(frictionless) == {"contact time", "lattice stability"}
+    assert set(bounds(bottles=TWO[:1], floor={"friction": 0.3})) == {"base friction"}
+
+
+def test_chosen_steps_keep_every_bound() -> None:
+    model = build_model(scene(**{**line(), "step": {}}))
+    assert model.dt * model.steps_per_tick == pytest.approx(0.01)
+    tightest = min(bound.dt for bound in model.bounds)
+    assert model.dt <= tightest < 0.01 / (model.steps_per_tick - 1)
+    assert model.dt_reason.startswith(f"{model.steps_per_tick} steps a tick, the fewest within the tightest bound")
+    assert min(model.bounds, key=lambda bound: bound.dt).reason in model.dt_reason
+
+
+def test_given_steps_are_told() -> None:
+    model = build_model(scene(step={"per_tick": 3}, **{k: v for k, v in line().items() if k != "step"}))
+    assert model.steps_per_tick == 3
+    assert model.dt == pytest.approx(0.01 / 3)
+    assert "given in the scene" in model.dt_reason
+    assert "beyond the tightest bound" in model.dt_reason
+
+
+def test_types_and_names_are_in_the_scenes_order() -> None:
+    model = build_model(scene(**line()))
+    assert model.bottle_types == ("bottle", "small")
+    np.testing.assert_array_equal(model.type_radius, [RADIUS, 0.03])
+    np.testing.assert_allclose(model.type_inertia, [MASS * RADIUS**2, 3e-5])
+    assert model.belts == ("feeder", "bend", "end", "side")
+    assert model.rails == ("right", "left", "outer", "inner", "fence", "bend_inner", "bend_outer")
+    assert (model.name, model.tick_ns, model.integrator) == ("test", 10_000_000, "semi_implicit_euler")
+    assert model.engine_hash == ENGINE_HASH
+    assert [entry.split("=")[0] for entry in model.versions] == ["numba", "llvmlite", "numpy"]
+    assert model.machine
+    assert model.has("rotation")
+    assert not build_model(scene(bottles=TWO[:1])).has("rotation")
+
+
+def test_contact_constants_by_type_and_material() -> None:
+    """A pair of materials counts in either order; one damping law's table is 0 where the other law is given."""
+    model = build_model(scene(**line()))
+    pairs, rails = model.pair_law, model.rail_law
+    assert pairs is not None
+    assert rails is not None
+    np.testing.assert_array_equal(pairs.stiffness, [[5000.0, 3000.0], [3000.0, 2000.0]])
+    np.testing.assert_array_equal(pairs.friction, [[0.1, 0.2], [0.2, 0.3]])
+    np.testing.assert_array_equal(pairs.damping_paper, [[0.5, 0.0], [0.0, 0.0]])
+    np.testing.assert_array_equal(pairs.damping_normal, [[0.0, 0.7], [0.7, 0.0]])
+    np.testing.assert_array_equal(rails.stiffness, [[8000.0], [4000.0]])
+    np.testing.assert_array_equal(rails.damping_normal, [[1.0], [0.0]])
+
+
+def test_base_friction_by_belt_and_bottle_type() -> None:
+    """Bottle's material first, then the belt's: a material may be used for both."""
+    given = scene(
+        bottle_types={"one": kind(material="a"), "other": kind(material="b")},
+        belts={"first": belt(0.0, (0.0, 0.0), 1.0, 1.0, material="a"),
+               "second": belt(0.0, (2.0, 0.0), 1.0, 1.0, material="b")},
+        base=[{"between": [bottle_, belt_], "friction": mu}
+              for bottle_, belt_, mu in (("a", "a", 0.1), ("a", "b", 0.2), ("b", "a", 0.3), ("b", "b", 0.4))],
+    )  # fmt: skip
+    # The floor, last, is as the first belt.
+    np.testing.assert_array_equal(base_friction(given), [[0.1, 0.3], [0.2, 0.4], [0.1, 0.3]])
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({"floor": {"friction": 0.25}}, [0.25]),
+        ({"floor": "none"}, [0.0]),
+        ({}, [0.0]),
+        ({"belts": {"one": belt(0.0)}, "base": base(0.4)}, [0.4]),
+        ({"belts": {"one": belt(0.0)}, "base": base(0.4), "floor": {"friction": 0.0}}, [0.0]),
+        ({"belts": {"one": belt(0.0)}, "base": base(0.4), "floor": "none"}, [0.0]),
+    ],
+)
+def test_friction_of_the_floor(fields: dict[str, Any], expected: list[float]) -> None:
+    np.testing.assert_array_equal(base_friction(scene(**fields))[-1], expected)
+
+
+def test_rails_that_meet_are_one_surface() -> None:
+    """End to end however listed, more than two at a point, or an end on another's side; apart or crossing are not."""
+    rails = {
+        "chain": polyline([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]),
+        "goes_on": segment((2.0, 1.0), (1.0, 1.0)),
+        "third_arm": segment((1.0, 1.0), (0.5, 2.0)),
+        "bends": arc((2.0, 1.5), 0.5, -math.pi / 2, 1.0),
+        "stem": segment((1.5, 1.0), (1.5, 0.2)),
+        "apart": segment((5.0, 0.0), (6.0, 0.0)),
+        "almost": segment((6.0 + 2e-6, 0.0), (7.0, 0.0)),
+        "crossing": segment((5.5, -1.0), (5.5, 1.0)),
+    }
+    model = build_model(scene(rails=rails, contacts=[contact(1e3, "steel")], bottles=[bottle(9.0, 9.0)]))
+    assert model.segments is not None
+    assert model.arcs is not None
+    by_rail: dict[str, set[int]] = {}
+    for pieces in (model.segments, model.arcs):
+        for rail, surface in zip(pieces.rail.tolist(), pieces.surface.tolist(), strict=True):
+            by_rail.setdefault(model.rails[rail], set()).add(surface)
+    joined = [by_rail[name] for name in ("chain", "goes_on", "third_arm", "bends", "stem")]
+    assert all(surfaces == joined[0] and len(surfaces) == 1 for surfaces in joined)
+    alone = [by_rail[name].pop() for name in ("apart", "almost", "crossing")]
+    assert len({*joined[0], *alone}) == 4
+
+
+def test_a_large_plant_gets_a_grid_of_bounded_size() -> None:
+    """Far apart as things may be, the static grid keeps to its largest number of cells."""
+    rails = {"here": segment((0.0, 0.0), (0.1, 0.0)), "there": segment((9e4, 9e4), (9e4, 9.1e4))}
+    model = build_model(scene(rails=rails, contacts=[contact(1e3, "steel")], bottles=[bottle(1.0, 1.0)]))
+    assert model.grid is not None
+    assert model.grid.columns * model.grid.rows < 300_000

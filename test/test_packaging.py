@@ -1,0 +1,181 @@
+"""What holds the package together: its resources, versions and dependencies, both ways of installing, the set-up."""
+
+import ast
+import importlib.metadata
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+import conveyor_sim
+from conveyor_sim.errors import SceneError
+from conveyor_sim.resources import config_dir, msg_defs_dir, scene_path
+
+ROOT = Path(__file__).parent.parent
+COLCON = Path(sys.executable).parent / "colcon"
+SHIPPED = {"accumulation_table", "paper_plant", "turntable", "two_bottles"}
+
+
+def run(*command: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(part) for part in command], cwd=cwd, env={**os.environ, **environment}, capture_output=True, text=True
+    )
+
+
+def copy_project(to: Path, *names: str) -> None:
+    for name in names:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, to / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(ROOT / name, to / name)
+
+
+def test_resources_of_a_checkout() -> None:
+    assert {scene.stem for scene in config_dir().glob("*.yaml")} >= SHIPPED
+    assert (msg_defs_dir() / "msg" / "Bottles.msg").is_file()
+
+
+@pytest.mark.parametrize("name", ["two_bottles", "two_bottles.yaml", "config/two_bottles.yaml"])
+def test_a_shipped_scene_is_found_by_name_from_anywhere(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert scene_path(name) == config_dir() / "two_bottles.yaml"
+
+
+def test_a_file_where_the_user_stands_wins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("two_bottles.yaml").write_text("name: mine\n")
+    assert scene_path("two_bottles.yaml") == Path("two_bottles.yaml")
+
+
+@pytest.mark.parametrize("name", ["no_such_scene", "elsewhere/two_bottles.yaml"])
+def test_an_unknown_scene_is_refused_with_the_names_there_are(name: str) -> None:
+    with pytest.raises(SceneError, match=rf"{name}: no such scene file; .*accumulation_table, .*two_bottles"):
+        scene_path(name)
+
+
+def test_importing_the_package_is_cheap(tmp_path: Path) -> None:
+    code = "import conveyor_sim, sys; print({'numpy', 'numba', 'pydantic'} & set(sys.modules))"
+    assert run(sys.executable, "-c", code, cwd=tmp_path).stdout == "set()\n"
+
+
+def test_the_package_exports_its_two_entry_points() -> None:
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.simulation import Simulation
+
+    assert conveyor_sim.Simulation is Simulation
+    assert conveyor_sim.load_scene is load_scene
+    with pytest.raises(AttributeError, match="nothing_of_the_sort"):
+        _ = conveyor_sim.nothing_of_the_sort
+
+
+def test_versions_agree() -> None:
+    stated = {ElementTree.parse(ROOT / file).findtext("version") for file in ("package.xml", "msg_defs/package.xml")}
+    assert stated == {conveyor_sim.__version__} == {importlib.metadata.version("conveyor_sim")}
+    assert f"## [{conveyor_sim.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_package_xml_names_every_ros_package_that_is_imported() -> None:
+    declared = {element.text for element in ElementTree.parse(ROOT / "package.xml").iter("exec_depend")}
+    imported = set()
+    for source in [*(ROOT / "conveyor_sim").rglob("*.py"), *(ROOT / "launch").glob("*.py")]:
+        for node in ast.walk(ast.parse(source.read_text())):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            imported |= {name.partition(".")[0] for name in names}
+    ros = {name for name in imported if name.endswith(("_msgs", "_srvs", "_interfaces")) or name.startswith("launch")}
+    assert ros | {"rclpy"} <= declared | {"simulation_interfaces"}  # served only where it is installed
+
+
+def test_colcon_lists_both_packages() -> None:
+    listed = run(COLCON, "list", "--base-paths", ".", "msg_defs", "--names-only", cwd=ROOT)
+    assert sorted(listed.stdout.split()) == ["conveyor_msgs", "conveyor_sim"]
+
+
+def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
+    project = ("conveyor_sim", "config", "launch", "msg_defs", "requirements", "resource", "README.md", "package.xml")
+    copy_project(tmp_path, *project, "setup.py", "setup.cfg", "pyproject.toml", "LICENSE")
+    built = run(COLCON, "build", "--base-paths", ".", "--packages-select", "conveyor_sim", cwd=tmp_path)
+    assert built.returncode == 0, built.stdout + built.stderr
+    prefix = tmp_path / "install" / "conveyor_sim"
+    assert {file.name for file in (prefix / "lib" / "conveyor_sim").iterdir()} == {
+        "conveyor-sim",
+        "plc_node",
+        "sim_node",
+    }
+    assert (prefix / "share" / "conveyor_sim" / "launch" / "line.launch.py").is_file()
+    assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "conveyor_sim").is_file()
+
+    (packages,) = prefix.glob("lib/python3*/site-packages")
+    code = (
+        "from conveyor_sim.resources import config_dir, msg_defs_dir; import conveyor_sim.scene, conveyor_sim.engine;"
+        "print(config_dir(), msg_defs_dir())"
+    )
+    found = run(sys.executable, "-c", code, cwd=tmp_path / "install", PYTHONPATH=str(packages))
+    share = prefix / "share" / "conveyor_sim"
+    assert found.stdout.split() == [str(share / "config"), str(share / "msg_defs")], found.stderr
+    assert {scene.stem for scene in (share / "config").glob("*.yaml")} >= SHIPPED
+
+
+def test_launch_file_hands_the_node_parameters_that_it_has() -> None:
+    launch = pytest.importorskip("launch.actions", reason="the launch packages come with an installed ROS 2 only")
+    from conveyor_sim.ros.parameters import TABLE
+
+    spec = importlib.util.spec_from_file_location("line_launch", ROOT / "launch" / "line.launch.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    entities = module.generate_launch_description().entities
+    arguments = {entity.name: entity for entity in entities if isinstance(entity, launch.DeclareLaunchArgument)}
+    assert set(arguments) - {entry.name for entry in TABLE} == {"controller"}
+    assert all(argument.description for argument in arguments.values())
+    node = {entry.name: (type(entry.default), str(entry.default).lower()) for entry in TABLE}
+    for name, default, kind, _ in module.SIMULATION_ARGUMENTS:
+        assert (kind, default) == node[name]
+
+
+@pytest.fixture
+def empty_machine(tmp_path: Path) -> Path:
+    """A copy of the set-up, and a folder `bin` with the few commands it needs before it looks for Python."""
+    copy_project(tmp_path, "tools", "requirements", "msg_defs", "setup.py", "setup.cfg")
+    (tmp_path / "conveyor_sim").mkdir()
+    copy_project(tmp_path, "conveyor_sim/version.py")
+    (tmp_path / "bin").mkdir()
+    for command in ("sh", "dirname"):
+        (tmp_path / "bin" / command).symlink_to(shutil.which(command) or "")
+    return tmp_path
+
+
+def set_up(machine: Path, distro: str = "jazzy") -> subprocess.CompletedProcess[str]:
+    return run("sh", "tools/set_up.sh", distro, cwd=machine, PATH=str(machine / "bin"), CC="", CXX="")
+
+
+def base_python() -> str:
+    return os.path.realpath(sys.executable)
+
+
+def test_set_up_without_python_says_what_to_install(empty_machine: Path) -> None:
+    result = set_up(empty_machine)
+    assert result.returncode == 1
+    assert result.stderr.startswith("conveyor_sim needs CPython 3.10, 3.11 or 3.12")
+    assert result.stderr.count("\n") == 1
+
+
+def test_set_up_without_compiler_says_what_to_install(empty_machine: Path) -> None:
+    (empty_machine / "bin" / "python3").symlink_to(base_python())
+    result = set_up(empty_machine)
+    assert result.returncode == 1
+    assert result.stderr.startswith("There is no C compiler (cc or gcc or clang) on PATH")
+    assert result.stderr.count("\n") == 1
+    assert not (empty_machine / ".venv").exists()
+
+
+def test_set_up_for_an_unknown_distribution_names_the_known_ones(empty_machine: Path) -> None:
+    (empty_machine / "bin" / "python3").symlink_to(base_python())
+    assert set_up(empty_machine, "humble").stderr == "DISTRO=humble: expected jazzy or kilted.\n"

@@ -1,0 +1,85 @@
+"""The engine's arrays with bottles wherever a test wants them, even inside each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
+
+from conveyor_sim.engine.forces import evaluate_forces
+from conveyor_sim.model import build_model
+from conveyor_sim.scene import Scene
+from conveyor_sim.state import State
+
+F8 = NDArray[np.float64]
+
+STIFFNESS = 1000.0
+"""N/m, of glass on steel in `rail_scene`."""
+
+FAR = 90.0
+"""m: a bottle at (FAR, FAR) is near nothing."""
+
+
+def state_of(
+    scene: Scene, points: Any, velocities: Any = None, spins: Any = None, kinds: Any = None, lists: bool = True
+) -> State:
+    """A State with bottles at points (n, 2), in slots 0 to n - 1; those of the scene are left out."""
+    points = np.asarray(points, float)
+    velocities = np.zeros_like(points) if velocities is None else np.asarray(velocities, float)
+    spins = np.zeros(len(points)) if spins is None else spins
+    kinds = np.zeros(len(points), int) if kinds is None else kinds
+    state = State(build_model(scene))
+    for (x, y), (vx, vy), omega, kind in zip(points, velocities, spins, kinds, strict=True):
+        state.add(int(kind), x, y, 0.0, vx, vy, float(omega))
+    if lists:
+        state.make_lists()
+    return state
+
+
+def rail_scene(rails: dict[str, Any], **fields: Any) -> Scene:
+    """Rails of STIFFNESS alone; one bottle, so that bottles don't touch each other."""
+    return scene(
+        contacts=[contact(STIFFNESS, "steel")], rails=rails, bottles=[bottle(FAR, FAR)], **{**NO_FLOOR, **fields}
+    )
+
+
+def rail_forces(rails: dict[str, Any], points: Any) -> F8:
+    """Force (n, 2), N, of the rails on bottles at rest at points (n, 2)."""
+    points = np.asarray(points, float)
+    state = state_of(rail_scene(rails), points)
+    evaluate_forces(state.world)
+    return np.column_stack([state.world.load.fx, state.world.load.fy])[: len(points)]
+
+
+def push(nearest: Any, points: Any, radius: float = RADIUS) -> F8:
+    """k (R - d) away from the nearest point, (n, 2): what one contact gives; 0 beyond R."""
+    away = np.asarray(points, float) - nearest
+    distance = np.hypot(*away.T)
+    return (STIFFNESS * np.maximum(radius - distance, 0.0) / distance)[:, None] * away
+
+
+def nearest_on_segment(start: Any, end: Any, points: Any) -> F8:
+    """Nearest point (n, 2) of a segment."""
+    start, along = np.asarray(start, float), np.asarray(end, float) - np.asarray(start, float)
+    share = np.clip((np.asarray(points) - start) @ along / (along @ along), 0.0, 1.0)
+    return np.asarray(start + share[:, None] * along)
+
+
+def nearest_on_arc(centre: Any, radius: float, start: float, span: float, points: Any) -> F8:
+    """Nearest point (n, 2) of an arc."""
+    centre = np.asarray(centre, float)
+    seen = np.asarray(points) - centre
+    angle = np.mod(np.arctan2(seen[:, 1], seen[:, 0]) - start, 2.0 * np.pi)
+    ends = centre + radius * np.array([[np.cos(a), np.sin(a)] for a in (start, start + span)])
+    to_ends = [np.hypot(*(points - end).T) for end in ends]
+    end = np.where((to_ends[0] <= to_ends[1])[:, None], ends[0], ends[1])
+    on_circle = centre + radius * seen / np.hypot(*seen.T)[:, None]
+    return np.asarray(np.where((angle <= span)[:, None], on_circle, end))
+
+
+def nearest_of(candidates: list[F8], points: Any) -> F8:
+    """The nearest of several candidates (n, 2) each."""
+    distance = np.array([np.hypot(*(np.asarray(points) - one).T) for one in candidates])
+    return np.asarray(np.choose(np.argmin(distance, axis=0)[:, None], candidates))

@@ -1,0 +1,202 @@
+"""Makes the environment of `make run` and `make test`: set_up.py DISTRO [test]
+
+A virtual environment with the ROS 2 wheels of that distribution, this package (editable) and conveyor_msgs, built
+from msg_defs/. `set-up.json` in the environment holds a key of what each stage was made from; a stage whose key
+still holds is skipped. The file is away while pip works, so an environment that was interrupted is made afresh.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
+STRIP = ROOT / "tools" / "strip_missing_includes.cmake"
+
+
+class SetUpError(Exception):
+    """One sentence for the user."""
+
+
+class Environment:
+    """The virtual environment of one distribution, and what it was made from."""
+
+    def __init__(self, distro: str) -> None:
+        self.distro = distro
+        self.path = ROOT / DISTROS[distro]
+        self.python = self.path / "bin" / "python"
+        self.state_file = self.path / "set-up.json"
+        self.state = self._read_state()
+
+    def _read_state(self) -> dict:
+        """What is known to be complete; nothing if the checkout was moved, or the base Python is gone."""
+        try:
+            state = json.loads(self.state_file.read_text())
+        except (OSError, ValueError):
+            return {}
+        runs = (
+            subprocess.run([self.python, "-I", "-S", "-c", ""], capture_output=True) if self.python.exists() else None
+        )
+        return state if state.get("path") == str(self.path) and runs and runs.returncode == 0 else {}
+
+    def write_state(self, **changes: str) -> None:
+        self.state.update(path=str(self.path), **changes)
+        draft = self.state_file.with_suffix(".draft")
+        draft.write_text(json.dumps(self.state, indent=1) + "\n")
+        draft.replace(self.state_file)
+
+    def forget(self, stage: str) -> None:
+        """Before a stage changes the environment: until it is through, it is not what it was either."""
+        if self.state.pop(stage, None):
+            self.write_state()
+
+    def create(self) -> None:
+        say(f"Python {sys.version.split()[0]} environment in {self.path.name}/")
+        command([sys.executable, "-I", "-m", "venv", "--clear", self.path], "creating the environment")
+        self.state = {}
+
+    def pip_install(self, what: list, why: str) -> None:
+        log = self.path / "pip.log"
+        self.state_file.unlink(missing_ok=True)
+        try:
+            command(
+                [self.python, "-m", "pip", "--disable-pip-version-check", "install", "--prefer-binary", *what], why, log
+            )
+        except SetUpError:
+            # pip itself gave up, and undid what it had begun.
+            if self.state:
+                self.write_state()
+            raise
+
+    def build_messages(self) -> None:
+        """Builds and installs conveyor_msgs into the environment's own prefix, which needs no path to be found."""
+        build = self.path / "conveyor_msgs"
+        manifest = build / "install_manifest.txt"
+        if manifest.exists():
+            for name in manifest.read_text().splitlines():
+                Path(name).unlink(missing_ok=True)
+        shutil.rmtree(build, ignore_errors=True)
+        log = self.path / "conveyor_msgs.log"
+        log.unlink(missing_ok=True)
+        # CMake looks for packages beside every bin/ on PATH: a sourced ROS must not be among them.
+        path = [p for p in os.environ["PATH"].split(":") if not (Path(p).parent / "share" / "ament_index").is_dir()]
+        env = {**os.environ, "AMENT_PREFIX_PATH": str(self.path), "PATH": ":".join([f"{self.path}/bin", *path])}
+        options = {
+            "CMAKE_BUILD_TYPE": "Release",
+            "CMAKE_PREFIX_PATH": self.path,
+            "CMAKE_INSTALL_PREFIX": self.path,
+            "CMAKE_PROJECT_INCLUDE": STRIP,
+            "Python3_EXECUTABLE": self.python,
+            "BUILD_TESTING": "OFF",
+        }
+        cmake = self.path / "bin" / "cmake"
+        defines = [f"-D{name}={value}" for name, value in options.items()]
+        what = "building conveyor_msgs"
+        command([cmake, "-G", "Ninja", "-S", ROOT / "msg_defs", "-B", build, *defines], what, log, env)
+        command([cmake, "--build", build, "--target", "install"], what, log, env)
+
+
+def say(text: str) -> None:
+    print(f"[set-up] {text}", flush=True)
+
+
+def command(arguments: list, what: str, log: Path | None = None, env: dict | None = None) -> None:
+    """Runs a command with its output in the log; SetUpError, after the output's end, if it fails."""
+    done = subprocess.run(
+        [str(argument) for argument in arguments],
+        env=env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
+    if log:
+        with log.open("a") as file:
+            file.write(done.stdout)
+    if done.returncode:
+        print("\n".join(done.stdout.splitlines()[-25:]), file=sys.stderr)
+        where = f" (all of its output: {log.relative_to(ROOT)})" if log else ""
+        raise SetUpError(f"Set-up failed while {what}{where}.")
+
+
+def key(*parts: Path | str) -> str:
+    """A digest of files (by content) and strings."""
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part.encode() if isinstance(part, str) else part.name.encode() + b"\0" + part.read_bytes())
+        digest.update(b"\0")
+    return digest.hexdigest()
+
+
+def check_compiler() -> None:
+    for language, variable, names in (("C", "CC", "cc gcc clang"), ("C++", "CXX", "c++ g++ clang++")):
+        candidates = [os.environ[variable].split()[0]] if os.environ.get(variable, "").strip() else names.split()
+        if not any(shutil.which(name) for name in candidates):
+            raise SetUpError(
+                f"There is no {language} compiler ({' or '.join(candidates)}) on PATH, which building the messages "
+                "needs: install one (Debian, Ubuntu: apt install build-essential; Fedora: dnf install gcc-c++)."
+            )
+
+
+def set_up(distro: str, test: bool) -> None:
+    environment = Environment(distro)
+    requirements = ROOT / "requirements"
+    build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
+    described = ("requirements/run.txt", "requirements/plot.txt", "setup.py", "setup.cfg", "conveyor_sim/version.py")
+    packages = key(*build, *(ROOT / name for name in described))
+    messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
+    tests = key(requirements / "test.txt")
+    needed = {"packages": packages, "messages": messages, **({"tests": tests} if test else {})}
+    if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
+        return
+
+    start = time.monotonic()
+    check_compiler()
+    if not environment.state:
+        environment.create()
+    if environment.state.get("packages") != packages:
+        say(f"ROS 2 {distro.capitalize()} and Python packages: about 1 GB on disk, one to three minutes ...")
+        environment.pip_install(
+            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot]"], "installing ROS 2 and Python packages"
+        )
+        environment.write_state(packages=packages)
+    if environment.state.get("messages") != messages:
+        say("conveyor_msgs from msg_defs/: half a minute ...")
+        environment.forget("messages")
+        environment.build_messages()
+        environment.write_state(messages=messages)
+    if test and environment.state.get("tests") != tests:
+        say("test tools ...")
+        environment.pip_install(["-r", requirements / "test.txt"], "installing the test tools")
+        environment.write_state(tests=tests)
+    say(f"done in {time.monotonic() - start:.0f} s")
+
+
+def main() -> int:
+    distro, test = sys.argv[1], sys.argv[2:] == ["test"]
+    if distro not in DISTROS:
+        print(f"DISTRO={distro}: expected {' or '.join(DISTROS)}.", file=sys.stderr)
+        return 1
+    # One at a time: two makes started together would tread on each other.
+    lock = os.open(ROOT, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        set_up(distro, test)
+    except SetUpError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("Set-up interrupted; it starts afresh the next time.", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
