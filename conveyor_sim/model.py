@@ -159,7 +159,7 @@ def _bounds(scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base: F8
         mu = float(base.max())
         tightest(
             "base friction",
-            [(base_friction_bound(mu, scene.gravity, scene.slip_limit), f"v_lim / (mu g) at mu = {mu:g}")],
+            [(base_friction_bound(mu, scene.gravity, scene.slip_limit), f"20 steps in v_lim / (mu g) at mu = {mu:g}")],
         )
         tightest("contact friction", _contact_friction_bounds(scene, pairs, rails, mu))
     return tuple(found)

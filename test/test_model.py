@@ -31,7 +31,7 @@ def test_bounds_of_the_papers_test_case() -> None:
     assert found == {
         "contact time": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
         "lattice stability": pytest.approx(2.0 / math.sqrt(6.0 * 5e3 / MASS)),
-        "base friction": pytest.approx(0.01 / (0.4 * 9.81)),
+        "base friction": pytest.approx(0.01 / (0.4 * 9.81) / 20),
         "contact friction": pytest.approx(MASS * 0.01 / (4 * 0.1 * (100 * 0.4 * MASS * 9.81))),
     }
 
@@ -50,7 +50,7 @@ def test_bounds_take_the_tightest_of_types_and_materials() -> None:
     without = bounds(**fields)
     assert without["contact time"] == pytest.approx(math.pi * math.sqrt(0.01 / 4e3) / 20)
     assert without["lattice stability"] == pytest.approx(2.0 / math.sqrt(6.0 * 4e3 / 0.02))
-    assert without["base friction"] == pytest.approx(0.01 / (0.7 * 9.81))
+    assert without["base friction"] == pytest.approx(0.01 / (0.7 * 9.81) / 20)
     railed = bounds(**fields, rails={"edge": segment((0.0, 6.0), (1.0, 6.0))})
     assert railed["contact time"] == pytest.approx(math.pi * math.sqrt(0.02 / 90e3) / 20)
     # Two bottles press with 2 mu m g; the light one turns more easily, 1/m + R^2/J = 50 + 90.

@@ -45,7 +45,9 @@ def _share_two(contacts: RailContacts, a: int, b: int) -> None:
     elif over_a <= cosine * over_b:
         contacts.share[a] = 0.0
     else:
-        rest = 1.0 - cosine * cosine
+        # 1 - cosine^2, without its cancellation where the pieces are nearly in line.
+        sine = contacts.nx[a] * contacts.ny[b] - contacts.ny[a] * contacts.nx[b]
+        rest = sine * sine
         contacts.share[a] = (over_a - cosine * over_b) / (rest * over_a)
         contacts.share[b] = (over_b - cosine * over_a) / (rest * over_b)
 

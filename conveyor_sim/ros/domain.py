@@ -8,6 +8,7 @@ import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
@@ -27,6 +28,8 @@ _SCRUBBED = (
     "ROS_NAMESPACE",
     "CYCLONEDDS_URI",
     "RMW_IMPLEMENTATION",
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
 )
 
 
@@ -57,13 +60,20 @@ def private_domain() -> Iterator[int]:
             os.environ.pop(name, None)
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)  # Fast DDS 2, in Jazzy
-        os.environ["FASTDDS_DEFAULT_PROFILES_FILE"] = str(profile)  # Fast DDS 3, in Kilted
+        os.environ[_profile_variable()] = str(profile)
         try:
             yield domain
         finally:
             os.environ.clear()
             os.environ.update(before)
+
+
+def _profile_variable() -> str:
+    """Fast DDS 3, in Kilted, warns of the name that Fast DDS 2, in Jazzy, knows alone."""
+    rclpy = find_spec("rclpy")
+    ros_libraries = Path(rclpy.origin).parents[3] if rclpy and rclpy.origin else Path()
+    renamed = any(ros_libraries.glob("libfastdds.so*"))
+    return "FASTDDS_DEFAULT_PROFILES_FILE" if renamed else "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -22,6 +21,7 @@ from conveyor_sim.resources import scene_path
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
 from conveyor_sim.ros.observer import Observer
+from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.scene import load_scene
 from conveyor_sim.summary import render, summarize, write_summary
 
@@ -33,11 +33,12 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
     """Run node and controller to the end of `duration` (s; None: the scene's), recorded to `bag`.
 
     Returns the wall time in s from the first tick to the last, if the node could tell it.
-    Raises ConveyorError if one of them ends before that. Either way nothing is left running.
+    Raises ConveyorError if one of them ends before that, or on Ctrl-C or SIGTERM. Either way nothing is left running.
     """
     file = scene_path(scene_name).resolve()
     scene = load_scene(file, {"duration": duration} if duration is not None else None)
     with ExitStack() as stack:
+        stop = stack.enter_context(StopRequest())
         stack.enter_context(private_domain())
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_")))
         stack.callback(_keep_logs, logs, bag)
@@ -54,12 +55,18 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
         stack.callback(node.stop)
         plc = Child("plc_node", {}, environment, logs)
         stack.callback(plc.stop)
-        while not observer.started and _both_run(node, plc):
+
+        def going_on() -> bool:
+            return node.exit_code is None and plc.exit_code is None and not stop.requested
+
+        while not observer.started and going_on():
             observer.wait(LOOK)
         with ProgressBar(scene.name, scene.duration) as progress:
-            while _both_run(node, plc):
+            while going_on():
                 observer.wait(LOOK)
                 progress.update(observer.time)
+        if stop.requested:
+            raise ConveyorError(f"interrupted at {observer.time:.2f} s; what was recorded is in {bag}")
         if plc.exit_code is None or node.exit_code is not None:
             raise ConveyorError(node.obituary())
         if plc.exit_code != 0:
@@ -71,10 +78,6 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
         if node.exit_code != 0:
             raise ConveyorError(node.obituary())
         return observer.wall
-
-
-def _both_run(node: Child, plc: Child) -> bool:
-    return node.exit_code is None and plc.exit_code is None
 
 
 def _keep_logs(logs: Path, bag: Path) -> None:
@@ -91,8 +94,6 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 def main(scene: str, out: Path | None, duration: float | None) -> None:
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
-    # Ended by a supervisor, it ends its processes as after Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     bag = out or new_run_folder()
     try:
         wall = run_in_lockstep(scene, bag, duration)
@@ -103,8 +104,6 @@ def main(scene: str, out: Path | None, duration: float | None) -> None:
             click.echo(f"picture: {picture}")
     except ConveyorError as error:
         sys.exit(f"main job: {error}")
-    except KeyboardInterrupt:
-        sys.exit(f"interrupted; what was recorded is in {bag}")
 
 
 if __name__ == "__main__":

@@ -6,10 +6,10 @@ back. What it decides is in plc_logic.py.
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
-from contextlib import closing
+import time
+from contextlib import closing, suppress
 from typing import Any
 
 import rclpy
@@ -25,8 +25,10 @@ from conveyor_sim.ros.declared import Entry, declare_table
 from conveyor_sim.ros.plc_logic import PlcMemory, PlcSettings, count_signal, scan
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.scene import parse_overrides, parse_scene
 
+LOOK = 0.01  # s of wall time between two looks for the simulation
 PATIENCE = 1.0  # s of wall time without an answer after which the same request is sent again
 
 SETTINGS = (
@@ -44,11 +46,16 @@ SCANNING = (
 )
 
 
-class PlcNode:
-    """Scans until the end of the run."""
+class Stopped(Exception):
+    """The controller was asked to end."""
 
-    def __init__(self) -> None:
+
+class PlcNode:
+    """Scans until the end of the run, or until `stop` is requested."""
+
+    def __init__(self, stop: StopRequest) -> None:
         """Raises ConveyorError for a parameter that can't be."""
+        self._stop = stop
         self._node = Node("plc_node")
         self._settings = PlcSettings(**declare_table(self._node, SETTINGS))
         scanning = declare_table(self._node, SCANNING)
@@ -67,11 +74,12 @@ class PlcNode:
         self._node.destroy_node()
 
     def run(self) -> None:
-        """Raises ConveyorError if the line has not the belts asked for, or a scan is refused."""
+        """Raises ConveyorError if the line has not the belts asked for, or a scan is refused; Stopped if asked to."""
         log = self._node.get_logger()
         log.info("waiting for the simulation")
-        self._has_line.wait()
-        self._lockstep.wait_for_service()
+        while not (self._has_line.is_set() and self._lockstep.service_is_ready()):
+            self._require_going_on()
+            time.sleep(LOOK)
         line, tick, last, signals, memory = None, 0, 0, dict[str, float](), PlcMemory()
         while line is None or tick < last:
             if self._line is not line:  # at the start, and after a reset
@@ -106,6 +114,7 @@ class PlcNode:
             release=release,
         )
         while True:
+            self._require_going_on()
             try:
                 response = self._lockstep.call(request, timeout_sec=PATIENCE)
             except TimeoutError:  # as newer distributions tell it; Jazzy returns None
@@ -113,6 +122,10 @@ class PlcNode:
             if response is not None:
                 return response
             self._node.get_logger().warning(f"no answer to the request for tick {target}; sent again")
+
+    def _require_going_on(self) -> None:
+        if self._stop.requested:
+            raise Stopped
 
     def _require_belts(self, line: Any) -> None:
         for belt in (self._settings.feeder, self._settings.table):
@@ -133,17 +146,15 @@ def _last_tick(line: Any) -> int:
 
 def main() -> None:
     """Exits with 0 at the end or after Ctrl-C or SIGTERM, with 1 and one sentence if the controller can't go on."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        with closing(PlcNode()) as plc:
-            plc.run()
-    except KeyboardInterrupt:
-        pass
-    except ConveyorError as error:
-        sys.exit(f"plc_node: {error}")
-    finally:
-        rclpy.shutdown()
+    with StopRequest() as stop:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            with closing(PlcNode(stop)) as plc, suppress(Stopped):
+                plc.run()
+        except ConveyorError as error:
+            sys.exit(f"plc_node: {error}")
+        finally:
+            rclpy.shutdown()
 
 
 if __name__ == "__main__":

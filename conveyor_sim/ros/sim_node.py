@@ -14,15 +14,15 @@ from conveyor_sim.ros.stop_request import StopRequest
 
 def main() -> None:
     """Exits with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
-    stop = StopRequest()
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = SimNode(on_stop=stop.request)
-    except ConveyorError as error:
-        sys.exit(f"sim_node: {error}")
-    stop.wait()
-    node.close()
-    rclpy.shutdown()
+    with StopRequest() as stop:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            node = SimNode(on_stop=stop.request)
+        except ConveyorError as error:
+            sys.exit(f"sim_node: {error}")
+        stop.wait()
+        node.close()
+        rclpy.shutdown()
     if node.error is not None:
         sys.exit(f"sim_node: {type(node.error).__name__}: {node.error}")
 

@@ -1,22 +1,32 @@
-"""Ctrl-C and SIGTERM as something to wait for."""
+"""Ctrl-C and SIGTERM as something to wait for: a KeyboardInterrupt is lost wherever Python ignores exceptions."""
 
 from __future__ import annotations
 
+import select
 import signal
 import socket
+from contextlib import AbstractContextManager
 
 
-class StopRequest:
-    """A signal, or a call of request(), whichever comes first. A signal interrupts nothing half done."""
+class StopRequest(AbstractContextManager["StopRequest"]):
+    """A signal, or a call of request(), whichever comes first; nothing is interrupted half done.
+
+    For the main thread; signals are handled as before once the context ends.
+    """
 
     def __init__(self) -> None:
-        """To be made in the main thread."""
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
-        # Written to in C, whichever thread the signal meets: numpy's and DDS's threads would take a blocked one.
-        signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda _number, _frame: None)
+        # Written to in C, whichever thread the signal meets: numpy and DDS have threads of their own.
+        self._wakeup_before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        self._handlers_before = {
+            number: signal.signal(number, lambda _number, _frame: None) for number in (signal.SIGINT, signal.SIGTERM)
+        }
+
+    @property
+    def requested(self) -> bool:
+        """Whether there was a request."""
+        return bool(select.select([self._reader], [], [], 0.0)[0])
 
     def request(self) -> None:
         """From any thread."""
@@ -24,4 +34,11 @@ class StopRequest:
 
     def wait(self) -> None:
         """Return once there was a request."""
-        self._reader.recv(1)
+        select.select([self._reader], [], [])
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._handlers_before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(self._wakeup_before)
+        self._reader.close()
+        self._writer.close()

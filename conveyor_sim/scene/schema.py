@@ -352,7 +352,7 @@ class Scene(Part):
         "Belts. Where they overlap, the last listed carries.", default={}
     )
     rails: Annotated[dict[Name, Rail], _named("rails")] = quantity(
-        "Rails. Those that join end to end are one surface.", default={}
+        "Rails. Those that join end to end, or end on another, are one surface.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],

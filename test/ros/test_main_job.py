@@ -78,6 +78,7 @@ def test_an_interrupted_job_leaves_a_whole_bag_and_no_process(tmp_path: Path, nu
     job.send_signal(number)
     output, _ = job.communicate(timeout=60)
     assert job.returncode == 1
-    assert f"interrupted; what was recorded is in {tmp_path / 'bag'}" in output
+    assert "main job: interrupted at " in output
+    assert f"what was recorded is in {tmp_path / 'bag'}" in output
     assert not any(Path(f"/proc/{process}").exists() for process in processes.values())
     assert recover(tmp_path / "bag").healthy

@@ -90,7 +90,7 @@ def test_at_the_end_of_the_run_the_bag_is_whole_while_the_node_lives_on(
     start_node: Callable[..., Child], client: LineClient, tmp_path: Path
 ) -> None:
     node = start_node(record=tmp_path / "bag", start_paused=False, duration=1.0, **{"rates.bottles": 10.0})
-    until(lambda: client.lockstep(0).tick == 100, "the end of the run")
+    until(lambda: "the run has ended at tick 100" in client.lockstep(0).reason, "the end of the run")
     recorded = messages(tmp_path / "bag")
     assert len(recorded["bottles"]) == 11
     assert len(recorded["signals"]) == 101
