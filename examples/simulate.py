@@ -3,6 +3,6 @@
 from conveyor_sim import Simulation, load_scene
 
 simulation = Simulation(load_scene("examples/push.yaml"))
-simulation.command(["belts/main/cmd_speed"], [0.1])   # m/s, from the next tick on
-simulation.advance(100)                               # ticks of 10 ms
+simulation.command(["belts/main/cmd_speed"], [0.1])  # m/s, from the next tick on
+simulation.advance(100)  # ticks of 10 ms
 print(simulation.bottles().x, simulation.contacts().normal_force)
