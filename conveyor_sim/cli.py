@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.progress import ProgressBar
+from conveyor_sim.progress import COMPILING, ProgressBar, told_if_long
 from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
@@ -44,6 +43,7 @@ def main() -> None:
 def check(scene: str, out: Path) -> None:
     """Validate SCENE (a file, or the name of a shipped one), tell what it comes to, and draw it."""
     from conveyor_sim.model import build_model
+    from conveyor_sim.report import plot_function
     from conveyor_sim.resources import scene_path
     from conveyor_sim.scene import load_scene
 
@@ -51,7 +51,7 @@ def check(scene: str, out: Path) -> None:
     checked = load_scene(path)
     model = build_model(checked)
     _print(_account(checked, model))
-    plot_scene = _plot_function("plot_scene")
+    plot_scene = plot_function("plot_scene")
     if plot_scene is not None:
         out.mkdir(parents=True, exist_ok=True)
         click.echo(f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}")
@@ -65,12 +65,16 @@ def check(scene: str, out: Path) -> None:
 def run(scene: str, out: Path | None, duration: float | None, no_record: bool) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
     from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.report import report
     from conveyor_sim.resources import scene_path
     from conveyor_sim.runner import run_scene
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.simulation import compile_kernels
 
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration})
     folder = None if no_record else out or new_run_folder()
+    with told_if_long(COMPILING):
+        compile_kernels(loaded)
     with ProgressBar(loaded.name, loaded.duration) as bar:
         done = run_scene(loaded, folder, bar.update)
     if done.interrupted:
@@ -79,26 +83,7 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool) -
         factor = done.simulated / done.wall
         click.echo(f"{done.simulated:.2f} s simulated in {done.wall:.2f} s, {factor:.3g} x real time")
     else:
-        _report(done.bag, done.wall)
-
-
-def _report(bag: Path, wall: float) -> None:
-    """Summary and pictures of a run, on the terminal and into its folder."""
-    from conveyor_sim.summary import render, summarize, write_summary
-
-    summary = summarize(bag, wall)
-    _print(render(summary))
-    click.echo(f"summary: {write_summary(summary, bag)}")
-    plot_bag = _plot_function("plot_bag")
-    if plot_bag is None:
-        return
-    try:
-        pictures = plot_bag(bag, bag / "pictures")
-    except ConveyorError as error:  # such as a scene without bottles: nothing to draw, but a good run all the same
-        click.echo(f"no pictures: {error}", err=True)
-        return
-    for picture in pictures:
-        click.echo(f"picture: {picture}")
+        report(done.bag, done.wall)
 
 
 @main.command()
@@ -145,22 +130,14 @@ def replay(bag: Path) -> None:
 @click.option("--bottle", "bottles", type=int, multiple=True, help="Id of a bottle to draw over time; repeatable.")
 def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[int, ...]) -> None:
     """Draw BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces."""
-    plot_bag = _plot_function("plot_bag")
+    from conveyor_sim.report import plot_function
+
+    plot_bag = plot_function("plot_bag")
     if plot_bag is None:
         sys.exit(1)
     folder = out or (bag if bag.is_dir() else bag.parent) / "pictures"
     for picture in plot_bag(bag, folder, times=times or None, bottles=bottles or None):
         click.echo(picture)
-
-
-def _plot_function(name: str) -> Any:
-    """A function of conveyor_sim.plot; None, and a sentence that says so, if matplotlib is not installed."""
-    if find_spec("matplotlib") is None:
-        click.echo("no pictures: matplotlib is not installed (pip install 'conveyor_sim[plot]')", err=True)
-        return None
-    import conveyor_sim.plot
-
-    return getattr(conveyor_sim.plot, name)
 
 
 def _print(content: RenderableType) -> None:

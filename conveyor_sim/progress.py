@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 PLAIN_SHARE = 0.1
 """Where there is no terminal: a line whenever this share of the whole has been done."""
+
+SILENCE = 2.0
+"""s of wall time without a word after which people wonder."""
+
+COMPILING = "compiling the kernels for this kind of scene, up to a minute; the next run finds them in the cache"
+
+
+@contextmanager
+def told_if_long(sentence: str) -> Iterator[None]:
+    """Say the sentence if what is inside takes longer than SILENCE."""
+    timer = threading.Timer(SILENCE, print, (sentence,), {"file": sys.stderr, "flush": True})
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):

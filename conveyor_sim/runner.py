@@ -26,7 +26,7 @@ class Run:
     simulated: float
     """s"""
     wall: float
-    """s, from the first tick to the end of the recording; kernels that are not cached yet compile in the first tick."""
+    """s, from the first tick to the end of the recording; kernels not compiled yet (`compile_kernels`) are in it."""
     interrupted: bool
     """Ended early by Ctrl-C or a request to terminate."""
 

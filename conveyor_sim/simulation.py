@@ -243,3 +243,11 @@ class Simulation:
                 f"after the tick that began at {self.time:g} s: "
                 f"dt = {self.model.dt:g} s is too long for this scene ({self.model.dt_reason}); raise step.per_tick"
             )
+
+
+def compile_kernels(scene: Scene) -> None:
+    """Have numba compile the kernels that a scene needs, or read them from its cache; nothing of it stays but that."""
+    rehearsal = Simulation(scene)
+    rehearsal.advance(1)
+    rehearsal.bottles()
+    rehearsal.contacts()

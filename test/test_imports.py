@@ -19,7 +19,7 @@ FLOORS = [
     ["simulation"],
     ["bag"],
     ["progress", "summary", "plot"],
-    ["runner"],
+    ["runner", "report"],
     ["ros"],
     ["cli"],
 ]

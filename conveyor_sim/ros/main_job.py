@@ -11,19 +11,17 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from conveyor_sim.bag.recorder import new_run_folder
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.plot import plot_bag
-from conveyor_sim.progress import ProgressBar
+from conveyor_sim.progress import COMPILING, ProgressBar, told_if_long
+from conveyor_sim.report import report
 from conveyor_sim.resources import scene_path
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
 from conveyor_sim.ros.observer import Observer
 from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.scene import load_scene
-from conveyor_sim.summary import render, summarize, write_summary
 
 LOOK = 0.05  # s of wall time between two looks at the processes
 PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent once a second
@@ -59,8 +57,9 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
         def going_on() -> bool:
             return node.exit_code is None and plc.exit_code is None and not stop.requested
 
-        while not observer.started and going_on():
-            observer.wait(LOOK)
+        with told_if_long(COMPILING):
+            while not observer.started and going_on():
+                observer.wait(LOOK)
         with ProgressBar(scene.name, scene.duration) as progress:
             while going_on():
                 observer.wait(LOOK)
@@ -96,12 +95,7 @@ def main(scene: str, out: Path | None, duration: float | None) -> None:
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
     bag = out or new_run_folder()
     try:
-        wall = run_in_lockstep(scene, bag, duration)
-        summary = summarize(bag, wall)
-        Console().print(render(summary), highlight=False)
-        click.echo(f"summary: {write_summary(summary, bag)}")
-        for picture in plot_bag(bag, bag / "pictures"):
-            click.echo(f"picture: {picture}")
+        report(bag, run_in_lockstep(scene, bag, duration))
     except ConveyorError as error:
         sys.exit(f"main job: {error}")
 

@@ -22,8 +22,8 @@ from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stepper import Stepper
-from conveyor_sim.scene import Scene, load_scene
-from conveyor_sim.simulation import Simulation
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import compile_kernels
 
 
 class SimNode:
@@ -61,7 +61,7 @@ class SimNode:
         given = parameters.declare(node)
         distro = default_distro()
         scene = load_scene(scene_path(given.scene), given.overrides())
-        _compile_kernels(scene)
+        compile_kernels(scene)  # before the run starts: its first tick would be a long overrun
         sink = RosSink(node, distro, {"markers": RateCap(given.marker_rate)})
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
@@ -97,13 +97,6 @@ class SimNode:
     def _die(self, error: Exception) -> None:
         self.error = error
         self._on_stop()
-
-
-def _compile_kernels(scene: Scene) -> None:
-    """Have numba compile, or read from its cache, before the run starts: its first tick would be a long overrun."""
-    rehearsal = Simulation(scene)
-    rehearsal.advance(1)
-    rehearsal.contacts()
 
 
 def bag_folder(record: Path | None, resets: int) -> Path | None:
