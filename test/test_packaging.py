@@ -94,7 +94,7 @@ def test_package_xml_names_every_ros_package_that_is_imported() -> None:
 
 
 def test_colcon_lists_both_packages() -> None:
-    listed = run(COLCON, "list", "--base-paths", ".", "msg_defs", "--names-only", cwd=ROOT)
+    listed = run(COLCON, "--log-base", "/dev/null", "list", "--base-paths", ".", "msg_defs", "--names-only", cwd=ROOT)
     assert sorted(listed.stdout.split()) == ["conveyor_msgs", "conveyor_sim"]
 
 
