@@ -1,4 +1,4 @@
-# make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., DISTRO=kilted)
+# make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., one with belts feeder and table; DISTRO=kilted)
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
 # make lint    style and types
 # make clean   removes what set-up and builds made, never runs/

@@ -53,7 +53,10 @@ def check(scene: str, out: Path) -> None:
     _print(_account(checked, model))
     plot_scene = plot_function("plot_scene")
     if plot_scene is not None:
-        out.mkdir(parents=True, exist_ok=True)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConveyorError(f"{out}: can't be made ({error.strerror}), expected a folder to draw into") from error
         click.echo(f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}")
 
 

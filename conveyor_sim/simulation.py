@@ -110,7 +110,10 @@ class Simulation:
             self._state.make_lists()
 
     def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
-        """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together."""
+        """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together.
+
+        What became of them is told by `take_outcomes`.
+        """
         self._pending.append((tuple(names), tuple(float(value) for value in values), source))
 
     def take_outcomes(self) -> list[CommandOutcome]:

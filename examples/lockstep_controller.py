@@ -28,6 +28,8 @@ def main(belt: str, scans: int) -> None:
     client = node.create_client(Lockstep, "lockstep")
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     _, line = wait_for_message(Line, node, "line", qos_profile=latched)
+    if belt not in line.belts:
+        sys.exit(f"{belt}: no such belt, expected one of {', '.join(line.belts)}")
     count = list(line.signal_names).index(f"belts/{belt}/bottles")
     client.wait_for_service()
     spinning = Thread(target=spin, args=(node,))

@@ -4,7 +4,7 @@
     python read_bag.py runs/20250131T120501Z
 
 Needs neither ROS nor conveyor_sim: the recording states its own message types. Works as well on what `ros2 bag record`
-made of the node's topics.
+made of the node's topics. A recording that was killed while it was written needs `conveyor-sim recover` first.
 """
 
 import sys

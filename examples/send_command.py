@@ -6,6 +6,7 @@ Needs ROS 2 and conveyor_msgs.
 """
 
 import sys
+from contextlib import suppress
 
 import rclpy
 from conveyor_msgs.msg import CommandOutcome, Commands
@@ -42,9 +43,12 @@ def main(belt: str, speed: str) -> None:
     sender = Sender(f"belts/{belt}/cmd_speed", float(speed))
     executor = SingleThreadedExecutor()
     executor.add_node(sender)
-    while sender.outcome is None:
-        executor.spin_once(timeout_sec=0.1)
-    rclpy.shutdown()
+    print(f"{sender.name}: waiting for the simulation, which answers at its next tick", flush=True)
+    with suppress(KeyboardInterrupt):
+        while sender.outcome is None:
+            executor.spin_once(timeout_sec=0.1)
+    if sender.outcome is None:
+        sys.exit("interrupted: no answer yet (is the node there, and not paused?)")
     if not sender.outcome.accepted:
         sys.exit(f"refused at tick {sender.outcome.tick}: {sender.outcome.reason}")
     print(f"applied at tick {sender.outcome.tick}")

@@ -39,7 +39,6 @@ def generate_launch_description() -> LaunchDescription:
         executable="plc_node",
         name="plc_node",
         output="screen",
-        parameters=[{"duration": given["duration"]}],
         condition=IfCondition(LaunchConfiguration("controller")),
     )
     # Without the simulation there is nothing left to launch for.

@@ -103,9 +103,13 @@ class Outputs:
         """Writes the outcomes of the tick's commands, then every topic that is due; returns the outcomes."""
         outcomes = self._sim.take_outcomes()
         for outcome in outcomes:
-            self._hand_out("outcomes", self._header(outcome.tick), messages.outcome_message, outcome)
+            self.tell(outcome)
         self._write_state()
         return outcomes
+
+    def tell(self, outcome: CommandOutcome) -> None:
+        """Writes one outcome that belongs to no tick to come."""
+        self._hand_out("outcomes", self._header(outcome.tick), messages.outcome_message, outcome)
 
     def _write_state(self) -> None:
         header, now = self._header(self._sim.tick), Snapshot(self._sim)

@@ -60,12 +60,8 @@ class InfeedState:
         pitch = 2.0 * float(state.model.type_radius[self.kind]) + (self.infeed.gap or 0.0)
         advance = self.infeed.speed * tick
         ahead = 0.0
-        previous = np.flatnonzero(state.world.bottles.id == max(self.last, 0))
-        if self.last >= 0 and previous.size:
-            dx = float(state.world.bottles.x[previous[0]]) - self.infeed.position[0]
-            dy = float(state.world.bottles.y[previous[0]]) - self.infeed.position[1]
-            progress = dx * self.direction[0] + dy * self.direction[1]
-            ahead = progress - pitch - self.extra * self.infeed.speed
+        if self.fed:
+            ahead = self._progress(state, time) - pitch - self.extra * self.infeed.speed
             if ahead < 0.0:
                 self.blocked = self._late(time, pitch)
                 return False
@@ -76,6 +72,15 @@ class InfeedState:
             return False
         self.due = time
         return True
+
+    def _progress(self, state: State, time: float) -> float:
+        """How far the bottle fed last has come along the in-line, m; one that is gone goes on at its speed."""
+        slot = np.flatnonzero(state.world.bottles.id == self.last)
+        if not slot.size:
+            return self.infeed.speed * (time - self.due)
+        dx = float(state.world.bottles.x[slot[0]]) - self.infeed.position[0]
+        dy = float(state.world.bottles.y[slot[0]]) - self.infeed.position[1]
+        return dx * self.direction[0] + dy * self.direction[1]
 
     def _late(self, time: float, pitch: float) -> bool:
         if self.infeed.speed == 0.0:

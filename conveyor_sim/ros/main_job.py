@@ -24,6 +24,7 @@ from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.scene import load_scene
 
 LOOK = 0.05  # s of wall time between two looks at the processes
+CONTROLLED = ("feeder", "table")  # belts that plc_node commands unless its parameters say otherwise
 PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent once a second
 
 
@@ -35,6 +36,12 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
     """
     file = scene_path(scene_name).resolve()
     scene = load_scene(file, {"duration": duration} if duration is not None else None)
+    missing = [belt for belt in CONTROLLED if belt not in scene.belts]
+    if missing:
+        raise ConveyorError(
+            f"{file}: no belt {' and no belt '.join(missing)}, which the controller commands; "
+            f"without a controller: conveyor-sim run {scene_name}"
+        )
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         stack.enter_context(private_domain())

@@ -130,7 +130,7 @@ class PlcNode:
     def _require_belts(self, line: Any) -> None:
         for belt in (self._settings.feeder, self._settings.table):
             if speed_command(belt) not in line.command_names or count_signal(belt) not in line.signal_names:
-                belts = ", ".join(line.belts)
+                belts = ", ".join(line.belts) or "no belts"
                 raise ConveyorError(f"belt {belt!r}: not on the line {line.scene_name}, which has {belts}")
 
     def _on_line(self, line: Any) -> None:

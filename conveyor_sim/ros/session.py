@@ -23,6 +23,8 @@ class Session:
         """
         self.run_id = uuid.uuid4().hex
         self.bag = bag
+        self._sink = sink
+        self._frame_id = frame_id
         self.wall = 0.0  # s of wall time from the start of the first tick to the end of the last one
         self._first_tick_at: float | None = None
         self.simulation = Simulation(scene)
@@ -44,6 +46,12 @@ class Session:
         outcomes = self.outputs.after_tick()
         self.wall = time.monotonic() - self._first_tick_at
         return outcomes
+
+    def refuse(self, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str) -> None:
+        """Tell those who listen that a command came too late to be applied; the recording is closed by then."""
+        tick = self.simulation.tick
+        outcome = CommandOutcome(tick, source, names, values, accepted=False, reason=reason)
+        Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id).tell(outcome)
 
     def flush(self) -> None:
         """Hand what was recorded to the operating system. Raises BagError."""

@@ -127,8 +127,10 @@ class Stepper:
         """Hand a command to the simulation, which applies or refuses it at the start of the next tick."""
 
         def hand_over() -> None:
-            if self.failure or self._ended:  # there is no next tick, so there would be no outcome
-                self._refused(source, f"since {self._standstill()}; expected a reset")
+            if self.failure or self._ended:  # there is no next tick to refuse it
+                reason = f"{self._standstill()}; expected a reset"
+                self._refused(source, f"since {reason}")
+                self.session.refuse(names, values, source, reason)
             else:
                 self.session.simulation.command(names, values, source)
 

@@ -110,7 +110,7 @@ def _sentence(model: type[BaseModel], problem: ErrorDetails) -> str:
     if not loc:
         return f"{shown(value)} given, expected {fields_of(model)}"
     names = field_names(model)
-    if kind == "extra_forbidden":
+    if kind in ("extra_forbidden", "invalid_key"):
         return _unknown(str(loc[0]), list(names))
     field = names[str(loc[0])]
     if kind == "missing":

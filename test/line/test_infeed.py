@@ -45,6 +45,13 @@ def clearances(sim: Simulation) -> np.ndarray:
     return np.hypot(x[i] - x[j], y[i] - y[j]) - 2.0 * RADIUS
 
 
+def test_a_bottle_that_is_removed_at_once_does_not_hurry_the_in_line() -> None:
+    """An outfeed within a pitch of the infeed: still one bottle every pitch / speed."""
+    gap, region = 0.01, [[0.05, -1.0], [1.0, -1.0], [1.0, 1.0], [0.05, 1.0]]
+    sim = infeed(gap=gap, outfeeds={"out": {"region": region}})
+    assert len(fed_at(sim, 200)) == 1 + int(SPEED * 2.0 / (2.0 * RADIUS + gap))
+
+
 @pytest.mark.parametrize("gap", [0.0, 0.001, 0.05])
 @pytest.mark.parametrize("direction", [0.0, 0.6])
 def test_packed_bottles_follow_each_other_at_the_gap(gap: float, direction: float) -> None:

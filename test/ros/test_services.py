@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from conveyor_msgs import srv
-from conveyor_msgs.msg import Line, Result, SimulationState
+from conveyor_msgs.msg import CommandOutcome, Line, Result, SimulationState
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -142,11 +142,16 @@ def test_at_the_end_it_pauses_until_a_reset(line: LineClient, shared_node: Child
     for result in (step(line, 1), set_state(line, PLAYING)):
         assert f"the run has ended at tick {LAST}" in result.error_message
     assert not line.call(Trigger, "resume").success
+    outcomes = line.listen(CommandOutcome, "outcomes")
     speed = line.publisher(Float64, "belts/feeder/cmd_speed", "cmd_speed")
     speed.publish(Float64(data=0.25))
     until(
         lambda: "cmd_speed refused since the run has ended" in shared_node.log.read_text(), "the refusal of a command"
     )
+    until(lambda: len(outcomes.messages) == 1, "its outcome")
+    told = outcomes.messages[0]
+    assert (told.tick, told.accepted) == (LAST, False)
+    assert told.reason == f"the run has ended at tick {LAST}; expected a reset"
     line.reset()
     line.step(1)
     assert tick(line) == 1
