@@ -4,12 +4,12 @@ What no scene asks for is absent: its arrays are None and its branch is not comp
 says whether and why; `model.py` builds its arrays; its law is one file in `engine/`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from conveyor_sim.laws import base_friction
 from conveyor_sim.scene.geometry import ArcPiece, initial_bottles, rail_shapes
-from conveyor_sim.scene.schema import CurvedBelt, Scene, Single
+from conveyor_sim.scene.schema import Contact, CurvedBelt, Scene, Single
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,20 @@ def _arcs(scene: Scene) -> str | None:
     return None
 
 
+def _contacts_in_use(scene: Scene) -> Iterator[tuple[int, Contact]]:
+    """The contacts between materials that can meet here: bottles if there are several, bottles and rails."""
+    bottles = {kind.material for kind in scene.bottle_types.values()}
+    rails = {rail.material for rail in rail_shapes(scene)}
+    for index, contact in enumerate(scene.contacts):
+        a, b = contact.between
+        of_bottles = {a, b} <= bottles and _pairs(scene) is not None
+        if of_bottles or (a in bottles and b in rails) or (b in bottles and a in rails):
+            yield index, contact
+
+
 def _damping(law: str) -> Callable[[Scene], str | None]:
     def called_for(scene: Scene) -> str | None:
-        for index, contact in enumerate(scene.contacts):
+        for index, contact in _contacts_in_use(scene):
             if contact.damping.law == law and contact.damping.coefficient > 0.0:
                 return f"contacts.{index}.damping: {contact.damping.coefficient:g} kg/s"
         return None
@@ -84,7 +95,7 @@ def _damping(law: str) -> Callable[[Scene], str | None]:
 
 
 def _contact_friction(scene: Scene) -> str | None:
-    for index, contact in enumerate(scene.contacts):
+    for index, contact in _contacts_in_use(scene):
         if contact.friction > 0.0:
             return f"contacts.{index}.friction: {contact.friction:g}"
     return None

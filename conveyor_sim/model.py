@@ -24,6 +24,7 @@ from conveyor_sim.timestep import (
     lattice_bound,
     steps_per_tick,
 )
+from conveyor_sim.version import __version__, sources_hash
 
 SKIN = 0.2
 """Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""
@@ -124,7 +125,10 @@ def build_model(scene: Scene) -> Model:
         base_friction=friction,
         gravity=scene.gravity,
         engine_hash=ENGINE_HASH,
-        versions=tuple(f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy")),
+        versions=(
+            f"conveyor_sim={__version__}+{sources_hash()}",
+            *(f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy")),
+        ),
         machine=_machine(),
     )
 
@@ -171,12 +175,14 @@ def _contact_friction_bounds(
     """Friction in contacts, at the force with which a single-file queue of all bottles presses."""
     most = most_bottles(scene)
     queue = ENDLESS_QUEUE if most is None else most
+    # Which types queue behind which is not known: the heaviest may press on the lightest.
+    heaviest = max(kind.mass for kind in scene.bottle_types.values())
     candidates = []
     for a, kind in enumerate(scene.bottle_types.values()):
         tables = [law.friction[a] for law in (pairs, rails) if law is not None and law.friction is not None]
         mu = max((float(table.max()) for table in tables), default=0.0)
         if mu > 0.0:
-            force = queue * base_mu * kind.mass * scene.gravity
+            force = queue * base_mu * heaviest * scene.gravity
             dt = contact_friction_bound(mu, force, kind.mass, kind.moment_of_inertia, kind.radius, scene.slip_limit)
             candidates.append(
                 (

@@ -239,8 +239,8 @@ class Simulation:
             self._state.make_lists()
             phase = RESUME
         bottles = self._state.world.bottles
-        if not math.isfinite(bottles.x.sum() + bottles.y.sum() + bottles.vx.sum() + bottles.vy.sum()):
-            bad = ~np.isfinite(bottles.x + bottles.y + bottles.vx + bottles.vy)
+        bad = ~np.isfinite(bottles.x + bottles.y + bottles.vx + bottles.vy)
+        if bad.any():
             raise SimulationError(
                 f"bottle {bottles.id[bad].min()} has no finite position or velocity "
                 f"after the tick that began at {self.time:g} s: "

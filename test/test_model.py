@@ -53,8 +53,8 @@ def test_bounds_take_the_tightest_of_types_and_materials() -> None:
     assert without["base friction"] == pytest.approx(0.01 / (0.7 * 9.81) / 20)
     railed = bounds(**fields, rails={"edge": segment((0.0, 6.0), (1.0, 6.0))})
     assert railed["contact time"] == pytest.approx(math.pi * math.sqrt(0.02 / 90e3) / 20)
-    # Two bottles press with 2 mu m g; the light one turns more easily, 1/m + R^2/J = 50 + 90.
-    force = 2 * 0.7 * 0.02 * 9.81
+    # Two bottles press with at most 2 mu m g of the heavy one; the light one turns more easily, 1/m + R^2/J = 50 + 90.
+    force = 2 * 0.7 * MASS * 9.81
     assert railed["contact friction"] == pytest.approx(0.01 / (2 * 0.3 * (50 + 90) * force))
 
 
@@ -92,7 +92,7 @@ def test_types_and_names_are_in_the_scenes_order() -> None:
     assert model.rails == ("right", "left", "outer", "inner", "fence", "bend_inner", "bend_outer")
     assert (model.name, model.tick_ns, model.integrator) == ("test", 10_000_000, "semi_implicit_euler")
     assert model.engine_hash == ENGINE_HASH
-    assert [entry.split("=")[0] for entry in model.versions] == ["numba", "llvmlite", "numpy"]
+    assert [entry.split("=")[0] for entry in model.versions] == ["conveyor_sim", "numba", "llvmlite", "numpy"]
     assert model.machine
     assert model.has("rotation")
     assert not build_model(scene(bottles=TWO[:1])).has("rotation")

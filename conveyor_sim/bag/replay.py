@@ -44,9 +44,12 @@ class _Messages:
 
     def __init__(self, bag: Bag, topic: str) -> None:
         self.topic = topic
-        self._source: Iterator[Any] = (frame.data for frame in bag.messages(topic))
+        # A second line begins another run, after a reset.
+        lines = [log_time for _, log_time, _ in bag.raw({"line"})]
+        end = lines[1] if len(lines) > 1 else None
+        raw = bag.raw({topic})
+        self._source: Iterator[Any] = (bag.decode(topic, data) for _, time, data in raw if end is None or time < end)
         self._next = next(self._source, None)
-        self._several_runs = bag.counts.get("line", 0) > 1
 
     @property
     def next_tick(self) -> int | None:
@@ -58,8 +61,6 @@ class _Messages:
         while self._next is not None and self._next.tick <= tick:
             message = self._next
             self._next = next(self._source, None)
-            if self._several_runs and self._next is not None and self._next.tick < message.tick:
-                self._next = None  # a reset: another run begins, which has a line of its own
             yield message
 
 
@@ -132,6 +133,8 @@ class _Replay:
         replayed = [Outcome(o.source, o.names, o.values, o.accepted, o.reason) for o in self._sim.take_outcomes()]
         if self._outcomes is not None:
             self._compared["outcomes"] = self._compared.get("outcomes", 0) + len(recorded)
+        else:
+            return None
         tick = self._sim.tick - 1
         return outcome_difference(tick, self._bag.time(tick), recorded, replayed)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
+from importlib.metadata import distributions
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
@@ -17,9 +18,12 @@ SEPARATOR = "=" * 80 + "\n"
 
 
 def default_distro() -> str:
-    """The sourced ROS 2 distribution if it is one of DISTROS, else "jazzy"."""
+    """The ROS 2 distribution that is sourced, or installed as wheels, if it is one of DISTROS; else "jazzy"."""
     sourced = os.environ.get("ROS_DISTRO", "")
-    return sourced if sourced in DISTROS else "jazzy"
+    if sourced in DISTROS:
+        return sourced
+    installed = [distro for distro in DISTROS if any(True for _ in distributions(name=f"ros-{distro}-rclpy"))]
+    return installed[0] if installed else "jazzy"
 
 
 @lru_cache(maxsize=len(DISTROS))

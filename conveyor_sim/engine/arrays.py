@@ -152,7 +152,7 @@ class Near(NamedTuple):
 
 
 class RailContacts(NamedTuple):
-    """Scratch: the contacts of one bottle with rails, (16,)."""
+    """Scratch: the contacts of one bottle with rails, (MOST_CONTACTS,)."""
 
     nx: F8
     ny: F8

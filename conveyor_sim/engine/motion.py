@@ -7,7 +7,9 @@ from .compile import copy, kernel
 from .neighbours import moved_too_far, rebuild
 
 TINY = 1e-100
-"""m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
+"""m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0.
+
+The tests are `<=`, so that what is not a number stays so and is found."""
 
 
 @kernel
@@ -16,12 +18,12 @@ def kick(bottles: Bottles, spin: Any, load: Load, dt: float) -> None:
     for i in range(bottles.x.size):
         vx = bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i])
         vy = bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i])
-        bottles.vx[i] = vx if abs(vx) > TINY else 0.0
-        bottles.vy[i] = vy if abs(vy) > TINY else 0.0
+        bottles.vx[i] = 0.0 if abs(vx) <= TINY else vx
+        bottles.vy[i] = 0.0 if abs(vy) <= TINY else vy
     if spin is not None:
         for i in range(bottles.x.size):
             omega = spin.omega[i] + dt * (spin.moment[i] * spin.inverse_inertia[i])
-            spin.omega[i] = omega if abs(omega) > TINY else 0.0
+            spin.omega[i] = 0.0 if abs(omega) <= TINY else omega
 
 
 @kernel

@@ -9,23 +9,31 @@ from .contact import contact_force
 from .segment import segment_contact
 from .shares import share_overlaps
 
-MOST_CONTACTS = 16
-"""Of one bottle with rails at a time; more could only be rails drawn one over the other."""
+MOST_CONTACTS = 32
+"""Of one bottle with rails at a time, the deepest ones; as many touch only in a pocket drawn as a fine polyline."""
 
 
 @kernel
 def _keep(
     found: RailContacts, count: int, overlap: float, nx: float, ny: float, material: int, rail: int, surface: int
 ) -> int:
-    if overlap <= 0.0 or count >= MOST_CONTACTS:
+    if overlap <= 0.0:
         return count
-    found.overlap[count] = overlap
-    found.nx[count] = nx
-    found.ny[count] = ny
-    found.material[count] = material
-    found.rail[count] = rail
-    found.surface[count] = surface
-    return count + 1
+    place = count
+    if count == MOST_CONTACTS:
+        place = 0
+        for c in range(1, count):
+            if found.overlap[c] < found.overlap[place]:
+                place = c
+        if overlap <= found.overlap[place]:
+            return count
+    found.overlap[place] = overlap
+    found.nx[place] = nx
+    found.ny[place] = ny
+    found.material[place] = material
+    found.rail[place] = rail
+    found.surface[place] = surface
+    return min(count + 1, MOST_CONTACTS)
 
 
 @kernel

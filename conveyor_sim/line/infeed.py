@@ -11,6 +11,9 @@ from conveyor_sim.state import State
 CLEAR = 1e-9
 """m; bottles one gap of 0 apart touch, and rounding must not block them."""
 
+ROUNDING = 1e-9
+"""s; sums of 1 / rate must not miss the tick they fall on."""
+
 LATE = 2.0
 """Of the time a bottle takes to enter from a moving in-line: after that without one, the infeed is blocked."""
 
@@ -89,7 +92,7 @@ class InfeedState:
 
     def _feed_rate(self, state: State, time: float) -> bool:
         rate = self.infeed.rate or 0.0
-        if time < self.due + self.extra:
+        if time < self.due + self.extra - ROUNDING:
             return False
         if not self._enter(state, 0.0):
             self.blocked = True

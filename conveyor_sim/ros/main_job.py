@@ -46,7 +46,8 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
         stop = stack.enter_context(StopRequest())
         stack.enter_context(private_domain())
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_")))
-        stack.callback(_keep_logs, logs, bag)
+        if not bag.exists():
+            stack.callback(_keep_logs, logs, bag)
         observer = stack.enter_context(Observer(scene.duration_ticks))
         environment = {**os.environ, "ROS_LOG_DIR": str(logs / "ros"), "PYTHONUNBUFFERED": "1"}
         node_parameters = {

@@ -31,8 +31,8 @@ T = TypeVar("T")
 UNSUPPORTED, OK, INCORRECT_STATE, OPERATION_FAILED = 0, 1, 3, 4
 # simulation_interfaces/srv/SetSimulationState
 ALREADY_IN_TARGET_STATE, STATE_TRANSITION_ERROR = 101, 102
-# simulation_interfaces/msg/SimulatorFeatures: reset (of time, of state), state getting, setting and pausing, stepping
-FEATURES = (20, 21, 22, 24, 25, 26, 31, 32)
+# simulation_interfaces/msg/SimulatorFeatures: reset (of all at once), state getting, setting and pausing, stepping
+FEATURES = (20, 24, 25, 26, 31, 32)
 # simulation_interfaces/srv/ResetSimulation
 SCOPE_DEFAULT, SCOPE_TIME, SCOPE_STATE = 0, 1, 2
 

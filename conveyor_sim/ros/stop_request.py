@@ -1,4 +1,7 @@
-"""Ctrl-C and SIGTERM as something to wait for: a KeyboardInterrupt is lost wherever Python ignores exceptions."""
+"""Ctrl-C, SIGTERM and a closed terminal as something to wait for.
+
+A KeyboardInterrupt would be lost wherever Python ignores exceptions.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import select
 import signal
 import socket
 from contextlib import AbstractContextManager
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopRequest(AbstractContextManager["StopRequest"]):
@@ -19,9 +24,7 @@ class StopRequest(AbstractContextManager["StopRequest"]):
         self._writer.setblocking(False)
         # Written to in C, whichever thread the signal meets: numpy and DDS have threads of their own.
         self._wakeup_before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
-        self._handlers_before = {
-            number: signal.signal(number, lambda _number, _frame: None) for number in (signal.SIGINT, signal.SIGTERM)
-        }
+        self._handlers_before = {number: signal.signal(number, lambda _number, _frame: None) for number in SIGNALS}
 
     @property
     def requested(self) -> bool:

@@ -24,7 +24,7 @@ problem is one line that names the file, the line, the field, the value and what
 - Numbers must be finite. Unknown fields and keys given twice are refused. YAML anchors and `<<` can be used.
 - Each pair of materials that can touch needs one entry in `contacts` (bottle and bottle, bottle and rail), each pair of
   bottle and belt one in `base`.
-- Where two rails end in the same point (within 1e-9 m), they are one surface. Rails of curved belts follow those under
+- Where a rail ends on another (within 1e-6 m), both are one surface. Rails of curved belts follow those under
   `rails` in the order of indices.
 - No bottle may be born inside a rail or another bottle; touching is allowed.
 """

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, bottle, contact, order, scene
+from scenes import MASS, RADIUS, bottle, contact, order, scene, simulation
 from worlds import FAR, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.errors import SimulationError
 from conveyor_sim.state import State
 
 K, C = 5000.0, 8.0
@@ -96,3 +97,11 @@ def test_a_bottle_at_rest_comes_to_rest(integrator: str) -> None:
     state.make_lists()
     INTEGRATORS[integrator](state.world, 1, 1e-3, START)
     assert bottles.vx[1] == 0.0
+
+
+def test_what_is_not_a_number_does_not_come_to_rest() -> None:
+    """Tiny speeds are set to 0; a NaN must survive that, or nobody would find it."""
+    sim = simulation(contacts=[contact(K)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)])
+    sim._state.world.bottles.vx[1] = np.nan
+    with pytest.raises(SimulationError, match="bottle 1 has no finite position or velocity"):
+        sim.advance()

@@ -55,8 +55,8 @@ def test_it_starts_paused_when_asked_to(line: LineClient) -> None:
 
 def test_features_tell_what_is_served(line: LineClient) -> None:
     response = line.call(srv.GetSimulatorFeatures, "get_simulator_features")
-    reset_all, reset_time, reset_state, get, put, pause, single, multiple = 20, 21, 22, 24, 25, 26, 31, 32
-    assert set(response.features) == {reset_all, reset_time, reset_state, get, put, pause, single, multiple}
+    reset_all, get, put, pause, single, multiple = 20, 24, 25, 26, 31, 32
+    assert set(response.features) == {reset_all, get, put, pause, single, multiple}
     assert "conveyor_sim" in response.custom_info
 
 
