@@ -138,17 +138,24 @@ def _copy(salvage: Salvage, copy: McapFile) -> None:
     """Copies messages with their times, topics and types; rosbag2's own record is left to be written anew."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, int] = {}
+    nameless = 0
     for record in salvage.records():
         if isinstance(record, SchemaRecord):
             schemas[record.id] = Schema(record.name, record.encoding, record.data)
-        elif isinstance(record, Channel) and record.id not in channels:
-            schema = schemas[record.schema_id]
-            channels[record.id] = copy.add_topic(record.topic, schema, record.message_encoding, record.metadata)
+        elif isinstance(record, Channel):
+            if record.id not in channels and record.schema_id in schemas:
+                schema = schemas[record.schema_id]
+                channels[record.id] = copy.add_topic(record.topic, schema, record.message_encoding, record.metadata)
         elif isinstance(record, Message):
-            channel = channels[record.channel_id]
-            copy.add_message(channel, record.data, record.log_time, record.publish_time, record.sequence)
+            if record.channel_id in channels:
+                channel = channels[record.channel_id]
+                copy.add_message(channel, record.data, record.log_time, record.publish_time, record.sequence)
+            else:
+                nameless += 1
         elif isinstance(record, Metadata) and record.name != RECORD_NAME:
             copy.add_metadata(record.name, record.metadata)
+    if nameless:
+        salvage.damage.append(f"{nameless} messages were left out: the chunk that names their topics is damaged")
 
 
 def _put_in_place(file: Path) -> Path:

@@ -9,13 +9,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from bag.small_line import SMALL_LINE
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
+from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
 
 Make = Callable[[str, int], Path]
 TICKS = 60
@@ -113,6 +118,31 @@ def test_cut_chunk_yields_the_messages_that_were_written_of_it(record_line: Make
     assert any("the last chunk was cut" in sentence for sentence in report.damage)
     assert report.message_count > sum(index.message_index_length > 0 for index in summary.chunk_indexes[:-1])
     whole(folder)
+
+
+def test_a_damaged_first_chunk_takes_along_the_messages_whose_topics_it_names(tmp_path: Path) -> None:
+    """Two flushes make two chunks; a byte of the first one is wrong, and the file's end is missing."""
+    folder = tmp_path / "bad"
+    simulation = Simulation(load_scene(SMALL_LINE))
+    with Recorder(folder) as recorder:
+        outputs = Outputs(simulation, [recorder], run_id="run")
+        outputs.start()
+        for _ in range(2):
+            recorder.flush()
+            for _ in range(20):
+                simulation.advance()
+                outputs.after_tick()
+    file = next(folder.glob("*.mcap"))
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    first, last = summary.chunk_indexes[0], summary.chunk_indexes[-1]
+    content = bytearray(file.read_bytes())[: last.chunk_start_offset + last.chunk_length]
+    content[first.chunk_start_offset + first.chunk_length - 5] ^= 0xFF
+    file.write_bytes(content)
+    (folder / "metadata.yaml").unlink()
+    with pytest.raises(BagError, match="not one whole message"):
+        recover(folder)
 
 
 def test_only_the_index_missing_loses_nothing(record_line: Make) -> None:
