@@ -21,6 +21,7 @@ from conveyor_sim.timestep import (
     base_friction_bound,
     contact_bound,
     contact_friction_bound,
+    damping_bound,
     lattice_bound,
     steps_per_tick,
 )
@@ -146,19 +147,23 @@ def _bounds(scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base: F8
 
     contacts = []
     lattices = []
+    dashpots = []
     for a, _ in enumerate(types):
         for b, _ in enumerate(types):
             if pairs is not None and pairs.stiffness[a, b] > 0.0:
                 k, reduced = float(pairs.stiffness[a, b]), float(mass[a] * mass[b] / (mass[a] + mass[b]))
                 contacts.append((contact_bound(k, reduced), f"20 steps a contact of two bottles at k = {k:g} N/m"))
                 lattices.append((lattice_bound(k, 2.0 * reduced), f"a hexagonal packing at k = {k:g} N/m"))
+                dashpots += [(c, reduced) for c in _dampings(pairs, a, b)]
         if rails is not None:
-            for k in rails.stiffness[a]:
+            for material, k in enumerate(rails.stiffness[a]):
                 if k > 0.0:
                     reason = f"20 steps a contact of a bottle and a rail at k = {k:g} N/m"
                     contacts.append((contact_bound(float(k), float(mass[a])), reason))
+                    dashpots += [(c, float(mass[a])) for c in _dampings(rails, a, material)]
     tightest("contact time", contacts)
     tightest("lattice stability", lattices)
+    tightest("damping", [(damping_bound(c, reduced), f"m_r / (2 c) at c = {c:g} kg/s") for c, reduced in dashpots])
     if base is not None:
         mu = float(base.max())
         tightest(
@@ -167,6 +172,12 @@ def _bounds(scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base: F8
         )
         tightest("contact friction", _contact_friction_bounds(scene, pairs, rails, mu))
     return tuple(found)
+
+
+def _dampings(law: PairLaw | RailLaw, row: int, column: int) -> list[float]:
+    """Damping coefficients of one pair that are not 0, kg/s."""
+    tables = [table for table in (law.damping_paper, law.damping_normal) if table is not None]
+    return [float(table[row, column]) for table in tables if table[row, column] > 0.0]
 
 
 def _contact_friction_bounds(

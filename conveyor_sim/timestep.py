@@ -36,6 +36,11 @@ def lattice_bound(stiffness: float, mass: float) -> float:
     return 2.0 / math.sqrt(6.0 * stiffness / mass)
 
 
+def damping_bound(coefficient: float, reduced_mass: float) -> float:
+    """Half of m_r / c, the time in which a dashpot alone stops two bottles, s; explicit steps of 2 m_r / c diverge."""
+    return 0.5 * reduced_mass / coefficient
+
+
 def base_friction_bound(friction: float, gravity: float, slip_limit: float) -> float:
     """Step that takes STEPS_PER_SLIP to v_lim / (mu g), s; beyond that time explicit friction chatters."""
     return slip_limit / (friction * gravity) / STEPS_PER_SLIP

@@ -10,6 +10,7 @@ from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, line, p
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.laws import base_friction
 from conveyor_sim.model import build_model
+from conveyor_sim.simulation import Simulation
 
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]
 
@@ -31,6 +32,7 @@ def test_bounds_of_the_papers_test_case() -> None:
     assert found == {
         "contact time": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
         "lattice stability": pytest.approx(2.0 / math.sqrt(6.0 * 5e3 / MASS)),
+        "damping": pytest.approx(0.5 * (MASS / 2) / 0.1),
         "base friction": pytest.approx(0.01 / (0.4 * 9.81) / 20),
         "contact friction": pytest.approx(MASS * 0.01 / (4 * 0.1 * (100 * 0.4 * MASS * 9.81))),
     }
@@ -171,3 +173,13 @@ def test_a_large_plant_gets_a_grid_of_bounded_size() -> None:
     model = build_model(scene(rails=rails, contacts=[contact(1e3, "steel")], bottles=[bottle(1.0, 1.0)]))
     assert model.grid is not None
     assert model.grid.columns * model.grid.rows < 300_000
+
+
+@pytest.mark.parametrize("law", ["paper", "normal"])
+@pytest.mark.parametrize("c", [50.0, 500.0, 2000.0])
+def test_a_strong_dashpot_shortens_the_step_until_it_holds(law: str, c: float) -> None:
+    """Two bottles at 1 m/s against each other: however strong the dashpot, they never leave faster than they came."""
+    pair = [bottle(0.0, 0.0, velocity=[0.5, 0.0]), bottle(0.14, 0.0, velocity=[-0.5, 0.0])]
+    sim = Simulation(scene(step={}, floor="none", contacts=[contact(5e3, damping=(law, c))], bottles=pair))
+    sim.advance(20)
+    assert abs(np.diff(sim.bottles().vx)[0]) <= 1.0

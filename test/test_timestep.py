@@ -10,6 +10,7 @@ from conveyor_sim.timestep import (
     contact_bound,
     contact_friction_bound,
     contact_time,
+    damping_bound,
     lattice_bound,
     steps_per_tick,
 )
@@ -21,6 +22,7 @@ def test_the_bounds_are_their_formulae() -> None:
     assert contact_time(k, m / 2) == pytest.approx(math.pi * math.sqrt(0.1 / k))
     assert contact_bound(k, m / 2) == pytest.approx(contact_time(k, m / 2) / 20)
     assert lattice_bound(k, m) == pytest.approx(2.0 / math.sqrt(6.0 * k / m))
+    assert damping_bound(0.1, m / 2) == pytest.approx(0.5 * (m / 2) / 0.1)
     assert base_friction_bound(0.4, 9.81, 0.01) == pytest.approx(0.01 / (0.4 * 9.81) / 20)
     # With J = m R^2 it is m v_lim / (4 mu N).
     force = 100 * 0.4 * m * 9.81
