@@ -306,7 +306,8 @@ class Stepper:
         for outcome in outcomes:
             if not outcome.accepted:
                 self._refused(outcome.source, f"at tick {outcome.tick}: {outcome.reason}")
-        if self._advance is not None or self.lockstep.owner:
+        in_lockstep = self._advance is not None and self._advance.paced
+        if in_lockstep or self.lockstep.owner:
             self._outcomes += outcomes
 
     def _refused(self, source: str, reason: str) -> None:
