@@ -53,7 +53,7 @@ def kernel(function: Function) -> Function:
     """Compile without the interpreter or its lock, cached on disk; IEEE arithmetic, no flag that reorders it.
 
     Kernels allocate nothing, so numba's reference counts (``_nrt``) are off: with them every column taken out of a
-    tuple is counted up and down inside the loops, and a dense table ran five times slower.
+    tuple is counted up and down inside the loops, which costs more than the arithmetic.
     """
     previous = _config.CACHE_DIR
     _config.CACHE_DIR = str(CACHE_DIR)
