@@ -1,6 +1,6 @@
 """Recorded lines run again to the same bits; where they do not, the first difference is found."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -156,6 +156,17 @@ def test_stock_recording_across_a_reset_replays_its_first_run(bag: Path, tmp_pat
     report = replay(stock(bag, tmp_path / "stock", iter(messages + messages)))
     assert report.difference is None
     assert report.compared["signals"] == 101
+
+
+def test_commands_after_a_reset_are_not_those_of_the_first_run(
+    bag: Path, record_line: Callable[[str, int], Path], tmp_path: Path
+) -> None:
+    """The first run ends at tick 10 with one command; those of the second, at ticks 3, 20 and 35, are not its own."""
+    with open_bag(record_line("short", 10)) as first, open_bag(bag) as second:
+        messages = [*first.raw(), *second.raw()]
+    report = replay(stock(bag, tmp_path / "stock", iter(messages)))
+    assert report.difference is None
+    assert (report.last_tick, report.compared["outcomes"]) == (10, 1)
 
 
 def test_stock_recording_that_began_late_replays_what_it_has(bag: Path, tmp_path: Path) -> None:

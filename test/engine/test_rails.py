@@ -15,6 +15,9 @@ from worlds import (
     rail_forces,
 )
 
+from conveyor_sim.engine.arrays import RailContacts
+from conveyor_sim.engine.rails import MOST_CONTACTS, _keep
+
 RANDOM = np.random.default_rng(20240229)
 ROUNDING = 1e-9
 """N: of forces of up to 65 N whose overlap is a difference of coordinates of some metres."""
@@ -238,3 +241,16 @@ def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
     assert np.all(np.isfinite(size))
     np.testing.assert_allclose(size[:-1], STIFFNESS * RADIUS, rtol=1e-6)
     assert 0.0 < size[-1] <= STIFFNESS * RADIUS
+
+
+def test_more_contacts_than_there_is_room_for_keep_the_deepest() -> None:
+    """Given in any order, the shallowest are the ones left out."""
+    whole, real = np.zeros(MOST_CONTACTS, np.uint32), np.zeros(MOST_CONTACTS)
+    found = RailContacts(*(real.copy() for _ in range(4)), *(whole.copy() for _ in range(3)), real.copy())
+    overlaps = np.random.default_rng(1).permutation(np.arange(1.0, MOST_CONTACTS + 9.0))
+    count = 0
+    for overlap in overlaps:
+        count = _keep(found, count, overlap, 1.0, 0.0, 0, int(overlap), 0)
+    assert count == MOST_CONTACTS
+    assert sorted(found.overlap) == list(np.arange(9.0, MOST_CONTACTS + 9.0))
+    np.testing.assert_array_equal(found.rail, found.overlap)
