@@ -1,5 +1,6 @@
 # make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., one with belts feeder and table; DISTRO=kilted)
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
+# make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
 # make lint    style and types
 # make clean   removes what set-up and builds made, never runs/
 
@@ -16,7 +17,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test lint clean set-up set-up-test
+.PHONY: help run test bench lint clean set-up set-up-test set-up-bench
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -26,6 +27,9 @@ run: set-up
 
 test: set-up-test
 	@$(PYTHON) -m pytest $(ARGS)
+
+bench: set-up-bench
+	@$(PYTHON) -m bench $(ARGS)
 
 lint: set-up-test
 	@$(PYTHON) -m ruff check .
@@ -37,6 +41,9 @@ set-up:
 
 set-up-test:
 	@sh tools/set_up.sh "$(DISTRO)" test
+
+set-up-bench:
+	@sh tools/set_up.sh "$(DISTRO)" bench
 
 clean:
 	rm -rf .venv .venv-kilted build install log dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -45,7 +45,7 @@ setup(
     zip_safe=False,
     python_requires=">=3.10",
     install_requires=requirements("run"),
-    extras_require={"plot": requirements("plot")},
+    extras_require={"plot": requirements("plot"), "bench": requirements("bench")},
     entry_points={
         "console_scripts": [
             "conveyor-sim = conveyor_sim.cli:main",

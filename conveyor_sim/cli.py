@@ -1,4 +1,4 @@
-"""The command `conveyor-sim`: check, run, plot, replay and recover. Errors are one sentence, without a traceback."""
+"""The command `conveyor-sim`: check, explain, run, plot, replay, recover. Errors are one sentence, no traceback."""
 
 from __future__ import annotations
 
@@ -62,10 +62,43 @@ def check(scene: str, out: Path) -> None:
 
 @main.command()
 @click.argument("scene")
+@click.option("--price", is_flag=True, help="Measure what each effect costs, in ns per bottle and step.")
+@click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
+def explain(scene: str, price: bool, at: float | None) -> None:
+    """Tell why SCENE is simulated as it is: which effects are on, what bounds the time step; with --price, the cost."""
+    from conveyor_sim.explain import explanation, price_table
+    from conveyor_sim.model import build_model
+    from conveyor_sim.resources import scene_path
+    from conveyor_sim.scene import load_scene
+
+    loaded = load_scene(scene_path(scene))
+    if at is not None and not (price and 0.0 < at <= loaded.duration):
+        raise ConveyorError(f"--at: {at:g} given, expected --price and a time of at most {loaded.duration:g} (s)")
+    _print(explanation(loaded, build_model(loaded)))
+    if not price:
+        return
+    from conveyor_sim.price import Pricing
+    from conveyor_sim.simulation import compile_kernels
+
+    with told_if_long(COMPILING):
+        compile_kernels(loaded)
+    pricing = Pricing(loaded, at)
+    with ProgressBar(f"{loaded.name}, to a warm state", 0.0) as bar:
+        pricing.warm_up(bar.update)
+    with ProgressBar("compiling without each effect", 0.0, counted="variants") as bar:
+        pricing.prepare(bar.update)
+    with ProgressBar("with and without, in turn", 0.0, counted="measurements") as bar:
+        prices = pricing.measure(bar.update)
+    _print(price_table(prices))
+
+
+@main.command()
+@click.argument("scene")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
-def run(scene: str, out: Path | None, duration: float | None, no_record: bool) -> None:
+@click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
+def run(scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
     from conveyor_sim.bag.recorder import new_run_folder
     from conveyor_sim.report import report
@@ -79,7 +112,7 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool) -
     with told_if_long(COMPILING):
         compile_kernels(loaded)
     with ProgressBar(loaded.name, loaded.duration) as bar:
-        done = run_scene(loaded, folder, bar.update)
+        done = run_scene(loaded, folder, bar.update, threads)
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:

@@ -1,23 +1,48 @@
-"""The tables of contact and friction constants by bottle type, from the scene's pairs of materials."""
+"""The columns of contact and friction coefficients by bottle type, from the scene's pairs of materials."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8, PairLaw, RailLaw
-from conveyor_sim.scene.schema import Contact, Floor, Scene
+from conveyor_sim.engine.arrays import F8, I4, ContactLaw, Curves
+from conveyor_sim.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
+from conveyor_sim.scene.contacts import Contact
+from conveyor_sim.scene.schema import Floor, Scene
+
+NO_CURVE = -1
 
 
-def pair_law(scene: Scene) -> PairLaw:
-    """Constants of contact between bottle types, (T, T)."""
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """Coefficients of the laws that are on. T bottle types, M rail materials, H belts."""
+
+    pair: ContactLaw | None
+    """(T * T,), bottle and bottle; None if bottles do not touch bottles."""
+    rail: ContactLaw | None
+    """(T * M,), bottle and rail; None without rails."""
+    curves: Curves | None
+    """The tables of contacts; None without."""
+    base_friction: F8 | None
+    """(H + 1, T), the floor last; None without friction under the bottles."""
+    base_radius: F8 | None
+    """(T,), m, of the ring that a type stands on, 0 for a point; None if all stand on points."""
+
+
+def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str]) -> Laws:
+    """The columns for the effects in `on`."""
     materials = [kind.material for kind in scene.bottle_types.values()]
-    return PairLaw(*_contact_tables(scene, materials, materials))
-
-
-def rail_law(scene: Scene, rail_materials: Sequence[str]) -> RailLaw:
-    """Constants of contact between bottle types and rail materials, (T, M)."""
-    materials = [kind.material for kind in scene.bottle_types.values()]
-    return RailLaw(*_contact_tables(scene, materials, rail_materials))
+    masses = np.array([kind.mass for kind in scene.bottle_types.values()])
+    reduced = masses[:, None] * masses / (masses[:, None] + masses)
+    against_rails = np.repeat(masses[:, None], len(rail_materials), axis=1)
+    rails = "segment_rails" in on or "arc_rails" in on
+    return Laws(
+        pair=_columns(scene, materials, materials, reduced, on) if "bottle_contact" in on else None,
+        rail=_columns(scene, materials, rail_materials, against_rails, on) if rails else None,
+        curves=_curves(scene) if "table" in on else None,
+        base_friction=base_friction(scene) if "base_friction" in on else None,
+        base_radius=base_radius(scene) if "ring_base" in on else None,
+    )
 
 
 def base_friction(scene: Scene) -> F8:
@@ -35,26 +60,91 @@ def base_friction(scene: Scene) -> F8:
     return table
 
 
-def _contact_tables(
-    scene: Scene, rows: Sequence[str], columns: Sequence[str]
-) -> tuple[F8, F8 | None, F8 | None, F8 | None]:
-    """Stiffness, friction, paper damping, normal damping; None where all are 0. Pairs that never meet get 0."""
-    given = {frozenset(contact.between): contact for contact in scene.contacts}
+def base_radius(scene: Scene) -> F8:
+    """Radius of the ring that each bottle type stands on, (T,), m; 0 for a point."""
+    return np.array([kind.base_radius or 0.0 for kind in scene.bottle_types.values()])
 
-    def table(value: Callable[[Contact], float]) -> F8:
-        found = [[given.get(frozenset((a, b))) for b in columns] for a in rows]
-        return np.array([[value(contact) if contact else 0.0 for contact in row] for row in found])
 
-    def damping(law: str) -> F8 | None:
-        return _or_none(table(lambda contact: contact.damping.coefficient if contact.damping.law == law else 0.0))
+def damping_effect(contact: Contact) -> str | None:
+    """The effect that a contact's damping is, None if it has none: `normal` with restitution on Hertz is Tsuji's."""
+    damping = contact.damping
+    if damping.law == "none" or (damping.restitution is None and damping.coefficient == 0.0):
+        return None
+    if damping.restitution == 1.0:
+        return None
+    if damping.law == "normal" and damping.restitution is not None and contact.hertz_stiffness is not None:
+        return "tsuji_damping"
+    return f"{damping.law}_damping"
 
-    return (
-        table(lambda contact: contact.stiffness),
-        _or_none(table(lambda contact: contact.friction)),
-        damping("paper"),
-        damping("normal"),
+
+def damping_coefficient(contact: Contact, reduced_mass: float) -> float:
+    """Coefficient of a contact's damping, in the unit of its law: as given, or from the restitution."""
+    damping, e = contact.damping, contact.damping.restitution
+    if e is None:
+        return damping.coefficient
+    if damping.law == "onset":
+        return onset_damping(e, damping.speed or 1.0)
+    if contact.hertz_stiffness is not None:
+        return tsuji_damping(e, contact.hertz_stiffness, reduced_mass)
+    solve = paper_damping if damping.law == "paper" else normal_damping
+    return solve(e, contact.stiffness or 0.0, reduced_mass)
+
+
+def _columns(
+    scene: Scene, rows: Sequence[str], columns: Sequence[str], reduced_mass: F8, on: Collection[str]
+) -> ContactLaw:
+    """Flat columns over materials in rows and columns; pairs that never meet get 0. reduced_mass: (rows, columns)."""
+    given = {frozenset(contact.between): index for index, contact in enumerate(scene.contacts)}
+    found = [given.get(frozenset((a, b)), -1) for a in rows for b in columns]
+    curve_of = {index: curve for curve, index in enumerate(_with_table(scene))}
+
+    def column(effect: str, value: Callable[[Contact, float], float | None]) -> F8 | None:
+        if effect not in on:
+            return None
+        entries = [
+            (value(scene.contacts[index], mass) or 0.0) if index >= 0 else 0.0
+            for index, mass in zip(found, reduced_mass.ravel().tolist(), strict=True)
+        ]
+        return np.array(entries) if any(entries) else None
+
+    def damping(effect: str) -> F8 | None:
+        return column(
+            effect,
+            lambda contact, mass: damping_coefficient(contact, mass) if damping_effect(contact) == effect else 0.0,
+        )
+
+    return ContactLaw(
+        stiffness=column("linear", lambda contact, _: contact.stiffness),
+        hertz=column("hertz", lambda contact, _: contact.hertz_stiffness),
+        curve=_curve_column([curve_of.get(index, NO_CURVE) for index in found]) if "table" in on else None,
+        damping_paper=damping("paper_damping"),
+        damping_normal=damping("normal_damping"),
+        damping_tsuji=damping("tsuji_damping"),
+        damping_onset=damping("onset_damping"),
+        friction=column("contact_friction", lambda contact, _: contact.friction),
+        tangential_stiffness=column(
+            "tangential_spring", lambda contact, _: contact.tangential.stiffness if contact.tangential else 0.0
+        ),
+        tangential_damping=column(
+            "tangential_spring", lambda contact, _: contact.tangential.damping if contact.tangential else 0.0
+        ),
     )
 
 
-def _or_none(table: F8) -> F8 | None:
-    return table if table.any() else None
+def _with_table(scene: Scene) -> list[int]:
+    return [index for index, contact in enumerate(scene.contacts) if contact.table is not None]
+
+
+def _curve_column(curves: Sequence[int]) -> I4 | None:
+    return np.array(curves, dtype=np.int32) if any(curve != NO_CURVE for curve in curves) else None
+
+
+def _curves(scene: Scene) -> Curves:
+    tables = [scene.contacts[index].table or () for index in _with_table(scene)]
+    whole = [points if points[0] == (0.0, 0.0) else ((0.0, 0.0), *points) for points in tables]
+    points = np.array([point for points in whole for point in points])
+    return Curves(
+        start=np.cumsum([0, *(len(points) for points in whole)]).astype(np.uint32),
+        overlap=points[:, 0].copy(),
+        force=points[:, 1].copy(),
+    )

@@ -1,37 +1,26 @@
 """Scene -> Model: the constant arrays, the chosen effects and why, the time step and its reason."""
 
 import platform
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
 import llvmlite.binding as llvm
 import numpy as np
 
-from conveyor_sim.effects import EffectChoice, choose_effects, most_bottles
-from conveyor_sim.engine.arrays import F8, Arcs, PairLaw, RailLaw, Segments, Settings, StaticGrid
+from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects
+from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
-from conveyor_sim.laws import base_friction, pair_law, rail_law
+from conveyor_sim.laws import build_laws
 from conveyor_sim.line.process_image import ProcessImage, process_image
 from conveyor_sim.plant import plant_grid, rail_arrays
+from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import (
-    Bound,
-    base_friction_bound,
-    contact_bound,
-    contact_friction_bound,
-    damping_bound,
-    lattice_bound,
-    steps_per_tick,
-)
+from conveyor_sim.timestep import Bound, steps_per_tick
 from conveyor_sim.version import __version__, sources_hash
 
 SKIN = 0.2
 """Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""
-
-ENDLESS_QUEUE = 100
-"""Bottles assumed to press on each other where an infeed has no end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +45,22 @@ class Model:
     """(T,), kg"""
     type_inertia: F8
     """(T,), kg m^2"""
+    type_base_radius: F8 | None
+    """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
     belt_shapes: tuple[BeltShape, ...]
     rail_shapes: tuple[RailShape, ...]
     process_image: ProcessImage
     settings: Settings
-    pair_law: PairLaw | None
-    rail_law: RailLaw | None
+    pair_law: ContactLaw | None
+    """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
+    rail_law: ContactLaw | None
+    """(T * M,), bottle and rail; None without rails."""
+    curves: Curves | None
+    """Tables of force against overlap; None where no contact has one."""
+    friction_curve: str
+    """`polynomial` or `atan`."""
+    friction_solver: str
+    """`explicit` or `implicit`."""
     segments: Segments | None
     arcs: Arcs | None
     grid: StaticGrid | None
@@ -72,7 +71,7 @@ class Model:
     versions: tuple[str, ...]
     machine: str
 
-    def has(self, effect: str) -> bool:
+    def has(self, effect: EffectName) -> bool:
         """Whether an effect is on."""
         return any(choice.on for choice in self.effects if choice.name == effect)
 
@@ -80,17 +79,15 @@ class Model:
 def build_model(scene: Scene) -> Model:
     """Build the Model of a valid scene."""
     effects = choose_effects(scene)
-    on = {effect.name for effect in effects if effect.on}
+    on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
     rails, belts = rail_shapes(scene), belt_shapes(scene)
     types = list(scene.bottle_types.values())
     rail_materials = sorted({rail.material for rail in rails})
     radius = np.array([kind.radius for kind in types])
-    pairs = pair_law(scene) if "bottle_contact" in on else None
-    rail_contact = rail_law(scene, rail_materials) if rails else None
-    friction = base_friction(scene) if "base_friction" in on else None
+    laws = build_laws(scene, rail_materials, on)
     skin = SKIN * float(radius.min())
     segments, arcs = rail_arrays(rails, rail_materials)
-    bounds = _bounds(scene, pairs, rail_contact, friction)
+    bounds = bounds_of(Terms(scene, laws, on))
     steps, reason = steps_per_tick(scene.tick, list(bounds), scene.step.per_tick)
     return Model(
         name=scene.name,
@@ -107,6 +104,7 @@ def build_model(scene: Scene) -> Model:
         type_radius=radius,
         type_mass=np.array([kind.mass for kind in types]),
         type_inertia=np.array([kind.moment_of_inertia for kind in types]),
+        type_base_radius=laws.base_radius,
         belt_shapes=tuple(belts),
         rail_shapes=tuple(rails),
         process_image=process_image(
@@ -117,13 +115,19 @@ def build_model(scene: Scene) -> Model:
             lever=1.0 if scene.lever_arm == "overlap" else 0.0,
             skin=skin,
             cell=2.0 * float(radius.max()) + skin,
+            rail_materials=len(rail_materials),
+            reach=2.0 * float(radius[0]),
+            atan=1 if "atan_friction" in on else None,
         ),
-        pair_law=pairs,
-        rail_law=rail_contact,
-        segments=segments,
-        arcs=arcs,
+        pair_law=laws.pair,
+        rail_law=laws.rail,
+        curves=laws.curves,
+        friction_curve="atan" if "atan_friction" in on else "polynomial",
+        friction_solver="implicit" if "implicit_friction" in on else "explicit",
+        segments=segments if "segment_rails" in on else None,
+        arcs=arcs if "arc_rails" in on else None,
         grid=plant_grid(rails, belts if "belts" in on else [], float(radius.max()), skin),
-        base_friction=friction,
+        base_friction=laws.base_friction,
         gravity=scene.gravity,
         engine_hash=ENGINE_HASH,
         versions=(
@@ -132,77 +136,6 @@ def build_model(scene: Scene) -> Model:
         ),
         machine=_machine(),
     )
-
-
-def _bounds(scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base: F8 | None) -> tuple[Bound, ...]:
-    """The bounds on dt that apply, each the tightest over types and materials."""
-    types = list(scene.bottle_types.values())
-    mass = np.array([kind.mass for kind in types])
-    found: list[Bound] = []
-
-    def tightest(name: str, candidates: Sequence[tuple[float, str]]) -> None:
-        if candidates:
-            dt, reason = min(candidates)
-            found.append(Bound(name, dt, reason))
-
-    contacts = []
-    lattices = []
-    dashpots = []
-    for a, _ in enumerate(types):
-        for b, _ in enumerate(types):
-            if pairs is not None and pairs.stiffness[a, b] > 0.0:
-                k, reduced = float(pairs.stiffness[a, b]), float(mass[a] * mass[b] / (mass[a] + mass[b]))
-                contacts.append((contact_bound(k, reduced), f"20 steps a contact of two bottles at k = {k:g} N/m"))
-                lattices.append((lattice_bound(k, 2.0 * reduced), f"a hexagonal packing at k = {k:g} N/m"))
-                dashpots += [(c, reduced) for c in _dampings(pairs, a, b)]
-        if rails is not None:
-            for material, k in enumerate(rails.stiffness[a]):
-                if k > 0.0:
-                    reason = f"20 steps a contact of a bottle and a rail at k = {k:g} N/m"
-                    contacts.append((contact_bound(float(k), float(mass[a])), reason))
-                    dashpots += [(c, float(mass[a])) for c in _dampings(rails, a, material)]
-    tightest("contact time", contacts)
-    tightest("lattice stability", lattices)
-    tightest("damping", [(damping_bound(c, reduced), f"m_r / (2 c) at c = {c:g} kg/s") for c, reduced in dashpots])
-    if base is not None:
-        mu = float(base.max())
-        tightest(
-            "base friction",
-            [(base_friction_bound(mu, scene.gravity, scene.slip_limit), f"20 steps in v_lim / (mu g) at mu = {mu:g}")],
-        )
-        tightest("contact friction", _contact_friction_bounds(scene, pairs, rails, mu))
-    return tuple(found)
-
-
-def _dampings(law: PairLaw | RailLaw, row: int, column: int) -> list[float]:
-    """Damping coefficients of one pair that are not 0, kg/s."""
-    tables = [table for table in (law.damping_paper, law.damping_normal) if table is not None]
-    return [float(table[row, column]) for table in tables if table[row, column] > 0.0]
-
-
-def _contact_friction_bounds(
-    scene: Scene, pairs: PairLaw | None, rails: RailLaw | None, base_mu: float
-) -> list[tuple[float, str]]:
-    """Friction in contacts, at the force with which a single-file queue of all bottles presses."""
-    most = most_bottles(scene)
-    queue = ENDLESS_QUEUE if most is None else most
-    # Which types queue behind which is not known: the heaviest may press on the lightest.
-    heaviest = max(kind.mass for kind in scene.bottle_types.values())
-    candidates = []
-    for a, kind in enumerate(scene.bottle_types.values()):
-        tables = [law.friction[a] for law in (pairs, rails) if law is not None and law.friction is not None]
-        mu = max((float(table.max()) for table in tables), default=0.0)
-        if mu > 0.0:
-            force = queue * base_mu * heaviest * scene.gravity
-            dt = contact_friction_bound(mu, force, kind.mass, kind.moment_of_inertia, kind.radius, scene.slip_limit)
-            candidates.append(
-                (
-                    dt,
-                    f"v_lim / [2 mu (1/m + R^2/J) N] at mu = {mu:g} and N = {force:.3g} N, "
-                    f"a single-file queue of {queue}",
-                )
-            )
-    return candidates
 
 
 def _machine() -> str:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8, Arcs, Belts, Ends, Sectors, Segments, StaticGrid
+from conveyor_sim.engine.arrays import F8, Arcs, Belts, Ends, Listed, Sectors, Segments, StaticGrid
 from conveyor_sim.engine.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
 from conveyor_sim.engine.static_grid import build_static_grid
+from conveyor_sim.engine.team import BLOCK
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
 from conveyor_sim.surfaces import Joints, find_joints
 
@@ -89,7 +90,13 @@ def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Bel
         certain=np.full(slots, len(shapes), dtype=np.int32),
         start=np.zeros(slots + 1, dtype=np.uint32),
         candidate=np.zeros(candidates, dtype=np.uint32),
+        uncertain=listed(slots),
     )
+
+
+def listed(slots: int) -> Listed:
+    """Room for a list of bottles by block, empty."""
+    return Listed(np.zeros(slots, np.uint32), np.zeros(slots // BLOCK + 2, np.uint32))
 
 
 def plant_grid(

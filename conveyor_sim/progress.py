@@ -32,11 +32,15 @@ def told_if_long(sentence: str) -> Iterator[None]:
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """Progress in simulated time, with the real-time factor so far. `total` in s, simulated."""
+    """Progress in simulated time, with the real-time factor so far. `total` in s, simulated.
 
-    def __init__(self, what: str, total: float, console: Console | None = None) -> None:
+    `counted`: what is counted instead of time, such as `rounds`.
+    """
+
+    def __init__(self, what: str, total: float, console: Console | None = None, counted: str = "") -> None:
         self._what = what
         self._total = total
+        self._counted = counted
         self._console = console or Console(file=sys.stderr, markup=False)
         self._start: tuple[float, float] | None = None
         self._next_line = PLAIN_SHARE * total
@@ -66,6 +70,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self._console.print(f"{self._what}: {self._state(done)}", highlight=False)
 
     def _state(self, done: float) -> str:
+        if self._counted:
+            return f"{done:.0f} of {self._total:.0f} {self._counted}"
         start, already = self._start or (time.monotonic(), done)
         wall = max(time.monotonic() - start, 1e-9)
         return f"{done:.1f} of {self._total:.1f} s, {(done - already) / wall:.3g} x real time"

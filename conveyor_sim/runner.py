@@ -31,13 +31,16 @@ class Run:
     """Ended early by Ctrl-C or a request to terminate."""
 
 
-def run_scene(scene: Scene, bag: Path | None, progress: Callable[[float], None] | None = None) -> Run:
+def run_scene(
+    scene: Scene, bag: Path | None, progress: Callable[[float], None] | None = None, threads: int | None = None
+) -> Run:
     """Runs a scene for its duration and records it to the folder `bag`, if given.
 
-    progress(simulated time, s) is told after every tick. Ctrl-C ends the run at the next tick, with a whole bag.
+    progress(simulated time, s) is told after every tick. threads: to step with, None has them chosen. Ctrl-C ends the
+    run at the next tick, with a whole bag.
     Raises SceneError, SimulationError, and BagError if the recording can't be written.
     """
-    simulation = Simulation(scene)
+    simulation = Simulation(scene, threads)
     recorder = Recorder(bag) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)

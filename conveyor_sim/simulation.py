@@ -1,15 +1,20 @@
 """`Simulation`: the one class that the node, the command line and the tests drive."""
 
+import copy
 import hashlib
 import math
+import os
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from conveyor_sim.engine.base import note_carriers
 from conveyor_sim.engine.contact_list import list_contacts
+from conveyor_sim.engine.crew import Crew
+from conveyor_sim.engine.footing import find_carriers, refresh_footing
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.engine.thread_choice import ThreadChoice
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome, refusal
 from conveyor_sim.line.infeed import infeed_states
@@ -20,7 +25,7 @@ from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.state import State
+from conveyor_sim.state import FIRST_SLOTS, State
 
 
 @dataclass(frozen=True)
@@ -40,14 +45,24 @@ class Simulation:
     """A scene in motion. Time passes in whole ticks only; commands act and observations are made between them.
 
     The same scene and the same commands at the same ticks give the same bits, however the ticks are divided into calls
-    of `advance` and whoever observes. Raises SceneError for a scene that can't be.
+    of `advance`, whoever observes and on however many threads. Raises SceneError for a scene that can't be.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+        """Put the bottles of a scene in place. threads: to step with; None: as many as turn out to be fastest.
+
+        Raises ValueError for less than one thread.
+        """
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads: {threads}, expected 1 or more, or None to have them chosen")
+        cores = len(os.sched_getaffinity(0))
+        self._crew = Crew(cores if threads is None else threads)
+        self._choice = ThreadChoice(cores) if threads is None else None
         self.scene = scene
         self.model = build_model(scene)
         self.tick = 0
-        self._state = State(self.model)
+        bottles = list(initial_bottles(scene))
+        self._state = State(self.model, len(bottles) or FIRST_SLOTS)
         self._advance = INTEGRATORS[self.model.integrator]
         self._every = {output: scene.every(output) for output in scene.TOPICS}
         self._pending: list[tuple[tuple[str, ...], tuple[float, ...], str]] = []
@@ -65,7 +80,7 @@ class Simulation:
         }
         self._infeeds = infeed_states(scene.infeeds, self.model.bottle_types, scene.seed)
         self._outfeeds = outfeed_states(scene.outfeeds)
-        for kind, x, y, theta, vx, vy, omega in initial_bottles(scene):
+        for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
         self._feed()
         self._state.make_lists()
@@ -99,13 +114,13 @@ class Simulation:
         """Let `ticks` ticks pass. Raises SimulationError if the state is no longer finite."""
         for _ in range(ticks):
             self._apply_commands()
-            if self.due("bottles"):
-                self._state.world.peaks.force[:] = 0.0
-                self._state.world.peaks.impulse[:] = 0.0
+            peaks = self._state.world.peaks
+            if peaks is not None and self.due("bottles"):
+                peaks.force[:] = 0.0
+                peaks.impulse[:] = 0.0
             self._integrate()
             self.tick += 1
-            for outfeed in self._outfeeds.values():
-                outfeed.take(self._state)
+            self._remove()
             self._feed()
             self._state.make_lists()
 
@@ -121,16 +136,32 @@ class Simulation:
         outcomes, self._outcomes = self._outcomes, []
         return outcomes
 
+    @property
+    def threads(self) -> int:
+        """Threads that the next tick is to be stepped with."""
+        return self._crew.most if self._choice is None else self._choice.size
+
+    def take_state_of(self, other: "Simulation") -> None:
+        """Take over the bottles, the time and the belts' speeds of another Simulation of the same line.
+
+        The scenes may differ in their effects and steps. Tangential springs start anew; watchdogs stay as they are.
+        """
+        self.tick = other.tick
+        self._commanded[:] = other._commanded
+        self._actual[:] = other._actual
+        self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
+        self._state.take(other._state)
+
     def due(self, output: str) -> bool:
         """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""
         every = self._every[output]
         return every > 0 and self.tick % every == 0
 
     def bottles(self) -> BottleColumns:
-        """Every bottle present, ordered by id."""
+        """Every bottle present, ordered by id; peaks are NaN where the scene has no such output (effect `peaks`)."""
         world = self._state.world
         slots = self._slots()
-        rest = np.zeros(slots.size)
+        rest, unknown = np.zeros(slots.size), np.full(slots.size, math.nan)
         spin = world.spin
         return BottleColumns(
             id=world.bottles.id[slots].astype(np.uint64),
@@ -142,8 +173,8 @@ class Simulation:
             vy=world.bottles.vy[slots],
             omega=spin.omega[slots] if spin is not None else rest,
             belt=self._carriers()[slots],
-            peak_force=world.peaks.force[slots],
-            impulse=world.peaks.impulse[slots],
+            peak_force=world.peaks.force[slots] if world.peaks is not None else unknown,
+            impulse=world.peaks.impulse[slots] if world.peaks is not None else unknown,
         )
 
     def contacts(self) -> ContactColumns:
@@ -151,7 +182,7 @@ class Simulation:
         room = 64
         while True:
             kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
-            count = list_contacts(self._state.world, kind, ends[0], ends[1], values)
+            count = list_contacts(self._state.world, self._crew.team(1)[0].found, kind, ends[0], ends[1], values)
             if count <= room:
                 break
             room = count
@@ -178,7 +209,7 @@ class Simulation:
         digest = hashlib.blake2b(np.int64(self.tick).tobytes(), digest_size=8)
         for name in ("id", "type", "x", "y", "theta", "vx", "vy", "omega"):
             digest.update(getattr(bottles, name).tobytes())
-        digest.update(self._commanded.tobytes() + self._actual.tobytes())
+        digest.update(self._commanded.tobytes() + self._actual.tobytes() + self._state.springs())
         return int.from_bytes(digest.digest(), "little")
 
     def _slots(self) -> np.ndarray:
@@ -189,12 +220,19 @@ class Simulation:
     def _carriers(self) -> np.ndarray:
         """Belt under each slot now, -1 for the floor."""
         world = self._state.world
-        if world.surface is None:
-            return np.full(world.bottles.id.size, -1, dtype=np.int32)
-        note_carriers(world.bottles, world.belts, world.surface)
-        return np.where(world.surface.carrier == len(self.model.belts), -1, world.surface.carrier).astype(np.int32)
+        carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
+        if world.surface is not None:
+            find_carriers(world.bottles, world.belts, world.surface, carriers)
+        return np.where(carriers == len(self.model.belts), -1, carriers).astype(np.int32)
+
+    def _remove(self) -> None:
+        if self.model.has("outfeed"):
+            for outfeed in self._outfeeds.values():
+                outfeed.take(self._state)
 
     def _feed(self) -> None:
+        if not self.model.has("infeed"):
+            return
         for infeed in self._infeeds.values():
             infeed.feed(self._state, self.time, self.scene.tick)
 
@@ -218,7 +256,7 @@ class Simulation:
         self._set_surfaces()
 
     def _set_surfaces(self) -> None:
-        surface = self._state.world.surface
+        world, surface = self._state.world, self._state.world.surface
         if surface is None or not self.model.belts:
             return
         for index, shape in enumerate(self.model.belt_shapes):
@@ -227,17 +265,25 @@ class Simulation:
                 surface.ux[index] = speed * math.cos(shape.angle)
                 surface.uy[index] = speed * math.sin(shape.angle)
             elif surface.turn is not None:
-                surface.turn[index] = speed / self._centre_radius[index]
+                turn = speed / self._centre_radius[index]
+                surface.turn[index] = turn
+                surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
+        refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)
 
     def _integrate(self) -> None:
         """One tick in whole steps; a list that turned out too short is grown within it, without a trace."""
         done, phase, steps = 0, START, self.model.steps_per_tick
+        began = time.perf_counter()
         while True:
-            done += self._advance(self._state.world, steps - done, self.model.dt, phase)
+            done += self._crew.advance(
+                self.threads, self._advance, self._state.world, steps - done, self.model.dt, phase
+            )
             if not self._state.world.neighbourhood.stale[0]:
                 break
             self._state.make_lists()
             phase = RESUME
+        if self._choice is not None:
+            self._choice.took(time.perf_counter() - began, steps * self._state.world.bottles.id.size)
         bottles = self._state.world.bottles
         bad = ~np.isfinite(bottles.x + bottles.y + bottles.vx + bottles.vy)
         if bad.any():

@@ -15,6 +15,7 @@ SIMULATION_ARGUMENTS = (
     ("real_time_factor", "1.0", float, "Simulated seconds per wall second; 0: as fast as possible."),
     ("start_paused", "false", bool, "Wait at tick 0 for a service call; with controller:=true it waits anyway."),
     ("record", "", str, "Folder of the recording, new or empty; empty text: none."),
+    ("threads", "0", int, "Threads to step with; 0: as many as prove fastest."),
     ("frame_id", "world", str, "Frame of all positions."),
 )
 

@@ -44,15 +44,21 @@ def bottle(x: float, y: float, vx: float = 0.0, vy: float = 0.0, **more: Any) ->
 
 
 def contact(
-    stiffness: float, other: str = "glass", damping: tuple[str, float] | None = None, friction: float = 0.0
+    stiffness: float | None,
+    other: str = "glass",
+    damping: tuple[str, float] | None = None,
+    friction: float = 0.0,
+    **more: Any,
 ) -> dict[str, Any]:
-    """Contact of glass with glass or another material."""
+    """Contact of glass with glass or another material; stiffness None where `more` gives another elastic law."""
     law, coefficient = damping or ("none", 0.0)
+    elastic = {} if stiffness is None else {"stiffness": stiffness}
     return {
         "between": ["glass", other],
-        "stiffness": stiffness,
         "damping": {"law": law, "coefficient": coefficient},
         "friction": friction,
+        **elastic,
+        **more,
     }
 
 

@@ -40,7 +40,7 @@ def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
         "turn_outer",
         "100 steps a tick",
         "normal_damping off: no contact with damping law normal",
-        "arc_rails on: rails.turn_inner",
+        "arc_rails on: belts.turn.rails.inner",
     ):
         assert phrase in words
     assert (tmp_path / "small_line.png").stat().st_size > 1000

@@ -10,15 +10,15 @@ PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
     ["errors", "version"],
-    ["engine", "scene", "timestep", "resources"],
+    ["engine", "scene", "timestep", "resources", "restitution"],
     ["surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["plant", "effects"],
     ["model"],
     ["state"],
     ["line"],
     ["simulation"],
-    ["bag"],
-    ["progress", "summary", "plot"],
+    ["bag", "price"],
+    ["progress", "summary", "plot", "explain"],
     ["runner", "report"],
     ["ros"],
     ["cli"],

@@ -32,7 +32,7 @@ def test_bounds_of_the_papers_test_case() -> None:
     assert found == {
         "contact time": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
         "lattice stability": pytest.approx(2.0 / math.sqrt(6.0 * 5e3 / MASS)),
-        "damping": pytest.approx(0.5 * (MASS / 2) / 0.1),
+        "paper damping": pytest.approx(0.5 * (MASS / 2) / 0.1),
         "base friction": pytest.approx(0.01 / (0.4 * 9.81) / 20),
         "contact friction": pytest.approx(MASS * 0.01 / (4 * 0.1 * (100 * 0.4 * MASS * 9.81))),
     }
@@ -98,20 +98,6 @@ def test_types_and_names_are_in_the_scenes_order() -> None:
     assert model.machine
     assert model.has("rotation")
     assert not build_model(scene(bottles=TWO[:1])).has("rotation")
-
-
-def test_contact_constants_by_type_and_material() -> None:
-    """A pair of materials counts in either order; one damping law's table is 0 where the other law is given."""
-    model = build_model(scene(**line()))
-    pairs, rails = model.pair_law, model.rail_law
-    assert pairs is not None
-    assert rails is not None
-    np.testing.assert_array_equal(pairs.stiffness, [[5000.0, 3000.0], [3000.0, 2000.0]])
-    np.testing.assert_array_equal(pairs.friction, [[0.1, 0.2], [0.2, 0.3]])
-    np.testing.assert_array_equal(pairs.damping_paper, [[0.5, 0.0], [0.0, 0.0]])
-    np.testing.assert_array_equal(pairs.damping_normal, [[0.0, 0.7], [0.7, 0.0]])
-    np.testing.assert_array_equal(rails.stiffness, [[8000.0], [4000.0]])
-    np.testing.assert_array_equal(rails.damping_normal, [[1.0], [0.0]])
 
 
 def test_base_friction_by_belt_and_bottle_type() -> None:

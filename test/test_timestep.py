@@ -11,6 +11,7 @@ from conveyor_sim.timestep import (
     contact_friction_bound,
     contact_time,
     damping_bound,
+    hertz_contact_time,
     lattice_bound,
     steps_per_tick,
 )
@@ -28,6 +29,13 @@ def test_the_bounds_are_their_formulae() -> None:
     force = 100 * 0.4 * m * 9.81
     assert contact_friction_bound(0.1, force, m, m * r**2, r, 0.01) == pytest.approx(m * 0.01 / (4 * 0.1 * force))
     assert contact_friction_bound(0.1, force, m, m * r**2 / 2, r, 0.01) == pytest.approx(m * 0.01 / (6 * 0.1 * force))
+
+
+def test_a_hertz_contact_is_shorter_the_faster() -> None:
+    """3.218 (m_r^2 / (k^2 v))^(1/5); test_restitution.py integrates it."""
+    k, m = 1e9, 0.1
+    assert hertz_contact_time(k, m, 2.0) == pytest.approx(3.218 * (m**2 / (k**2 * 2.0)) ** 0.2, rel=1e-4)
+    assert hertz_contact_time(k, m, 64.0) == pytest.approx(hertz_contact_time(k, m, 2.0) / 2.0)
 
 
 BOUNDS = [Bound("slow", 3e-4, "because it is slow"), Bound("tight", 1.1e-4, "because it is tight")]

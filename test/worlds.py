@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 
+from conveyor_sim.engine.arrays import World
 from conveyor_sim.engine.forces import evaluate_forces
+from conveyor_sim.engine.team import members
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.state import State
@@ -20,6 +22,14 @@ STIFFNESS = 1000.0
 
 FAR = 90.0
 """m: a bottle at (FAR, FAR) is near nothing."""
+
+ALONE = members(1)[0]
+"""A team of one thread."""
+
+
+def evaluate(world: World, dt: float = 1e-5) -> None:
+    """Evaluate all forces of the present state into `world.load`."""
+    evaluate_forces(world, ALONE, dt)
 
 
 def state_of(
@@ -49,7 +59,7 @@ def rail_forces(rails: dict[str, Any], points: Any) -> F8:
     """Force (n, 2), N, of the rails on bottles at rest at points (n, 2)."""
     points = np.asarray(points, float)
     state = state_of(rail_scene(rails), points)
-    evaluate_forces(state.world)
+    evaluate(state.world)
     return np.column_stack([state.world.load.fx, state.world.load.fy])[: len(points)]
 
 

@@ -1,4 +1,4 @@
-"""Makes the environment of `make run` and `make test`: set_up.py DISTRO [test]
+"""Makes the environment of `make run`, `make test` and `make bench`: set_up.py DISTRO [test|bench]
 
 A virtual environment with the ROS 2 wheels of that distribution, this package (editable) and conveyor_msgs, built
 from msg_defs/. `set-up.json` in the environment holds a key of what each stage was made from; a stage whose key
@@ -17,6 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
+TOOLS = {"test": "the test tools", "bench": "what is compared with"}
 STRIP = ROOT / "tools" / "strip_missing_includes.cmake"
 
 
@@ -145,15 +146,16 @@ def check_compiler() -> None:
             )
 
 
-def set_up(distro: str, test: bool) -> None:
+def set_up(distro: str, tools: str) -> None:
     environment = Environment(distro)
     requirements = ROOT / "requirements"
     build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
     described = ("requirements/run.txt", "requirements/plot.txt", "setup.py", "setup.cfg", "conveyor_sim/version.py")
     packages = key(*build, *(ROOT / name for name in described))
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
-    tests = key(requirements / "test.txt")
-    needed = {"packages": packages, "messages": messages, **({"tests": tests} if test else {})}
+    needed = {"packages": packages, "messages": messages}
+    if tools:
+        needed[tools] = key(requirements / f"{tools}.txt")
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
         return
 
@@ -172,15 +174,15 @@ def set_up(distro: str, test: bool) -> None:
         environment.forget("messages")
         environment.build_messages()
         environment.write_state(messages=messages)
-    if test and environment.state.get("tests") != tests:
-        say("test tools ...")
-        environment.pip_install(["-r", requirements / "test.txt"], "installing the test tools")
-        environment.write_state(tests=tests)
+    if tools and environment.state.get(tools) != needed[tools]:
+        say(f"{TOOLS[tools]} ...")
+        environment.pip_install(["-r", requirements / f"{tools}.txt"], f"installing {TOOLS[tools]}")
+        environment.write_state(**{tools: needed[tools]})
     say(f"done in {time.monotonic() - start:.0f} s")
 
 
 def main() -> int:
-    distro, test = sys.argv[1], sys.argv[2:] == ["test"]
+    distro, tools = sys.argv[1], "".join(sys.argv[2:])
     if distro not in DISTROS:
         print(f"DISTRO={distro}: expected {' or '.join(DISTROS)}.", file=sys.stderr)
         return 1
@@ -188,7 +190,7 @@ def main() -> int:
     lock = os.open(ROOT, os.O_RDONLY)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        set_up(distro, test)
+        set_up(distro, tools)
     except SetUpError as error:
         print(error, file=sys.stderr)
         return 1

@@ -3,12 +3,12 @@
 import math
 
 from .arrays import Arcs
-from .compile import kernel
+from .compile import part
 from .joint import end_counts
 from .sector import span_distance
 
 
-@kernel
+@part
 def arc_contact(arcs: Arcs, k: int, x: float, y: float, radius: float) -> tuple[float, float, float]:
     """Overlap (m) of a circle with arc k and the unit normal from its centre to the rail; 0 or less: none."""
     dx = x - arcs.x[k]

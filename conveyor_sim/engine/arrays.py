@@ -4,13 +4,14 @@ Shapes: S bottle slots, P pairs, G segments, A arcs, H belts (the floor is entry
 SI units. Columns are float64 unless said otherwise.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 F8 = NDArray[np.float64]
 U4 = NDArray[np.uint32]
+I4 = NDArray[np.int32]
 I8 = NDArray[np.int64]
 
 
@@ -27,6 +28,8 @@ class Bottles(NamedTuple):
     """m g, N."""
     type: U4
     id: I8
+    packed: F8
+    """(4 S,), x, y, vx, vy of each bottle side by side: the copy that the pairs are gathered from."""
 
 
 class Spin(NamedTuple):
@@ -44,9 +47,9 @@ class Load(NamedTuple):
 
     fx: F8
     fy: F8
-    normal_max: F8
-    """N, largest normal force of one contact."""
-    normal_sum: F8
+    normal_max: F8 | None
+    """N, largest normal force of one contact; absent when nobody asks for peaks."""
+    normal_sum: F8 | None
     """N, normal forces of all contacts."""
 
 
@@ -65,35 +68,114 @@ class Peaks(NamedTuple):
     impulse: F8
 
 
+class ContactLaw(NamedTuple):
+    """Coefficients of contact as flat columns; None where no contact of the scene has that law.
+
+    As a table by type: (T * T,), entry a * T + b, or (T * M,), entry type * M + material. By pair: (P,). What a contact
+    does not have is 0 in the column, for the laws add up.
+    """
+
+    stiffness: F8 | None
+    """N/m, N = k delta."""
+    hertz: F8 | None
+    """N/m^1.5, N = k_h delta^1.5."""
+    curve: I4 | None
+    """Which of the Curves gives N; -1: none."""
+    damping_paper: F8 | None
+    """kg/s, against the whole relative velocity."""
+    damping_normal: F8 | None
+    """kg/s, along the normal; the contact never pulls."""
+    damping_tsuji: F8 | None
+    """kg/(s m^0.25), times delta^0.25; the contact never pulls."""
+    damping_onset: F8 | None
+    """s/m, lambda in N (1 + lambda v_n); the contact never pulls."""
+    friction: F8 | None
+    tangential_stiffness: F8 | None
+    """N/m, of the spring with history."""
+    tangential_damping: F8 | None
+    """kg/s, beside that spring."""
+
+
+class Curves(NamedTuple):
+    """Tables of normal force against overlap, one behind the other."""
+
+    start: U4
+    """Curve c is entries start[c]:start[c + 1]; the first of them is (0, 0)."""
+    overlap: F8
+    force: F8
+
+
+class PairSprings(NamedTuple):
+    """Tangential springs of the pairs, (P,), and a copy by pair that outlives a rebuild of the list."""
+
+    elongation: F8
+    """m, along the tangent; positive slip lengthens it."""
+    kept_i: U4
+    kept_j: U4
+    kept: F8
+    kept_count: I8
+    """(1,)"""
+
+
 class Pairs(NamedTuple):
-    """Verlet list of bottle pairs, sorted by (i, j), i < j; the constants of each pair beside it, (P,) by capacity."""
+    """Verlet list of bottle pairs, sorted by (i, j), i < j, (P,) by capacity. Explained in `pairs.py`."""
 
     i: U4
     j: U4
-    stiffness: F8
-    friction: F8 | None
-    damping_paper: F8 | None
-    damping_normal: F8 | None
+    reach: F8 | None
+    """R_i + R_j, m; absent when all radii are equal."""
+    radius_i: F8 | None
+    """R_i, likewise."""
+    law: ContactLaw
     used: I8
     """(1,), pairs in use."""
+    fx: F8
+    """N, (2 P + 1,): on i at p, on j at P + p, and a last entry that stays 0."""
+    fy: F8
+    moment: F8 | None
+    """N m, likewise."""
+    normal: F8 | None
+    """N, likewise; for peaks."""
+    touch: F8 | None
+    """1 for a closed contact, likewise; for the implicit solver."""
+    spring: PairSprings | None
 
 
-class PairLaw(NamedTuple):
-    """Constants of bottle-bottle contact by type, (T, T)."""
+class Gathered(NamedTuple):
+    """Scratch: what a block of pairs needs to know of its bottles."""
 
-    stiffness: F8
-    friction: F8 | None
-    damping_paper: F8 | None
-    damping_normal: F8 | None
+    difference: F8
+    """(4 * BLOCK,), x, y, vx, vy of j less those of i, side by side."""
+    turn: F8
+    """(BLOCK,), omega of i and of j together, rad/s."""
+    rim: F8
+    """(BLOCK,), R omega of i and of j together, m/s, where radii differ."""
+    ease: F8
+    """(BLOCK,), dt/m_t, s/kg, for the implicit solver."""
 
 
-class RailLaw(NamedTuple):
-    """Constants of bottle-rail contact by bottle type and rail material, (T, M)."""
+class Slots(NamedTuple):
+    """Which entries of the pair forces act on each bottle; explained in `slots.py`."""
 
-    stiffness: F8
-    friction: F8 | None
-    damping_paper: F8 | None
-    damping_normal: F8 | None
+    entry: U4
+    """(S * WIDTH,), by bottle, in order of the partner; unused ones point at the entry that stays 0."""
+    filled: U4
+    """(S,), entries of each bottle."""
+    more_start: U4
+    """(S + 1,), entries beyond WIDTH of bottle i are more_start[i]:more_start[i + 1]."""
+    more_bottle: U4
+    more_entry: U4
+
+
+class Implicit(NamedTuple):
+    """For friction solved implicitly, (S,)."""
+
+    mobility: F8
+    """1/m + R^2/J, 1/kg."""
+    closed: F8
+    """Closed contacts of each bottle, its base among them."""
+    ease: F8
+    """dt times mobility times closed contacts, s/kg."""
 
 
 class Ends(NamedTuple):
@@ -144,11 +226,30 @@ class Arcs(NamedTuple):
     surface: U4
 
 
+class Listed(NamedTuple):
+    """Some of the bottles, in order; those of the c-th block of bottles are bottle[first[c]:first[c + 1]]."""
+
+    bottle: U4
+    first: U4
+
+
+class NearSprings(NamedTuple):
+    """Tangential springs by entry of a Near list, and a copy by bottle and piece that outlives a rebuild."""
+
+    elongation: F8
+    kept_bottle: U4
+    kept_piece: U4
+    kept: F8
+    kept_count: I8
+    """(1,)"""
+
+
 class Near(NamedTuple):
     """Rail pieces near each bottle: those of slot s are piece[start[s]:start[s + 1]], in order."""
 
     start: U4
     piece: U4
+    springs: NearSprings | None
 
 
 class RailContacts(NamedTuple):
@@ -162,6 +263,8 @@ class RailContacts(NamedTuple):
     material: U4
     rail: U4
     surface: U4
+    entry: I8
+    """Of the Near list of segments; -1 - entry for one of arcs."""
     solution: F8
     """Effective overlaps while they are solved for."""
 
@@ -193,26 +296,42 @@ class Belts(NamedTuple):
     length: F8
     width: F8
     sectors: Sectors | None
-    certain: NDArray[np.int32]
+    certain: I4
     """(S,), the belt that carries wherever the bottle moves within the skin, -1: test the candidates."""
     start: U4
     candidate: U4
     """Belts that may carry, the last listed first; those of slot s are candidate[start[s]:start[s + 1]]."""
+    uncertain: Listed
 
 
 class Surface(NamedTuple):
-    """Velocity field of each belt's surface, (H + 1,): (ux - turn (y - cy), uy + turn (x - cx)); the floor rests."""
+    """Velocity field of each belt's surface, (H + 1,): (ux - turn y, uy + turn x); the floor rests."""
 
     ux: F8
     uy: F8
     turn: F8 | None
     """rad/s; absent without curved belts."""
-    cx: F8 | None
-    cy: F8 | None
     friction: F8
     """(H + 1, T), coefficient by bottle type."""
-    carrier: NDArray[np.int32]
-    """(S,), the belt (or H, the floor) under each bottle in the last force evaluation."""
+
+
+class Footing(NamedTuple):
+    """What each bottle stands on, (S,): the field of its belt, copied so that the friction loop gathers nothing."""
+
+    carrier: I4
+    """The belt, or H, the floor."""
+    ux: F8
+    uy: F8
+    turn: F8 | None
+    pull: F8
+    """mu m g, N; 0 where a ring straddles belts and is summed point by point."""
+
+
+class Ring(NamedTuple):
+    """Base rings, (S,)."""
+
+    radius: F8
+    """R_b, m."""
 
 
 class Neighbourhood(NamedTuple):
@@ -258,6 +377,11 @@ class Settings(NamedTuple):
     """m, a rebuild is due once a bottle has moved by half of it."""
     cell: float
     """m, edge of a neighbour cell."""
+    rail_materials: int
+    reach: float
+    """m, R_i + R_j where all radii are equal."""
+    atan: Any
+    """None: the polynomial friction curve; 1: the arctangent."""
 
 
 class World(NamedTuple):
@@ -267,17 +391,34 @@ class World(NamedTuple):
     bottles: Bottles
     spin: Spin | None
     load: Load
-    peaks: Peaks
+    peaks: Peaks | None
     stage: Stage | None
+    implicit: Implicit | None
     neighbourhood: Neighbourhood
     pairs: Pairs | None
-    pair_law: PairLaw | None
+    slots: Slots | None
+    pair_law: ContactLaw | None
+    curves: Curves | None
     grid: StaticGrid | None
     segments: Segments | None
     near_segments: Near | None
     arcs: Arcs | None
     near_arcs: Near | None
-    rail_law: RailLaw | None
-    rail_contacts: RailContacts | None
+    railed: Listed | None
+    """Bottles with a rail near."""
+    rail_law: ContactLaw | None
     belts: Belts | None
     surface: Surface | None
+    footing: Footing | None
+    ring: Ring | None
+
+
+class Member(NamedTuple):
+    """One of the threads that take steps together, with its scratch; explained in `team.py`."""
+
+    rank: int
+    size: int
+    sync: I8
+    """(SYNC_SIZE,), shared: counts of the barrier and flags."""
+    gathered: Gathered
+    found: RailContacts

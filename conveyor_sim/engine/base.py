@@ -1,47 +1,144 @@
-"""Friction between a bottle's base and the belt or floor under it: N = m g, at the axis (paper eqs. 7, 15)."""
+"""Friction between a bottle's base and the belt or floor under it, N = m g (paper eqs. 7, 15).
+
+The base is a point at the axis, the paper's, or a ring (`ring.py`). Bottles whose belt is certain go through one loop
+without branches; a ring that may stand on several belts is summed point by point.
+"""
 
 import math
 from typing import Any
 
-from .arrays import Bottles, Load
-from .belts import carrier
-from .compile import kernel
-from .friction import regularisation
+from numba import uint64
+
+from .arrays import Bottles, Load, Settings
+from .compile import part
+from .friction import implicit_regularisation, regularisation
+from .ring import ring_means, ring_share, straddling_ring
 
 
-@kernel
-def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tuple[float, float]:
-    """Velocity of surface h at a point, m/s: uniform on a straight belt, Omega x (r - C) on a curved one."""
-    ux, uy = surface.ux[h], surface.uy[h]
-    if turn is not None:
-        ux -= turn[h] * (y - surface.cy[h])
-        uy += turn[h] * (x - surface.cx[h])
-    return ux, uy
-
-
-@kernel
-def add_base_friction(slip_limit: float, bottles: Bottles, load: Load, belts: Any, surface: Any) -> None:
-    """Add the friction of belts and floor to `load`; note in `surface.carrier` what each bottle stands on."""
-    if surface is None:
+@part
+def add_base_friction(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    load: Load,
+    belts: Any,
+    surface: Any,
+    footing: Any,
+    ring: Any,
+    implicit: Any,
+    dt: float,
+    block: int,
+    first: int,
+    end: int,
+) -> None:
+    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end, a block."""
+    if footing is None:
         return
-    floor = surface.ux.size - 1
-    for i in range(bottles.x.size):
-        h = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
-        surface.carrier[i] = h
-        ux, uy = surface_velocity(h, bottles.x[i], bottles.y[i], surface, surface.turn)
-        vx = bottles.vx[i] - ux
-        vy = bottles.vy[i] - uy
-        pull = surface.friction[h, bottles.type[i]] * bottles.weight[i]
-        pull *= regularisation(math.sqrt(vx * vx + vy * vy), slip_limit)
+    if ring is None:
+        _point_friction(settings, settings.atan, bottles, load, footing, footing.turn, implicit, dt, first, end)
+    if ring is not None:
+        _ring_friction(settings, bottles, spin, load, footing, footing.turn, ring, first, end)
+        _straddling(settings, bottles, spin, load, belts, surface, ring, block)
+
+
+@part
+def _relative(bottles: Bottles, footing: Any, turn: Any, i: int) -> tuple[float, float]:
+    """Velocity of the axis relative to the belt, m/s."""
+    vx = bottles.vx[i] - footing.ux[i]
+    vy = bottles.vy[i] - footing.uy[i]
+    if turn is not None:
+        vx += turn[i] * bottles.y[i]
+        vy -= turn[i] * bottles.x[i]
+    return vx, vy
+
+
+@part
+def _point_friction(
+    settings: Settings,
+    atan: Any,
+    bottles: Bottles,
+    load: Load,
+    footing: Any,
+    turn: Any,
+    implicit: Any,
+    dt: float,
+    first: int,
+    end: int,
+) -> None:
+    for i in range(uint64(first), uint64(end)):
+        vx, vy = _relative(bottles, footing, turn, i)
+        pull = footing.pull[i] * _quotient(
+            settings, atan, bottles, footing, implicit, dt, i, math.sqrt(vx * vx + vy * vy)
+        )
         load.fx[i] -= pull * vx
         load.fy[i] -= pull * vy
 
 
-@kernel
-def note_carriers(bottles: Bottles, belts: Any, surface: Any) -> None:
-    """Note in `surface.carrier` what each bottle stands on now."""
-    if surface is None:
+@part
+def _quotient(
+    settings: Settings, atan: Any, bottles: Bottles, footing: Any, implicit: Any, dt: float, i: int, speed: float
+) -> float:
+    if implicit is None:
+        return regularisation(speed, settings.slip_limit, atan)
+    b = dt * footing.pull[i] * bottles.inverse_mass[i] * implicit.closed[i] / settings.slip_limit
+    return implicit_regularisation(speed, b, settings.slip_limit, atan)
+
+
+@part
+def _ring_friction(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    load: Load,
+    footing: Any,
+    turn: Any,
+    ring: Any,
+    begin: int,
+    end: int,
+) -> None:
+    for i in range(uint64(begin), uint64(end)):
+        vx, vy = _relative(bottles, footing, turn, i)
+        turning = spin.omega[i] - _turn(turn, i)
+        rim = abs(turning) * ring.radius[i]
+        slide = math.sqrt(vx * vx + vy * vy)
+        limit, first, rest = ring_means(slide, rim, settings.slip_limit)
+        pull = footing.pull[i] * ring_share(slide, rim, limit, first, rest)
+        twist = footing.pull[i] * ring_share(rim, slide, limit, first, rest)
+        load.fx[i] -= pull * vx
+        load.fy[i] -= pull * vy
+        spin.moment[i] -= twist * ring.radius[i] * ring.radius[i] * turning
+
+
+@part
+def _turn(turn: Any, i: int) -> float:
+    if turn is None:
+        return 0.0
+    return turn[i]
+
+
+@part
+def _straddling(
+    settings: Settings, bottles: Bottles, spin: Any, load: Load, belts: Any, surface: Any, ring: Any, block: int
+) -> None:
+    if belts is None:
         return
-    floor = surface.ux.size - 1
-    for i in range(bottles.x.size):
-        surface.carrier[i] = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
+    for entry in range(belts.uncertain.first[block], belts.uncertain.first[block + 1]):
+        i = belts.uncertain.bottle[entry]
+        fx, fy, moment = straddling_ring(
+            i,
+            belts,
+            surface,
+            surface.ux.size - 1,
+            bottles.x[i],
+            bottles.y[i],
+            bottles.vx[i],
+            bottles.vy[i],
+            spin.omega[i],
+            ring.radius[i],
+            bottles.weight[i],
+            bottles.type[i],
+            settings.slip_limit,
+        )
+        load.fx[i] += fx
+        load.fy[i] += fy
+        spin.moment[i] += moment

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import llvmlite.binding as llvm
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -48,23 +49,49 @@ CACHE_DIR = cache_dir()
 _config: Any = numba.config
 _njit: Any = numba.njit
 
+# Numba leaves this part of LLVM off: it joins neighbouring loads, sums and stores to packed ones, which gathers by row
+# of `Bottles.packed` live on.
+_config.SLP_VECTORIZE = 1
+# A loop over columns is vectorised only if they don't overlap, which LLVM tests as it enters the loop. By default it
+# gives up, silently, where that takes more than 8 comparisons, about four columns.
+llvm.set_option("conveyor_sim", "-runtime-memory-check-threshold=1000")
+llvm.set_option("conveyor_sim", "-vectorize-memory-check-threshold=1000")
+
 
 def kernel(function: Function) -> Function:
     """Compile without the interpreter or its lock, cached on disk; IEEE arithmetic, no flag that reorders it.
 
+    Every kernel is inlined where it is called: LLVM vectorises no loop with a call in it, and finds long ones too long.
     Kernels allocate nothing, so numba's reference counts (``_nrt``) are off: with them every column taken out of a
     tuple is counted up and down inside the loops, which costs more than the arithmetic.
     """
+    return _compiled(function, no_cpython_wrapper=False)
+
+
+def part(function: Function) -> Function:
+    """Compile a kernel that only kernels call: the way in from Python, with its many arrays, takes most of the time."""
+    return _compiled(function, no_cpython_wrapper=True)
+
+
+def _compiled(function: Function, **options: bool) -> Function:
     previous = _config.CACHE_DIR
     _config.CACHE_DIR = str(CACHE_DIR)
     try:
-        compiled: Function = _njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
+        compiled: Function = _njit(
+            nogil=True,
+            cache=True,
+            error_model="numpy",
+            forceinline=True,
+            no_cfunc_wrapper=True,
+            _nrt=False,
+            **options,
+        )(function)
     finally:
         _config.CACHE_DIR = previous
     return compiled
 
 
-@kernel
+@part
 def at(column: Any, index: int) -> Any:
     """Entry of a column, or None where the effect behind the column is absent."""
     if column is None:
@@ -72,7 +99,7 @@ def at(column: Any, index: int) -> Any:
     return column[index]
 
 
-@kernel
+@part
 def copy(source: Any, target: Any) -> None:
     """Copy a column; an array assignment would allocate in case the two overlap."""
     for index in range(source.size):

@@ -1,45 +1,156 @@
-"""The force in one contact: linear penalty, damping, friction (paper eqs. 22-23, 7-10).
+"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10; physics.md's additions).
 
 Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b
-its negative.
+its negative. The laws of a pair of materials add up; what a pair does not have is 0 in its column, what no pair of the
+scene has is None and not in the machine code.
+
+No branches: a loop over pairs is vectorised, and pairs apart get exactly 0. Only a curve breaks that.
 """
 
+import math
 from typing import Any
 
-from .compile import kernel
-from .friction import regularisation
+from .arrays import ContactLaw
+from .compile import kernel, part
+from .curve import curve_force
+from .friction import friction_share, implicit_share
 
 
 @kernel
 def contact_force(
+    law: ContactLaw,
+    e: int,
+    curves: Any,
+    slip_limit: float,
+    atan: Any,
     overlap: float,
     share: float,
     closing: float,
     slip: float,
-    stiffness: float,
-    friction: Any,
-    damping_paper: Any,
-    damping_normal: Any,
-    slip_limit: float,
+    spring: Any,
+    implicit: Any,
 ) -> tuple[float, float]:
-    """Return (N, T) in N. Coefficients of absent effects are None.
+    """Return (N, T) in N by entry e of the law; both 0 for an overlap (m) of 0 or less.
 
-    overlap: m, > 0. share: effective over geometric overlap, 1 for a contact on its own.
+    share: effective over geometric overlap, 1 for a contact on its own; it scales the law as a whole.
     closing: m/s, relative velocity (a less b) along n. slip: m/s, relative velocity of the contact points along t.
-    stiffness: N/m (eq. 23). friction: coefficient. damping_paper: kg/s, against the whole relative velocity, not
-    clamped (eq. 22). damping_normal: kg/s, along n only, and the normal force never pulls.
+    atan: which friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None.
+    implicit: dt/m_t in s/kg for friction at the slip after the step, or None.
     """
-    normal = stiffness * overlap * share
-    if damping_normal is not None:
-        normal += damping_normal * share * closing
-        if normal < 0.0:
-            normal = 0.0
-    tangential = 0.0
-    if damping_paper is not None:
-        normal += damping_paper * share * closing
-        tangential = -damping_paper * share * slip
-    if friction is not None:
+    depth = 0.0 if overlap < 0.0 else overlap
+    normal = _elastic(law.stiffness, law.hertz, law.curve, curves, e, depth)
+    normal = _damped(normal, law.damping_normal, law.damping_tsuji, law.damping_onset, e, depth, closing)
+    normal = share * _dragged(normal, law.damping_paper, e, depth, closing)
+    tangential = _tangential(
+        law.friction,
+        law.tangential_stiffness,
+        law.tangential_damping,
+        e,
+        slip_limit,
+        atan,
+        share,
         # Coulomb's law needs a pressing contact: paper damping may pull at the end of a rebound.
-        pressing = normal if normal > 0.0 else 0.0
-        tangential -= friction * pressing * regularisation(abs(slip), slip_limit) * slip
-    return normal, tangential
+        0.0 if normal < 0.0 else normal,
+        slip,
+        spring,
+        implicit,
+    )
+    return normal, _dragged(tangential, law.damping_paper, e, depth, -slip * share)
+
+
+@part
+def _elastic(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
+    """k delta (23) + k_h delta^1.5 + table."""
+    normal = 0.0
+    if stiffness is not None:
+        normal += stiffness[e] * depth
+    if hertz is not None:
+        normal += hertz[e] * (depth * math.sqrt(depth))
+    if curve is not None:
+        normal += curve_force(curves, curve[e], depth)
+    return normal
+
+
+@part
+def _damped(elastic: float, normal: Any, tsuji: Any, onset: Any, e: int, depth: float, closing: float) -> float:
+    """With c v_n, c delta^0.25 v_n (Tsuji et al. 1992) or N lambda v_n (Hunt and Crossley 1975), never pulling."""
+    total = elastic
+    if onset is not None:
+        total += elastic * (onset[e] * closing)
+    if tsuji is not None:
+        total += tsuji[e] * math.sqrt(math.sqrt(depth)) * closing
+    if normal is not None:
+        total += (normal[e] if depth > 0.0 else 0.0) * closing
+    return _clamped(total, normal, tsuji, onset)
+
+
+@part
+def _clamped(total: float, normal: Any, tsuji: Any, onset: Any) -> float:
+    if normal is None:
+        if tsuji is None:
+            if onset is None:
+                return total
+    return 0.0 if total < 0.0 else total
+
+
+@part
+def _dragged(force: float, coefficient: Any, e: int, depth: float, velocity: float) -> float:
+    """With c v (22), not without contact: a dashpot alone does not know that the surfaces are apart."""
+    if coefficient is None:
+        return force
+    return force + (coefficient[e] if depth > 0.0 else 0.0) * velocity
+
+
+@part
+def _tangential(
+    friction: Any,
+    stiffness: Any,
+    damping: Any,
+    e: int,
+    slip_limit: float,
+    atan: Any,
+    share: float,
+    pressing: float,
+    slip: float,
+    spring: Any,
+    implicit: Any,
+) -> float:
+    """Coulomb friction, by its regularised curve or, where the pair has one, by its tangential spring."""
+    if friction is None:
+        return 0.0
+    most = friction[e] * pressing
+    sliding = -most * _curve_share(most, slip, slip_limit, atan, implicit)
+    if spring is None:
+        return sliding
+    held = -share * _add_damping(stiffness[e] * spring, damping, e, slip)
+    held = -most if -most > held else held
+    held = most if held > most else held
+    return held if stiffness[e] > 0.0 else sliding
+
+
+@part
+def _curve_share(most: float, slip: float, slip_limit: float, atan: Any, implicit: Any) -> float:
+    if implicit is None:
+        return friction_share(slip, slip_limit, atan)
+    return implicit_share(slip, most * implicit * (1.0 / slip_limit), slip_limit, atan)
+
+
+@part
+def _add_damping(force: float, damping: Any, e: int, slip: float) -> float:
+    if damping is None:
+        return force
+    return force + damping[e] * slip
+
+
+@kernel
+def spring_after(law: ContactLaw, e: int, spring: float, slip: float, dt: float, normal: float) -> float:
+    """Elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N (Cundall and Strack 1979).
+
+    normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
+    """
+    stiffness = law.tangential_stiffness[e]  # type: ignore[index]
+    longer = spring + dt * slip
+    most = law.friction[e] * (0.0 if normal < 0.0 else normal)  # type: ignore[index]
+    cut = math.copysign(most, longer) / (stiffness if stiffness > 0.0 else 1.0)
+    kept = cut if stiffness * abs(longer) > most else longer
+    return kept if stiffness > 0.0 else 0.0

@@ -5,59 +5,103 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import F8, I8, World
-from .compile import kernel
-from .pairs import pair_contact
-from .rails import find_rail_contacts, rail_contact
+from .arrays import F8, I8, RailContacts, World
+from .compile import kernel, part
+from .contact import contact_force
+from .pairs import elongation, normal_and_overlap
+from .rails import find_rail_contacts, rail_contact, rail_elongation
 
 BOTTLE_BOTTLE, BOTTLE_RAIL = 0, 1
 
 
 @kernel
-def list_contacts(world: World, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
+def list_contacts(world: World, found: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
     """Write the contacts of the present state; return how many there are, which may exceed the columns' length.
 
-    kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m), N, T (N).
-    The neighbour lists must hold.
+    found: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m),
+    N, T (N). The neighbour lists must hold. Friction that is solved implicitly is told as the explicit law has it.
     """
-    count = _pair_contacts(world.settings, world.bottles, world.spin, world.pairs, kind, a, b, values)
-    return _rail_contacts(world, world.bottles, world.spin, world.rail_law, kind, a, b, values, count)
+    count = _pair_contacts(world.settings, world.bottles, world.spin, world.pairs, world.curves, kind, a, b, values)
+    return _rail_contacts(world, world.bottles, world.spin, world.rail_law, found, kind, a, b, values, count)
 
 
-@kernel
+@part
 def _pair_contacts(
-    settings: Any, bottles: Any, spin: Any, pairs: Any, kind: NDArray[np.uint8], a: I8, b: I8, values: F8
+    settings: Any, bottles: Any, spin: Any, pairs: Any, curves: Any, kind: NDArray[np.uint8], a: I8, b: I8, values: F8
 ) -> int:
     if pairs is None:
         return 0
     count = 0
     for p in range(pairs.used[0]):
-        overlap, nx, ny, normal, tangential = pair_contact(p, settings, bottles, spin, pairs)
+        i, j = pairs.i[p], pairs.j[p]
+        reach = bottles.radius[i] + bottles.radius[j]
+        overlap, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
         if overlap > 0.0:
             if count < kind.size:
-                i = pairs.i[p]
-                arm = bottles.radius[i] - 0.5 * overlap
+                normal, tangential = _pair_force(
+                    settings, bottles, spin, pairs, pairs.spring, curves, p, overlap, nx, ny
+                )
                 kind[count] = BOTTLE_BOTTLE
                 a[count] = i
-                b[count] = pairs.j[p]
+                b[count] = j
+                arm = bottles.radius[i] - 0.5 * overlap
                 _write(values, count, bottles.x[i], bottles.y[i], arm, nx, ny, overlap, normal, tangential)
             count += 1
     return count
 
 
-@kernel
+@part
+def _pair_force(
+    settings: Any,
+    bottles: Any,
+    spin: Any,
+    pairs: Any,
+    springs: Any,
+    curves: Any,
+    p: int,
+    overlap: float,
+    nx: float,
+    ny: float,
+) -> tuple[float, float]:
+    i, j = pairs.i[p], pairs.j[p]
+    vx = bottles.vx[i] - bottles.vx[j]
+    vy = bottles.vy[i] - bottles.vy[j]
+    slip = -vx * ny + vy * nx
+    if spin is not None:
+        shorter = 0.5 * settings.lever * overlap
+        slip += spin.omega[i] * (bottles.radius[i] - shorter) + spin.omega[j] * (bottles.radius[j] - shorter)
+    closing = vx * nx + vy * ny
+    limit, atan = settings.slip_limit, settings.atan
+    spring = elongation(springs, p)
+    return contact_force(pairs.law, p, curves, limit, atan, overlap, 1.0, closing, slip, spring, None)
+
+
+@part
 def _rail_contacts(
-    world: World, bottles: Any, spin: Any, law: Any, kind: NDArray[np.uint8], a: I8, b: I8, values: F8, count: int
+    world: World,
+    bottles: Any,
+    spin: Any,
+    law: Any,
+    found: Any,
+    kind: NDArray[np.uint8],
+    a: I8,
+    b: I8,
+    values: F8,
+    count: int,
 ) -> int:
     if law is None:
         return count
-    found: Any = world.rail_contacts
     for i in range(bottles.x.size):
         here = find_rail_contacts(i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, found)
         for c in range(here):
             if found.share[c] > 0.0:
                 if count < kind.size:
-                    normal, tangential = rail_contact(c, i, world.settings, bottles, spin, found, law)
+                    spring = rail_elongation(
+                        law.tangential_stiffness, world.near_segments, world.near_arcs, found.entry[c]
+                    )
+                    normal, tangential, _ = rail_contact(
+                        c, i, world.settings, world.settings.atan, bottles, spin, found, law, world.curves, spring, None
+                    )
                     nx, ny, overlap = found.nx[c], found.ny[c], found.overlap[c]
                     kind[count] = BOTTLE_RAIL
                     a[count] = i
@@ -68,7 +112,7 @@ def _rail_contacts(
     return count
 
 
-@kernel
+@part
 def _write(
     values: F8,
     c: int,

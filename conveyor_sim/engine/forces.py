@@ -1,42 +1,130 @@
-"""One evaluation of all forces: a pure function of positions and velocities, whatever integrator asks."""
+"""One evaluation of all forces: a function of positions, velocities and springs, whatever integrator asks.
 
-from .arrays import World
+Two phases, with a barrier between: `pair_phase` reads every bottle and writes pairs, `bottle_forces` reads pairs and
+writes the bottles of one block. Sums run in a fixed order (pairs by partner, segments, arcs, base).
+"""
+
+from typing import Any
+
+from .arrays import Member, World
 from .base import add_base_friction
-from .compile import kernel
-from .pairs import add_pair_forces
-from .rails import add_rail_forces
+from .compile import kernel, part
+from .footing import check_footing
+from .pairs import find_touching, pack, pair_forces
+from .rails import add_rail_forces, count_rail_contacts
+from .slots import sum_pair_forces, sum_slots
+from .team import BLOCK, end_block, first_block, wait_for_all
 
 
 @kernel
-def evaluate_forces(world: World) -> None:
-    """Fill `world.load` (N) and `world.spin.moment` (N m) from the bottles' positions and velocities (eq. 22).
+def evaluate_forces(world: World, member: Member, dt: float) -> None:
+    """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
+    pack_all(world, member)
+    pair_phase(world, member, dt, 0.0)
+    slots = world.bottles.x.size
+    for block in range(first_block(member, slots), end_block(member, slots)):
+        bottle_forces(world, member, dt, 0.0, block, block * BLOCK, min(block * BLOCK + BLOCK, slots))
+    wait_for_all(member)
 
-    Sums run in a fixed order (pairs by slots, then segments, arcs, base), so the bits do not depend on when the
-    neighbour lists were made.
+
+@part
+def pack_all(world: World, member: Member) -> None:
+    """Pack this member's bottles; all are packed on return."""
+    bottles = world.bottles
+    for block in range(first_block(member, bottles.x.size), end_block(member, bottles.x.size)):
+        pack(bottles, block * BLOCK, min(block * BLOCK + BLOCK, bottles.x.size))
+    wait_for_all(member)
+
+
+@part
+def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> None:
+    """Find what this member's share of the pairs exerts; all pairs are done on return.
+
+    All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, by how much the tangential
+    springs are taken along, 0 if this evaluation is not that of a step.
     """
-    load = world.load
-    load.fx[:] = 0.0
-    load.fy[:] = 0.0
-    load.normal_max[:] = 0.0
-    load.normal_sum[:] = 0.0
-    _clear_moment(world.spin)
-    add_pair_forces(world.settings, world.bottles, world.spin, load, world.pairs)
+    _count_closed(world, world.implicit, member, dt)
+    pair_forces(world.settings, world.bottles, world.spin, world.pairs, world.curves, world.implicit, member, spring_dt)
+    wait_for_all(member)
+
+
+@part
+def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, block: int, first: int, end: int) -> None:
+    """Fill `world.load` (N) and `world.spin.moment` (N m) of the bottles of one block, first to end (eq. 22)."""
+    sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     add_rail_forces(
         world.settings,
         world.bottles,
         world.spin,
-        load,
+        world.load,
         world.segments,
         world.near_segments,
         world.arcs,
         world.near_arcs,
+        world.railed,
         world.rail_law,
-        world.rail_contacts,
+        world.curves,
+        world.implicit,
+        member.found,
+        block,
+        spring_dt,
     )
-    add_base_friction(world.settings.slip_limit, world.bottles, load, world.belts, world.surface)
+    check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, block)
+    add_base_friction(
+        world.settings,
+        world.bottles,
+        world.spin,
+        world.load,
+        world.belts,
+        world.surface,
+        world.footing,
+        world.ring,
+        world.implicit,
+        dt,
+        block,
+        first,
+        end,
+    )
 
 
-@kernel
-def _clear_moment(spin) -> None:  # type: ignore[no-untyped-def]
-    if spin is not None:
-        spin.moment[:] = 0.0
+@part
+def _moments(spin: Any) -> Any:
+    if spin is None:
+        return None
+    return spin.moment
+
+
+@part
+def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> None:
+    """Count the closed contacts of every bottle, for the mass splitting of the implicit solver."""
+    if implicit is None:
+        return
+    bottles = world.bottles
+    find_touching(world.settings, bottles, world.pairs, member)
+    wait_for_all(member)
+    for block in range(first_block(member, bottles.x.size), end_block(member, bottles.x.size)):
+        first, end = block * BLOCK, min(block * BLOCK + BLOCK, bottles.x.size)
+        sum_slots(world.slots, _touch(world.pairs), first, end, implicit.closed)
+        count_rail_contacts(
+            bottles,
+            world.segments,
+            world.near_segments,
+            world.arcs,
+            world.near_arcs,
+            world.railed,
+            member.found,
+            block,
+            implicit.closed,
+        )
+        for i in range(first, end):
+            # The base is a contact too.
+            implicit.closed[i] += 1.0
+            implicit.ease[i] = dt * implicit.mobility[i] * implicit.closed[i]
+    wait_for_all(member)
+
+
+@part
+def _touch(pairs: Any) -> Any:
+    if pairs is None:
+        return None
+    return pairs.touch

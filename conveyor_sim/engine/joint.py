@@ -1,12 +1,12 @@
 """Where rail pieces meet: their common end point pushes a bottle once, and only from beyond both pieces."""
 
 from .arrays import Ends
-from .compile import kernel
+from .compile import part
 
 FREE, ANSWERS, SILENT = 0, 1, 2
 
 
-@kernel
+@part
 def end_counts(ends: Ends, piece: int, end: int, x: float, y: float) -> bool:
     """Whether the end point of a piece may touch a bottle at (x, y) that lies beyond that end.
 

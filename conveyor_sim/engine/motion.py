@@ -1,71 +1,101 @@
-"""The parts that integrators are made of: kick (velocities), drift (positions), and what follows every step."""
+"""The parts that integrators are made of: kick (velocities), drift (positions), and what follows every step.
+
+Each works on the bottles of one block, first to end.
+"""
 
 from typing import Any
 
-from .arrays import Bottles, Load, Peaks, World
-from .compile import copy, kernel
-from .neighbours import moved_too_far, rebuild
+from numba import uint64
+
+from .arrays import Bottles, Load, Member, World
+from .compile import part
+from .rebuild import moved_too_far, rebuild
+from .team import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
 
 TINY = 1e-100
-"""m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0.
-
-The tests are `<=`, so that what is not a number stays so and is found."""
+"""m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
 
 
-@kernel
-def kick(bottles: Bottles, spin: Any, load: Load, dt: float) -> None:
+@part
+def settle(speed: float) -> float:
+    """The speed, or 0 for one below TINY; what is not a number stays so, and is found."""
+    return 0.0 if abs(speed) <= TINY else speed
+
+
+@part
+def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: int) -> None:
     """v += dt a and omega += dt alpha, with a = F/m, alpha = M/J (paper eqs. 1, 5)."""
-    for i in range(bottles.x.size):
-        vx = bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i])
-        vy = bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i])
-        bottles.vx[i] = 0.0 if abs(vx) <= TINY else vx
-        bottles.vy[i] = 0.0 if abs(vy) <= TINY else vy
+    for i in range(uint64(first), uint64(end)):
+        bottles.vx[i] = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
+        bottles.vy[i] = settle(bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i]))
     if spin is not None:
-        for i in range(bottles.x.size):
-            omega = spin.omega[i] + dt * (spin.moment[i] * spin.inverse_inertia[i])
-            spin.omega[i] = 0.0 if abs(omega) <= TINY else omega
+        for i in range(uint64(first), uint64(end)):
+            spin.omega[i] = settle(spin.omega[i] + dt * (spin.moment[i] * spin.inverse_inertia[i]))
 
 
-@kernel
-def drift(bottles: Bottles, spin: Any, dt: float) -> None:
+@part
+def drift(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
     """r += dt v and theta += dt omega (paper eq. 6)."""
-    for i in range(bottles.x.size):
+    for i in range(uint64(first), uint64(end)):
         bottles.x[i] += dt * bottles.vx[i]
         bottles.y[i] += dt * bottles.vy[i]
     if spin is not None:
-        for i in range(bottles.x.size):
+        for i in range(uint64(first), uint64(end)):
             spin.theta[i] += dt * spin.omega[i]
 
 
-@kernel
-def store_velocities(stage: Any, bottles: Bottles, spin: Any) -> None:
+@part
+def store_velocities(stage: Any, bottles: Bottles, spin: Any, first: int, end: int) -> None:
     """Keep the velocities within a step."""
-    copy(bottles.vx, stage.vx)
-    copy(bottles.vy, stage.vy)
+    for i in range(first, end):
+        stage.vx[i] = bottles.vx[i]
+        stage.vy[i] = bottles.vy[i]
     if spin is not None:
-        copy(spin.omega, stage.omega)
+        for i in range(first, end):
+            stage.omega[i] = spin.omega[i]
 
 
-@kernel
-def recall_velocities(stage: Any, bottles: Bottles, spin: Any) -> None:
+@part
+def recall_velocities(stage: Any, bottles: Bottles, spin: Any, first: int, end: int) -> None:
     """Take the kept velocities back."""
-    copy(stage.vx, bottles.vx)
-    copy(stage.vy, bottles.vy)
+    for i in range(first, end):
+        bottles.vx[i] = stage.vx[i]
+        bottles.vy[i] = stage.vy[i]
     if spin is not None:
-        copy(stage.omega, spin.omega)
+        for i in range(first, end):
+            spin.omega[i] = stage.omega[i]
 
 
-@kernel
-def accumulate_peaks(load: Load, peaks: Peaks, dt: float) -> None:
+@part
+def accumulate_peaks(load: Load, peaks: Any, dt: float, first: int, end: int) -> None:
     """Note the largest normal force (N) and the impulse of all normal forces (N s) of each bottle."""
-    for i in range(peaks.force.size):
-        peaks.force[i] = load.normal_max[i] if load.normal_max[i] > peaks.force[i] else peaks.force[i]
-        peaks.impulse[i] += dt * load.normal_sum[i]
+    if peaks is None:
+        return
+    _accumulate(load.normal_max, load.normal_sum, peaks, dt, first, end)
 
 
-@kernel
-def lists_hold(world: World) -> bool:
-    """Rebuild the lists if a bottle has moved too far; False if they did not fit and must be grown first."""
-    if moved_too_far(world.bottles, world.neighbourhood, world.settings.skin):
-        rebuild(world)
+@part
+def _accumulate(largest: Any, sums: Any, peaks: Any, dt: float, first: int, end: int) -> None:
+    for i in range(uint64(first), uint64(end)):
+        peaks.force[i] = largest[i] if largest[i] > peaks.force[i] else peaks.force[i]
+        peaks.impulse[i] += dt * sums[i]
+
+
+@part
+def note_moved(world: World, member: Member, first: int, end: int) -> None:
+    """Raise the flag MOVED if a bottle of first to end has left the range for which the lists hold."""
+    if moved_too_far(world.bottles, world.neighbourhood, world.settings.skin, first, end):
+        raise_flag(member, MOVED)
+
+
+@part
+def lists_hold(world: World, member: Member) -> bool:
+    """Wait for all; rebuild the lists if a bottle has moved too far; False if they did not fit and must be grown."""
+    wait_for_all(member)
+    if flag_raised(member, MOVED):
+        wait_for_all(member)
+        if member.rank == 0:
+            lower_flag(member, MOVED)
+            rebuild(world)
+        wait_for_all(member)
     return world.neighbourhood.stale[0] == 0

@@ -1,50 +1,24 @@
-"""Verlet lists with a skin: who may touch whom, valid until a bottle has moved by half the skin.
+"""The Verlet list of bottle pairs: who may touch whom, valid until a bottle has moved by half the skin.
 
-Candidates come from a hashed cell grid (bottles) and from a static grid over the plant (rails and belts). Lists are
-sorted by slot, so that sums over them, and hence the bits of a run, do not depend on when a rebuild happened.
+Sorted by slot, so that sums over it, and hence the bits of a run, do not depend on when it was made.
 """
 
-import math
 from typing import Any
 
-from .arrays import Bottles, Neighbourhood, World
-from .belts import belt_distance
-from .compile import copy, kernel
+from .arrays import Bottles, ContactLaw, Neighbourhood, Pairs
+from .cells import bucket_of, sort_into_cells
+from .compile import kernel, part
 
 
-@kernel
-def bucket_of(cx: int, cy: int, buckets: int) -> int:
-    """Bucket of a cell; different cells may share one, so a member's own cell must still be compared."""
-    return (cx * 73856093 ^ cy * 19349663) & (buckets - 1)
-
-
-@kernel
-def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
-    """Counting sort of the occupied slots by hashed cell."""
-    buckets = hood.bucket.size - 1
-    hood.bucket[:] = 0
-    for i in range(bottles.x.size):
-        if bottles.id[i] >= 0:
-            hood.cell[i, 0] = math.floor(bottles.x[i] / cell)
-            hood.cell[i, 1] = math.floor(bottles.y[i] / cell)
-            hood.bucket[bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)] += 1
-    total = 0
-    for b in range(buckets + 1):
-        total += hood.bucket[b]
-        hood.bucket[b] = total
-    # Backwards, so that each bucket ends up at its start and in the order of slots.
-    for i in range(bottles.x.size - 1, -1, -1):
-        if bottles.id[i] >= 0:
-            b = bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)
-            hood.bucket[b] -= 1
-            hood.order[hood.bucket[b]] = i
-
-
-@kernel
+@part
 def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell: float, skin: float) -> int:
-    """Fill the pair list, sorted by (i, j), i < j; return the number of pairs, which may exceed its capacity."""
+    """Fill the pair list, sorted by (i, j), i < j; return the number of pairs, which may exceed its capacity.
+
+    law: by type. What is by pair (coefficients, radii, tangential springs) is filled or carried over too.
+    """
     if pairs is None:
         return 0
+    _keep_springs(pairs, pairs.spring)
     sort_into_cells(bottles, hood, cell)
     buckets = hood.bucket.size - 1
     capacity = pairs.i.size
@@ -73,174 +47,82 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell
                             pairs.i[count] = i
                         count += 1
     pairs.used[0] = min(count, capacity)
-    _fill(pairs.stiffness, law.stiffness, bottles, pairs)
-    _fill(pairs.friction, law.friction, bottles, pairs)
-    _fill(pairs.damping_paper, law.damping_paper, bottles, pairs)
-    _fill(pairs.damping_normal, law.damping_normal, bottles, pairs)
+    _fill_laws(pairs, pairs.law, law, bottles)
+    _fill_radii(pairs, pairs.reach, bottles)
+    if count <= capacity:
+        _put_springs_back(pairs, pairs.spring)
     return count
 
 
-@kernel
-def _fill(column: Any, table: Any, bottles: Bottles, pairs: Any) -> None:
+@part
+def _fill_laws(pairs: Pairs, columns: ContactLaw, tables: ContactLaw, bottles: Bottles) -> None:
+    _fill(columns.stiffness, tables.stiffness, pairs, bottles)
+    _fill(columns.hertz, tables.hertz, pairs, bottles)
+    _fill(columns.curve, tables.curve, pairs, bottles)
+    _fill(columns.damping_paper, tables.damping_paper, pairs, bottles)
+    _fill(columns.damping_normal, tables.damping_normal, pairs, bottles)
+    _fill(columns.damping_tsuji, tables.damping_tsuji, pairs, bottles)
+    _fill(columns.damping_onset, tables.damping_onset, pairs, bottles)
+    _fill(columns.friction, tables.friction, pairs, bottles)
+    _fill(columns.tangential_stiffness, tables.tangential_stiffness, pairs, bottles)
+    _fill(columns.tangential_damping, tables.tangential_damping, pairs, bottles)
+
+
+@part
+def _fill(column: Any, table: Any, pairs: Pairs, bottles: Bottles) -> None:
     if column is None:
         return
+    types = round(table.size**0.5)
     for p in range(pairs.used[0]):
-        column[p] = table[bottles.type[pairs.i[p]], bottles.type[pairs.j[p]]]
+        column[p] = table[bottles.type[pairs.i[p]] * types + bottles.type[pairs.j[p]]]
+
+
+@part
+def _fill_radii(pairs: Pairs, reach: Any, bottles: Bottles) -> None:
+    if reach is None:
+        return
+    for p in range(pairs.used[0]):
+        pairs.radius_i[p] = bottles.radius[pairs.i[p]]  # type: ignore[index]
+        reach[p] = bottles.radius[pairs.i[p]] + bottles.radius[pairs.j[p]]
+
+
+@part
+def _keep_springs(pairs: Pairs, springs: Any) -> None:
+    """Copy the springs by pair, unless that was done and the list then turned out too short."""
+    if springs is None:
+        return
+    if springs.kept_count[0] >= 0:
+        return
+    kept = 0
+    for p in range(pairs.used[0]):
+        if springs.elongation[p] != 0.0:
+            springs.kept_i[kept] = pairs.i[p]
+            springs.kept_j[kept] = pairs.j[p]
+            springs.kept[kept] = springs.elongation[p]
+            kept += 1
+    springs.kept_count[0] = kept
+
+
+@part
+def _put_springs_back(pairs: Pairs, springs: Any) -> None:
+    """Give pairs that are still listed their springs; both lists are sorted by (i, j)."""
+    if springs is None:
+        return
+    k, kept = 0, springs.kept_count[0]
+    for p in range(pairs.used[0]):
+        i, j = pairs.i[p], pairs.j[p]
+        while k < kept and (springs.kept_i[k] < i or (springs.kept_i[k] == i and springs.kept_j[k] < j)):
+            k += 1
+        found = k < kept and springs.kept_i[k] == i and springs.kept_j[k] == j
+        springs.elongation[p] = springs.kept[k] if found else 0.0
+    springs.kept_count[0] = -1
 
 
 @kernel
-def static_cell(grid: Any, x: float, y: float) -> int:
-    """Cell of the static grid under a point, -1 outside: nothing of the plant is near there."""
-    if not (x >= grid.x and y >= grid.y):
-        return -1
-    column = (x - grid.x) / grid.size
-    row = (y - grid.y) / grid.size
-    if not (column < grid.columns and row < grid.rows):
-        return -1
-    return int(row) * grid.columns + int(column)
-
-
-@kernel
-def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, margin: float) -> int:
-    """List the straight rail pieces within radius + margin of each bottle; return how many entries that takes."""
-    if segments is None:
-        return 0
-    count = 0
-    for i in range(bottles.x.size):
-        near.start[i] = min(count, near.piece.size)
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
-        if home < 0:
-            continue
-        reach = bottles.radius[i] + margin
-        for entry in range(grid.segment_start[home], grid.segment_start[home + 1]):
-            g = grid.segment[entry]
-            dx = bottles.x[i] - segments.x[g]
-            dy = bottles.y[i] - segments.y[g]
-            along = dx * segments.tx[g] + dy * segments.ty[g]
-            along = min(max(along, 0.0), segments.length[g])
-            dx -= along * segments.tx[g]
-            dy -= along * segments.ty[g]
-            if dx * dx + dy * dy <= reach * reach:
-                if count < near.piece.size:
-                    near.piece[count] = g
-                count += 1
-    near.start[bottles.x.size] = min(count, near.piece.size)
-    return count
-
-
-@kernel
-def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: float) -> int:
-    """List the arcs within radius + margin of each bottle; return how many entries that takes."""
-    if arcs is None:
-        return 0
-    count = 0
-    for i in range(bottles.x.size):
-        near.start[i] = min(count, near.piece.size)
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
-        if home < 0:
-            continue
-        reach = bottles.radius[i] + margin
-        for entry in range(grid.arc_start[home], grid.arc_start[home + 1]):
-            k = grid.arc[entry]
-            dx = bottles.x[i] - arcs.x[k]
-            dy = bottles.y[i] - arcs.y[k]
-            # The whole circle stands for the arc here: never too few candidates.
-            if abs(math.sqrt(dx * dx + dy * dy) - arcs.radius[k]) <= reach:
-                if count < near.piece.size:
-                    near.piece[count] = k
-                count += 1
-    near.start[bottles.x.size] = min(count, near.piece.size)
-    return count
-
-
-@kernel
-def list_belts(bottles: Bottles, grid: Any, belts: Any, floor: int, margin: float) -> int:
-    """Find for each bottle the belt that is certain within `margin`, else list candidates; return their number."""
-    if belts is None:
-        return 0
-    count = 0
-    for i in range(bottles.x.size):
-        belts.start[i] = min(count, belts.candidate.size)
-        belts.certain[i] = floor
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
-        if home < 0:
-            continue
-        first = count
-        # The last listed belt carries: the grid lists them in that order.
-        for entry in range(grid.belt_start[home], grid.belt_start[home + 1]):
-            h = grid.belt[entry]
-            distance = belt_distance(belts, belts.sectors, h, bottles.x[i], bottles.y[i])
-            if distance <= -margin:
-                continue
-            if distance >= margin and count == first:
-                belts.certain[i] = h
-                break
-            belts.certain[i] = -1
-            if count < belts.candidate.size:
-                belts.candidate[count] = h
-            count += 1
-            if distance >= margin:
-                break
-    belts.start[bottles.x.size] = min(count, belts.candidate.size)
-    return count
-
-
-@kernel
-def rebuild(world: World) -> tuple[int, int, int, int]:
-    """Make all lists anew; return the entries that pairs, segments, arcs and belts need.
-
-    Where that is more than a list holds, the lists are incomplete and `neighbourhood.stale` is set: grow, call again.
-    """
-    bottles, hood = world.bottles, world.neighbourhood
-    skin = world.settings.skin
-    pairs = list_pairs(bottles, hood, world.pairs, world.pair_law, world.settings.cell, skin)
-    segments = list_near_segments(bottles, world.grid, world.segments, world.near_segments, 0.5 * skin)
-    arcs = list_near_arcs(bottles, world.grid, world.arcs, world.near_arcs, 0.5 * skin)
-    belts = list_belts(bottles, world.grid, world.belts, _floor(world.surface), 0.5 * skin)
-    copy(bottles.x, hood.x)
-    copy(bottles.y, hood.y)
-    fits = _fits_pairs(pairs, world.pairs) and _fits_near(segments, world.near_segments)
-    fits = fits and _fits_near(arcs, world.near_arcs) and _fits_belts(belts, world.belts)
-    hood.stale[0] = 0 if fits else 1
-    return pairs, segments, arcs, belts
-
-
-@kernel
-def _floor(surface: Any) -> int:
-    if surface is None:
-        return 0
-    return surface.ux.size - 1
-
-
-@kernel
-def _fits_pairs(needed: int, pairs: Any) -> bool:
-    if pairs is None:
-        return True
-    return needed <= pairs.i.size
-
-
-@kernel
-def _fits_near(needed: int, near: Any) -> bool:
-    if near is None:
-        return True
-    return needed <= near.piece.size
-
-
-@kernel
-def _fits_belts(needed: int, belts: Any) -> bool:
-    if belts is None:
-        return True
-    return needed <= belts.candidate.size
-
-
-@kernel
-def moved_too_far(bottles: Bottles, hood: Neighbourhood, skin: float) -> bool:
-    """Whether some bottle has moved by more than half the skin since the last rebuild."""
-    limit = 0.25 * skin * skin
-    furthest = 0.0
-    for i in range(bottles.x.size):
-        dx = bottles.x[i] - hood.x[i]
-        dy = bottles.y[i] - hood.y[i]
-        squared = dx * dx + dy * dy
-        furthest = squared if squared > furthest else furthest
-    return furthest > limit
+def drop_springs(pairs: Any, springs: Any, slot: int) -> None:
+    """Forget the springs of a bottle that is taken away: its slot may be another's before the next rebuild."""
+    if springs is None:
+        return
+    for p in range(pairs.used[0]):
+        if pairs.i[p] == slot or pairs.j[p] == slot:
+            springs.elongation[p] = 0.0

@@ -1,77 +1,248 @@
-"""Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|."""
+"""Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|, for all listed pairs, block by block.
+
+The fast layout, once round. Pairs p = 0, 1, ... are listed by (i, j); a block is BLOCK of them:
+
+    packed   | x y vx vy | x y vx vy | x y vx vy | ...          one row a bottle, made anew before every evaluation
+                  i            j                                 1. gather: row j less row i, one packed load each
+    gathered | dx dy du dv | dx dy du dv | ...                   of this block only: it stays in the first cache
+                  v v v v v v v v                                2. law: eight pairs at a time, no branches; a pair
+    pairs.fx | on i: 0 .. P-1 | on j: P .. 2P-1 | 0 |               apart gets 0. Written twice, once a partner:
+                  ^     ^            ^                               nobody adds to what another wrote
+    slots    | 2  5  P+1  -  -  - | ...                          3. sum (slots.py): each bottle adds its own entries,
+                                                                    six to a row; "-" is the entry that stays 0
+
+Steps 1 and 2 write by pair, step 3 by bottle: no two threads write to one place, and every sum has one order, that of
+the partners. A scatter to both bottles would need neither copies nor slots, but races, and does not vectorise.
+"""
 
 import math
 from typing import Any
 
-from .arrays import Bottles, Load, Pairs, Settings
-from .compile import at, kernel
-from .contact import contact_force
+from numba import uint64
+
+from .arrays import Bottles, Member, Pairs, Settings
+from .compile import part
+from .contact import contact_force, spring_after
+from .team import BLOCK, end_block, first_block
+
+# Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
+_1, _2, _3, _4 = uint64(1), uint64(2), uint64(3), uint64(4)
 
 
-@kernel
-def lever_arms(overlap: float, radius_i: float, radius_j: float, lever: float) -> tuple[float, float]:
-    """Arms from the axes to the contact point, m: R - delta/2 (conserves angular momentum), or the paper's R."""
-    return radius_i - 0.5 * lever * overlap, radius_j - 0.5 * lever * overlap
+@part
+def pack(bottles: Bottles, first: int, end: int) -> None:
+    """Copy positions and velocities of bottles first to end into rows."""
+    for i in range(uint64(first), uint64(end)):
+        pack_row(bottles.packed, i, bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i])
 
 
-@kernel
-def pair_contact(
-    p: int, settings: Settings, bottles: Bottles, spin: Any, pairs: Pairs
-) -> tuple[float, float, float, float, float]:
-    """Overlap (m), normal from i to j, N and T (N) of pair p; an overlap of 0 or less means no contact."""
-    i, j = pairs.i[p], pairs.j[p]
-    dx = bottles.x[j] - bottles.x[i]
-    dy = bottles.y[j] - bottles.y[i]
-    reach = bottles.radius[i] + bottles.radius[j]
-    squared = dx * dx + dy * dy
-    if squared >= reach * reach:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    distance = math.sqrt(squared)
-    overlap = reach - distance
-    # Coincident centres have no normal of their own: any will part them, the same one every time.
-    nx = dx / distance if distance > 0.0 else 1.0
-    ny = dy / distance if distance > 0.0 else 0.0
-    vx = bottles.vx[i] - bottles.vx[j]
-    vy = bottles.vy[i] - bottles.vy[j]
-    closing = vx * nx + vy * ny
-    slip = -vx * ny + vy * nx
-    if spin is not None:
-        arm_i, arm_j = lever_arms(overlap, bottles.radius[i], bottles.radius[j], settings.lever)
-        slip += spin.omega[i] * arm_i + spin.omega[j] * arm_j
-    normal, tangential = contact_force(
-        overlap,
-        1.0,
-        closing,
-        slip,
-        pairs.stiffness[p],
-        at(pairs.friction, p),
-        at(pairs.damping_paper, p),
-        at(pairs.damping_normal, p),
-        settings.slip_limit,
-    )
-    return overlap, nx, ny, normal, tangential
+@part
+def pack_row(packed: Any, i: int, x: float, y: float, vx: float, vy: float) -> None:
+    """Write the row of bottle i, an unsigned index."""
+    row = i * _4
+    packed[row] = x
+    packed[row + _1] = y
+    packed[row + _2] = vx
+    packed[row + _3] = vy
 
 
-@kernel
-def add_pair_forces(settings: Settings, bottles: Bottles, spin: Any, load: Load, pairs: Any) -> None:
-    """Add the forces and moments of all bottle pairs to `load` and `spin.moment`; every pair acts on both alike."""
+@part
+def pair_forces(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    pairs: Any,
+    curves: Any,
+    implicit: Any,
+    member: Member,
+    spring_dt: float,
+) -> None:
+    """Find the forces and moments of this member's share of the pairs, from `bottles.packed` and `spin.omega`.
+
+    spring_dt: s, how far the tangential springs are taken along; 0 for an evaluation that is not a step of its own.
+    """
     if pairs is None:
         return
-    for p in range(pairs.used[0]):
-        overlap, nx, ny, normal, tangential = pair_contact(p, settings, bottles, spin, pairs)
-        if overlap > 0.0:
-            i, j = pairs.i[p], pairs.j[p]
-            fx = -normal * nx - tangential * ny
-            fy = -normal * ny + tangential * nx
-            load.fx[i] += fx
-            load.fy[i] += fy
-            load.fx[j] -= fx
-            load.fy[j] -= fy
-            load.normal_sum[i] += normal
-            load.normal_sum[j] += normal
-            load.normal_max[i] = max(load.normal_max[i], normal)
-            load.normal_max[j] = max(load.normal_max[j], normal)
-            if spin is not None:
-                arm_i, arm_j = lever_arms(overlap, bottles.radius[i], bottles.radius[j], settings.lever)
-                spin.moment[i] += arm_i * tangential
-                spin.moment[j] += arm_j * tangential
+    used = pairs.used[0]
+    for block in range(first_block(member, used), end_block(member, used)):
+        first: Any = uint64(block * BLOCK)
+        count: Any = uint64(min(BLOCK, used - block * BLOCK))
+        _gather(bottles.packed, spin, pairs, pairs.reach, first, count, member.gathered)
+        _gather_ease(implicit, pairs, first, count, member.gathered.ease)
+        _law(
+            settings,
+            settings.atan,
+            spin,
+            pairs,
+            pairs.reach,
+            pairs.moment,
+            pairs.normal,
+            pairs.spring,
+            curves,
+            implicit,
+            member.gathered,
+            first,
+            count,
+            spring_dt,
+        )
+
+
+@part
+def _gather(packed: Any, spin: Any, pairs: Pairs, reach: Any, first: int, count: int, gathered: Any) -> None:
+    difference, turn = gathered.difference, gathered.turn
+    for c in range(count):
+        a, b = uint64(pairs.i[first + c]), uint64(pairs.j[first + c])
+        i, j = a * _4, b * _4
+        # All loads before all stores, or they can't be joined.
+        dx = packed[j] - packed[i]
+        dy = packed[j + _1] - packed[i + _1]
+        dvx = packed[j + _2] - packed[i + _2]
+        dvy = packed[j + _3] - packed[i + _3]
+        row = c * _4
+        difference[row] = dx
+        difference[row + _1] = dy
+        difference[row + _2] = dvx
+        difference[row + _3] = dvy
+        if spin is not None:
+            turn[c] = spin.omega[a] + spin.omega[b]
+    _gather_rims(spin, pairs, reach, first, count, gathered.rim)
+
+
+@part
+def _gather_rims(spin: Any, pairs: Pairs, reach: Any, first: int, count: int, rim: Any) -> None:
+    if reach is not None:
+        if spin is not None:
+            for c in range(count):
+                p = first + c
+                radius = pairs.radius_i[p]  # type: ignore[index]
+                rim[c] = radius * spin.omega[pairs.i[p]] + (reach[p] - radius) * spin.omega[pairs.j[p]]
+
+
+@part
+def _gather_ease(implicit: Any, pairs: Pairs, first: int, count: int, ease: Any) -> None:
+    if implicit is None:
+        return
+    for c in range(count):
+        ease[c] = implicit.ease[pairs.i[first + c]] + implicit.ease[pairs.j[first + c]]
+
+
+@part
+def normal_and_overlap(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
+    """Overlap (m; 0 or less: apart) and unit normal of two circles, (dx, dy) being the way from axis to axis."""
+    distance = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / distance if distance > 0.0 else 0.0
+    # Coincident centres have no normal of their own: any will part them, the same one every time.
+    return reach - distance, dx * inverse if distance > 0.0 else 1.0, dy * inverse
+
+
+@part
+def _law(
+    settings: Settings,
+    atan: Any,
+    spin: Any,
+    pairs: Pairs,
+    reach: Any,
+    moment: Any,
+    normals: Any,
+    springs: Any,
+    curves: Any,
+    implicit: Any,
+    gathered: Any,
+    first: int,
+    count: int,
+    spring_dt: float,
+) -> None:
+    difference, other = gathered.difference, first + uint64(pairs.i.size)
+    half = 0.5 * settings.lever
+    for c in range(count):
+        row, p, q = c * _4, first + c, other + c
+        dvx, dvy = difference[row + _2], difference[row + _3]
+        overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
+        closing = -(dvx * nx + dvy * ny)
+        slip = dvx * ny - dvy * nx + _rim_slip(settings, spin, reach, gathered, c, half * overlap)
+        normal, tangential = contact_force(
+            pairs.law,
+            p,
+            curves,
+            settings.slip_limit,
+            atan,
+            overlap,
+            1.0,
+            closing,
+            slip,
+            elongation(springs, p),
+            _ease(implicit, gathered, c),
+        )
+        fx = -normal * nx - tangential * ny
+        fy = tangential * nx - normal * ny
+        pairs.fx[p] = fx
+        pairs.fy[p] = fy
+        pairs.fx[q] = -fx
+        pairs.fy[q] = -fy
+        if moment is not None:
+            radius_i, radius_j = _radii(settings, pairs, reach, p)
+            moment[p] = (radius_i - half * overlap) * tangential
+            moment[q] = (radius_j - half * overlap) * tangential
+        if normals is not None:
+            normals[p] = normal
+            normals[q] = normal
+        if springs is not None:
+            before = springs.elongation[p]
+            after = spring_after(pairs.law, p, before, slip, spring_dt, normal)
+            springs.elongation[p] = after if spring_dt > 0.0 else before
+
+
+@part
+def _reach(settings: Settings, reach: Any, p: int) -> float:
+    if reach is None:
+        return settings.reach
+    return reach[p]
+
+
+@part
+def _radii(settings: Settings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
+    if reach is None:
+        return 0.5 * settings.reach, 0.5 * settings.reach
+    return pairs.radius_i[p], reach[p] - pairs.radius_i[p]  # type: ignore[index]
+
+
+@part
+def _rim_slip(settings: Settings, spin: Any, reach: Any, gathered: Any, c: int, shorter: float) -> float:
+    """Slip of the rims, m/s: omega_i arm_i + omega_j arm_j, arms shorter than the radii by half the overlap."""
+    if spin is None:
+        return 0.0
+    if reach is None:
+        return (0.5 * settings.reach - shorter) * gathered.turn[c]
+    return gathered.rim[c] - shorter * gathered.turn[c]
+
+
+@part
+def elongation(springs: Any, p: int) -> Any:
+    """Elongation (m) of the tangential spring of pair p, or None."""
+    if springs is None:
+        return None
+    return springs.elongation[p]
+
+
+@part
+def _ease(implicit: Any, gathered: Any, c: int) -> Any:
+    if implicit is None:
+        return None
+    return gathered.ease[c]
+
+
+@part
+def find_touching(settings: Settings, bottles: Bottles, pairs: Any, member: Member) -> None:
+    """Note in `pairs.touch` which of this member's share of the pairs are closed; for the implicit solver."""
+    if pairs is None:
+        return
+    used = pairs.used[0]
+    begin = first_block(member, used) * BLOCK
+    for p in range(uint64(begin), uint64(min(used, end_block(member, used) * BLOCK))):
+        i, j = uint64(pairs.i[p]) * _4, uint64(pairs.j[p]) * _4
+        dx = bottles.packed[j] - bottles.packed[i]
+        dy = bottles.packed[j + _1] - bottles.packed[i + _1]
+        reach = _reach(settings, pairs.reach, p)
+        closed = 1.0 if dx * dx + dy * dy < reach * reach else 0.0
+        pairs.touch[p] = closed
+        pairs.touch[p + uint64(pairs.i.size)] = closed

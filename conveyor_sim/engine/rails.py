@@ -3,22 +3,26 @@
 from typing import Any
 
 from .arc import arc_contact
-from .arrays import Bottles, Load, RailContacts, RailLaw, Settings
-from .compile import kernel
-from .contact import contact_force
+from .arrays import Bottles, ContactLaw, Load, RailContacts, Settings
+from .compile import kernel, part
+from .contact import contact_force, spring_after
 from .segment import segment_contact
 from .shares import share_overlaps
-
-MOST_CONTACTS = 32
-"""Of one bottle with rails at a time, the deepest ones; as many touch only in a pocket drawn as a fine polyline."""
+from .team import MOST_CONTACTS
 
 
 @kernel
-def _keep(
-    found: RailContacts, count: int, overlap: float, nx: float, ny: float, material: int, rail: int, surface: int
+def keep_deepest(
+    found: RailContacts,
+    count: int,
+    overlap: float,
+    nx: float,
+    ny: float,
+    material: int,
+    rail: int,
+    surface: int,
+    entry: int,
 ) -> int:
-    if overlap <= 0.0:
-        return count
     place = count
     if count == MOST_CONTACTS:
         place = 0
@@ -33,32 +37,37 @@ def _keep(
     found.material[place] = material
     found.rail[place] = rail
     found.surface[place] = surface
+    found.entry[place] = entry
     return min(count + 1, MOST_CONTACTS)
 
 
-@kernel
+@part
 def _segment_contacts(i: int, bottles: Bottles, segments: Any, near: Any, found: RailContacts, count: int) -> int:
     if segments is None:
         return count
     for entry in range(near.start[i], near.start[i + 1]):
         g = near.piece[entry]
         overlap, nx, ny = segment_contact(segments, g, bottles.x[i], bottles.y[i], bottles.radius[i])
-        count = _keep(found, count, overlap, nx, ny, segments.material[g], segments.rail[g], segments.surface[g])
+        if overlap > 0.0:
+            material, rail, surface = segments.material[g], segments.rail[g], segments.surface[g]
+            count = keep_deepest(found, count, overlap, nx, ny, material, rail, surface, entry)
     return count
 
 
-@kernel
+@part
 def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, found: RailContacts, count: int) -> int:
     if arcs is None:
         return count
     for entry in range(near.start[i], near.start[i + 1]):
         k = near.piece[entry]
         overlap, nx, ny = arc_contact(arcs, k, bottles.x[i], bottles.y[i], bottles.radius[i])
-        count = _keep(found, count, overlap, nx, ny, arcs.material[k], arcs.rail[k], arcs.surface[k])
+        if overlap > 0.0:
+            material, rail, surface = arcs.material[k], arcs.rail[k], arcs.surface[k]
+            count = keep_deepest(found, count, overlap, nx, ny, material, rail, surface, -1 - entry)
     return count
 
 
-@kernel
+@part
 def find_rail_contacts(
     i: int, bottles: Bottles, segments: Any, near_segments: Any, arcs: Any, near_arcs: Any, found: RailContacts
 ) -> int:
@@ -72,44 +81,69 @@ def find_rail_contacts(
     return count
 
 
-@kernel
+@part
 def rail_contact(
-    c: int, i: int, settings: Settings, bottles: Bottles, spin: Any, found: RailContacts, law: RailLaw
-) -> tuple[float, float]:
-    """N and T (N) on bottle i in its contact c with a rail at rest."""
+    c: int,
+    i: int,
+    settings: Settings,
+    atan: Any,
+    bottles: Bottles,
+    spin: Any,
+    found: RailContacts,
+    law: ContactLaw,
+    curves: Any,
+    spring: Any,
+    implicit: Any,
+) -> tuple[float, float, float]:
+    """N and T (N) on bottle i in its contact c with a rail at rest, and its slip (m/s).
+
+    spring: m, or None; implicit: s/kg, or None (see `contact_force`).
+    """
     nx, ny = found.nx[c], found.ny[c]
     closing = bottles.vx[i] * nx + bottles.vy[i] * ny
     slip = -bottles.vx[i] * ny + bottles.vy[i] * nx
     if spin is not None:
         slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
-    kind, material = bottles.type[i], found.material[c]
-    return contact_force(
-        found.overlap[c],
-        found.share[c],
-        closing,
-        slip,
-        law.stiffness[kind, material],
-        _at2(law.friction, kind, material),
-        _at2(law.damping_paper, kind, material),
-        _at2(law.damping_normal, kind, material),
-        settings.slip_limit,
+    entry = law_entry(settings, bottles, found, c, i)
+    normal, tangential = contact_force(
+        law, entry, curves, settings.slip_limit, atan, found.overlap[c], found.share[c], closing, slip, spring, implicit
     )
+    return normal, tangential, slip
 
 
-@kernel
+@part
+def law_entry(settings: Settings, bottles: Bottles, found: RailContacts, c: int, i: int) -> int:
+    """Entry of contact c of bottle i in the rails' law."""
+    return bottles.type[i] * settings.rail_materials + found.material[c]
+
+
+@part
 def rail_arm(overlap: float, radius: float, lever: float) -> float:
     """Arm from the axis to the contact point, m: R - delta, or the paper's R."""
     return radius - lever * overlap
 
 
-@kernel
-def _at2(table: Any, row: int, column: int) -> Any:
-    if table is None:
-        return None
-    return table[row, column]
+@part
+def count_rail_contacts(
+    bottles: Bottles,
+    segments: Any,
+    near_segments: Any,
+    arcs: Any,
+    near_arcs: Any,
+    railed: Any,
+    found: RailContacts,
+    block: int,
+    counts: Any,
+) -> None:
+    """Add to counts[i] the closed rail contacts of each bottle of a block; for the implicit solver."""
+    if railed is None:
+        return
+    for place in range(railed.first[block], railed.first[block + 1]):
+        i = railed.bottle[place]
+        counts[i] += find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
 
 
-@kernel
+@part
 def add_rail_forces(
     settings: Settings,
     bottles: Bottles,
@@ -119,20 +153,102 @@ def add_rail_forces(
     near_segments: Any,
     arcs: Any,
     near_arcs: Any,
+    railed: Any,
     law: Any,
-    found: Any,
+    curves: Any,
+    implicit: Any,
+    found: RailContacts,
+    block: int,
+    spring_dt: float,
 ) -> None:
-    """Add the forces and moments of all rails to `load` and `spin.moment`."""
-    if law is None:
+    """Add the forces and moments of all rails on the bottles of a block to `load` and `spin.moment`.
+
+    spring_dt: s, how far the tangential springs are taken along.
+    """
+    if railed is None:
         return
-    for i in range(bottles.x.size):
+    for place in range(railed.first[block], railed.first[block + 1]):
+        i = railed.bottle[place]
         count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
         for c in range(count):
+            found.solution[c] = 0.0
             if found.share[c] > 0.0:
-                normal, tangential = rail_contact(c, i, settings, bottles, spin, found, law)
+                spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, found.entry[c])
+                ease = _ease(implicit, i)
+                normal, tangential, slip = rail_contact(
+                    c, i, settings, settings.atan, bottles, spin, found, law, curves, spring, ease
+                )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
-                load.normal_sum[i] += normal
-                load.normal_max[i] = max(load.normal_max[i], normal)
+                _note_normal(load.normal_sum, load.normal_max, i, normal)
                 if spin is not None:
                     spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
+                entry = law_entry(settings, bottles, found, c, i)
+                found.solution[c] = _spring_after(law, entry, spring, slip, spring_dt, normal)
+        if spring_dt > 0.0:
+            _store_springs(law.tangential_stiffness, near_segments, near_arcs, found, count, i)
+
+
+@part
+def _spring_after(law: ContactLaw, entry: int, spring: Any, slip: float, dt: float, normal: float) -> float:
+    if spring is None:
+        return 0.0
+    return spring_after(law, entry, spring, slip, dt, normal)
+
+
+@part
+def _note_normal(sums: Any, largest: Any, i: int, normal: float) -> None:
+    if sums is not None:
+        sums[i] += normal
+        largest[i] = normal if normal > largest[i] else largest[i]
+
+
+@part
+def _ease(implicit: Any, i: int) -> Any:
+    if implicit is None:
+        return None
+    return implicit.ease[i]
+
+
+@part
+def rail_elongation(tangential: Any, near_segments: Any, near_arcs: Any, entry: int) -> Any:
+    """Elongation of the spring of a contact, by its entry in the lists (`RailContacts.entry`)."""
+    if tangential is None:
+        return None
+    if entry >= 0:
+        return _spring_at(near_segments, entry)
+    return _spring_at(near_arcs, -1 - entry)
+
+
+@part
+def _spring_at(near: Any, entry: int) -> float:
+    if near is None:
+        return 0.0
+    return near.springs.elongation[entry]
+
+
+@part
+def _store_springs(tangential: Any, near_segments: Any, near_arcs: Any, found: Any, count: int, i: int) -> None:
+    """Keep the springs of the closed contacts of bottle i, forget those of all its other rails."""
+    if tangential is None:
+        return
+    _forget_springs(near_segments, i)
+    _forget_springs(near_arcs, i)
+    for c in range(count):
+        if found.entry[c] >= 0:
+            _set_spring(near_segments, found.entry[c], found.solution[c])
+        else:
+            _set_spring(near_arcs, -1 - found.entry[c], found.solution[c])
+
+
+@part
+def _forget_springs(near: Any, i: int) -> None:
+    if near is not None:
+        for entry in range(near.start[i], near.start[i + 1]):
+            near.springs.elongation[entry] = 0.0
+
+
+@part
+def _set_spring(near: Any, entry: int, elongation: float) -> None:
+    if near is not None:
+        near.springs.elongation[entry] = elongation

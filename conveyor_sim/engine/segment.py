@@ -3,11 +3,11 @@
 import math
 
 from .arrays import Segments
-from .compile import kernel
+from .compile import part
 from .joint import end_counts
 
 
-@kernel
+@part
 def segment_contact(segments: Segments, g: int, x: float, y: float, radius: float) -> tuple[float, float, float]:
     """Overlap (m) of a circle with segment g and the unit normal from its centre to the rail; 0 or less: none."""
     dx = x - segments.x[g]

@@ -8,12 +8,12 @@ their own push: clearing both would call for a force without bound.
 """
 
 from .arrays import RailContacts
-from .compile import kernel
+from .compile import part
 
 SWEEPS = 64
 
 
-@kernel
+@part
 def share_overlaps(contacts: RailContacts, count: int) -> None:
     """Set `share` = lambda / delta of the first `count` contacts of one bottle; each surface for itself."""
     for a in range(count):
@@ -33,7 +33,7 @@ def share_overlaps(contacts: RailContacts, count: int) -> None:
             _share_many(contacts, a, count)
 
 
-@kernel
+@part
 def _share_two(contacts: RailContacts, a: int, b: int) -> None:
     """In closed form."""
     cosine = contacts.nx[a] * contacts.nx[b] + contacts.ny[a] * contacts.ny[b]
@@ -52,7 +52,7 @@ def _share_two(contacts: RailContacts, a: int, b: int) -> None:
         contacts.share[b] = (over_b - cosine * over_a) / (rest * over_b)
 
 
-@kernel
+@part
 def _share_many(contacts: RailContacts, first: int, count: int) -> None:
     """Three or more pieces at once, which is rare: projected Gauss-Seidel."""
     surface = contacts.surface[first]

@@ -1,11 +1,13 @@
 """A grid over the plant, made once: which rail pieces and belts a bottle with its axis in a cell can come near."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import StaticGrid
+from .compile import part
 
 MOST_CELLS = 250_000
 
@@ -48,3 +50,15 @@ def build_static_grid(
     arc_start, arc = fill(rails[count:], range(len(arcs)))
     belt_start, belt = fill(carriers, range(len(belts) - 1, -1, -1))
     return StaticGrid(x, y, size, columns, rows, segment_start, segment, arc_start, arc, belt_start, belt)
+
+
+@part
+def static_cell(grid: Any, x: float, y: float) -> int:
+    """Cell of the static grid under a point, -1 outside: nothing of the plant is near there."""
+    if not (x >= grid.x and y >= grid.y):
+        return -1
+    column = (x - grid.x) / grid.size
+    row = (y - grid.y) / grid.size
+    if not (column < grid.columns and row < grid.rows):
+        return -1
+    return int(row) * grid.columns + int(column)

@@ -66,7 +66,7 @@ class SimNode:
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
         def open_session(resets: int) -> Session:
-            return Session(scene, sink, bag_folder(given.record, resets), given.frame_id, distro)
+            return Session(scene, sink, bag_folder(given.record, resets), given.frame_id, distro, given.threads)
 
         stepper = Stepper(
             open_session,

@@ -32,6 +32,7 @@ TABLE = (
     Entry("publish_clock", True, "Whether /clock is published."),
     Entry("clock_rate", 100.0, "At most so many /clock messages per wall second.", 1.0, 1e4),
     Entry("marker_rate", 30.0, "At most so many markers per wall second; recordings are not thinned.", 1.0, 1e4),
+    Entry("threads", 0, "Threads to step with; 0: as many as prove fastest.", 0, 1024),
     Entry("lockstep_max_ticks", 100_000, "Longest advance, in ticks, that a lockstep request may ask for.", 1, 10**9),
     *(Entry(f"rates.{name}", -1.0, f"Rate of {name}: {_RATE_TEXT}", -1.0, 1e6) for name in RATES),
 )
@@ -50,6 +51,7 @@ class Parameters:
     publish_clock: bool
     clock_rate: float
     marker_rate: float
+    threads: int
     lockstep_max_ticks: int
     rates: Mapping[str, float]
 

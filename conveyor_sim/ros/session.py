@@ -16,8 +16,8 @@ from conveyor_sim.simulation import Simulation
 class Session:
     """A simulation with its sinks. Not for several threads: whoever steps it owns it."""
 
-    def __init__(self, scene: Scene, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
-        """Starts the run; `bag` is the folder to record to, if any.
+    def __init__(self, scene: Scene, sink: Sink, bag: Path | None, frame_id: str, distro: str, threads: int) -> None:
+        """Starts the run; `bag` is the folder to record to, if any. threads: to step with, 0 has them chosen.
 
         Raises SceneError, and BagError if the folder can't be written.
         """
@@ -27,7 +27,7 @@ class Session:
         self._frame_id = frame_id
         self.wall = 0.0  # s of wall time from the start of the first tick to the end of the last one
         self._first_tick_at: float | None = None
-        self.simulation = Simulation(scene)
+        self.simulation = Simulation(scene, threads or None)
         self._recorder = Recorder(bag, distro=distro) if bag else None
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.geometry import (
     TOUCH,
     XY,
@@ -21,7 +22,8 @@ from conveyor_sim.scene.geometry import (
 from conveyor_sim.scene.overlaps import overlapping
 from conveyor_sim.scene.polygons import why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.schema import CurvedBelt, Grid, Infeed, PolylineRail, Scene, SegmentRail, Single
+from conveyor_sim.scene.rails import PolylineRail, SegmentRail
+from conveyor_sim.scene.schema import Grid, Infeed, Scene, Single
 from conveyor_sim.scene.types import COORDINATE_LIMIT
 from conveyor_sim.scene.words import shown
 

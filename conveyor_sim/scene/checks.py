@@ -4,9 +4,11 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations_with_replacement
 
+from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.schema import CurvedBelt, Grid, Scene
+from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
 from conveyor_sim.scene.words import shown
 
@@ -15,7 +17,7 @@ def problems_of(scene: Scene) -> list[Problem]:
     """Everything that is wrong with a scene whose fields are each valid by themselves."""
     return [
         *_times(scene),
-        *_damping(scene),
+        *contact_problems(scene),
         *_repeated("contacts", [tuple(sorted(contact.between)) for contact in scene.contacts]),
         *_repeated("base", [base.between for base in scene.base]),
         *_missing_contacts(scene),
@@ -44,16 +46,6 @@ def _times(scene: Scene) -> Iterator[Problem]:
                 ("outputs", topic),
                 f"{shown(rate)} given, expected 0, or the tick rate divided by a whole number: "
                 f"{tick_rate:g}, {tick_rate / 2:g}, {tick_rate / 4:g}, {tick_rate / 5:g} ... (Hz)",
-            )
-
-
-def _damping(scene: Scene) -> Iterator[Problem]:
-    for index, contact in enumerate(scene.contacts):
-        damping = contact.damping
-        if damping.law == "none" and damping.coefficient > 0:
-            yield Problem(
-                ("contacts", index, "damping", "coefficient"),
-                f'{shown(damping.coefficient)} given, expected law "paper" or "normal" beside it (the law is "none")',
             )
 
 

@@ -9,7 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.scene.schema import ArcRail, Belt, CurvedBelt, Grid, GridOfBottles, PolylineRail, Rail, Scene
+from conveyor_sim.scene.belts import Belt, CurvedBelt
+from conveyor_sim.scene.rails import ArcRail, PolylineRail, Rail
+from conveyor_sim.scene.schema import Grid, GridOfBottles, Scene
 
 Array = NDArray[np.float64]
 XY = tuple[float, float]

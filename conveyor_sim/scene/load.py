@@ -13,6 +13,7 @@ from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.checks import problems_of
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.schema import Scene, Source
+from conveyor_sim.scene.tables import with_tables
 from conveyor_sim.scene.yaml_lines import Document
 
 _MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
@@ -35,14 +36,25 @@ def load_scene(path: str | PathLike[str], overrides: Mapping[str, Any] | None = 
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise SceneError(f"{path}:{line}: not UTF-8 text, expected a scene file in UTF-8") from None
-    return parse_scene(text, str(path), overrides)
+    return parse_scene(text, str(path), overrides, file.parent)
 
 
-def parse_scene(text: str, name: str = "<text>", overrides: Mapping[str, Any] | None = None) -> Scene:
-    """Read a scene from YAML text; `name` stands for the file in errors. See `load_scene`."""
+def parse_scene(
+    text: str,
+    name: str = "<text>",
+    overrides: Mapping[str, Any] | None = None,
+    folder: FilePath | None = None,
+) -> Scene:
+    """Read a scene from YAML text; `name` stands for the file in errors, files that it names lie in `folder`.
+
+    See `load_scene`.
+    """
     document = Document(text, name)
     changes = plain(overrides or {}, name)
-    data = _merge(document.data, changes) if changes else document.data
+    merged = _merge(document.data, changes) if changes else document.data
+    data, unread = with_tables(merged, folder)
+    if unread:
+        raise _refused(unread, document, name, changes)
     try:
         scene = Scene.model_validate(data)
     except ValidationError as error:
@@ -50,7 +62,9 @@ def parse_scene(text: str, name: str = "<text>", overrides: Mapping[str, Any] | 
     problems = problems_of(scene)
     if problems:
         raise _refused(problems, document, name, changes)
-    scene._source = Source(text, name, _yaml_text(changes))
+    # A recording keeps the text and the overrides: with the tables among them, it needs no file.
+    kept = changes if data is merged else {**changes, "contacts": data["contacts"]}
+    scene._source = Source(text, name, _yaml_text(changes), _yaml_text(kept))
     return scene
 
 
@@ -95,7 +109,7 @@ def _untagged(error: ValidationError) -> list[Problem]:
 def _refused(problems: list[Problem], document: Document, name: str, changes: Any) -> SceneError:
     lines = []
     for problem in problems:
-        overridden = _holds(changes, problem.path)
+        overridden = holds(changes, problem.path)
         place = f"{name} (override)" if overridden else f"{name}:{document.line_of(problem.path)}"
         path = f" {dotted(problem.path)}:" if problem.path else ""
         lines.append((0 if overridden else document.line_of(problem.path), f"{place}:{path} {problem.text}"))
@@ -105,7 +119,7 @@ def _refused(problems: list[Problem], document: Document, name: str, changes: An
     return SceneError("\n".join(texts))
 
 
-def _holds(changes: Any, path: Path) -> bool:
+def holds(changes: Any, path: Path) -> bool:
     """Whether the value at a path, or one above it, comes from the overrides."""
     for part in path:
         if not isinstance(changes, dict):

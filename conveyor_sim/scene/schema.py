@@ -8,64 +8,29 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Le, Len
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    ModelWrapValidatorHandler,
-    PrivateAttr,
-    Tag,
-    ValidationError,
-    model_validator,
-)
+from pydantic import Discriminator, PrivateAttr, Tag
 
+from conveyor_sim.scene.belts import Belt
+from conveyor_sim.scene.contacts import Base, Contact
+from conveyor_sim.scene.effect_names import Forced
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.rails import Rail
 from conveyor_sim.scene.types import (
     Angle,
     Count,
-    Flag,
     Holds,
-    Limits,
     Name,
     NotNegative,
     Number,
-    Pair,
     Point,
-    PointList,
     PolygonList,
     Positive,
     Seed,
-    Span,
     Text,
     Velocity,
     nanoseconds,
     quantity,
 )
-from conveyor_sim.scene.words import in_words, listed
-
-
-class Part(BaseModel):
-    """A mapping in a scene file: frozen, no unknown fields, its errors in plain words."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-
-    @model_validator(mode="wrap")
-    @classmethod
-    def _in_words(cls, data: Any, handler: ModelWrapValidatorHandler["Part"]) -> "Part":
-        try:
-            return handler(data)
-        except ValidationError as error:
-            raise in_words(cls, error) from None
-
-
-def _one_of(kinds: dict[str, str]) -> Discriminator:
-    """Chooses a model by `kind`; tags are in brackets, so that they can't be taken for names of a scene."""
-
-    def tag(data: Any) -> str | None:
-        kind = data.get("kind") if isinstance(data, Mapping) else getattr(data, "kind", None)
-        return kinds.get(kind) if isinstance(kind, str) else None
-
-    text = listed([f'"{kind}"' for kind in kinds])
-    return Discriminator(tag, custom_error_type="kind", custom_error_message=text, custom_error_context={"text": text})
 
 
 class Step(Part):
@@ -79,33 +44,6 @@ class Step(Part):
     )
 
 
-class Damping(Part):
-    """Damping of a contact."""
-
-    law: Literal["none", "paper", "normal"] = quantity(
-        "none; paper: -c v*, v* the relative velocity of the contact points, in all directions (22); "
-        "normal: along the normal only, and a contact never pulls.",
-        default="none",
-    )
-    coefficient: NotNegative = quantity("Damping coefficient c.", "kg/s", default=0.0)
-
-
-class Contact(Part):
-    """What happens where two materials touch: bottle and bottle, or bottle and rail."""
-
-    between: Pair = quantity("The two materials, in any order.")
-    stiffness: Positive = quantity("Stiffness k of the linear contact, N = k x overlap (23).", "N/m")
-    damping: Damping = quantity("Damping of the contact.", default=Damping())
-    friction: NotNegative = quantity("Coefficient of friction of the contact.", "1", default=0.0)
-
-
-class Base(Part):
-    """Friction of bottles that stand on a belt."""
-
-    between: Pair = quantity("The bottle's material, then the belt's.")
-    friction: NotNegative = quantity("Coefficient of friction of the bottle's base on the belt.", "1")
-
-
 class BottleType(Part):
     """A kind of bottle."""
 
@@ -114,107 +52,18 @@ class BottleType(Part):
     inertia: Positive | None = quantity(
         "Moment of inertia about the axis. Left out: m R^2, a thin-walled cylinder.", "kg m^2", default=None
     )
+    base_radius: Positive | None = quantity(
+        "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion. "
+        "Left out: it stands on a point, as in the paper.",
+        "m",
+        default=None,
+    )
     material: Name = quantity("Material, as named in `contacts` and `base`.")
 
     @property
     def moment_of_inertia(self) -> float:
         """Moment of inertia about the axis (kg m^2): the one given, or m R^2."""
         return self.mass * self.radius**2 if self.inertia is None else self.inertia
-
-
-class _Belt(Part):
-    speed: Number = quantity("Speed at the start, positive forward.", "m/s", default=0.0)
-    speed_limits: Limits = quantity("Least and greatest speed that a command may ask for.", "m/s", default=(-3.0, 3.0))
-    material: Name = quantity("Material, as named in `base`.")
-    watchdog: Positive | None = quantity(
-        "Without a speed command for this long, the belt stops. Left out: it keeps its speed.", "s", default=None
-    )
-
-
-class StraightBelt(_Belt):
-    """A rectangle that runs along its length."""
-
-    kind: Literal["straight"] = quantity("The kind of belt.")
-    start: Point = quantity(
-        "Corner where the belt begins, on the right-hand side seen along travel; the width grows to the left.", "m"
-    )
-    angle: Angle = quantity("Direction of travel at positive speed, from the x-axis, counter-clockwise.", "rad")
-    length: Positive = quantity("Length along travel.", "m")
-    width: Positive = quantity("Width across travel.", "m")
-
-
-class BeltRails(Part):
-    """Which rails a curved belt has along its arcs."""
-
-    inner: Flag = quantity("A rail along the inner arc, named `<belt>_inner`.", default=False)
-    outer: Flag = quantity("A rail along the outer arc, named `<belt>_outer`.", default=False)
-    material: Name | None = quantity("Material of these rails; needed if there is one.", default=None)
-
-
-class CurvedBelt(_Belt):
-    """A sector of a ring that turns about its centre; speed holds at the centre line, positive counter-clockwise.
-
-    Given either by `centre`, `start_angle` and `span`, or by `from`, `to` and `side`.
-    """
-
-    kind: Literal["curved"] = quantity("The kind of belt.")
-    inner_radius: NotNegative = quantity("Radius R of the inner arc.", "m")
-    width: Positive = quantity("Width, from the inner to the outer arc.", "m")
-    centre: Point | None = quantity("Centre of the arcs.", "m", default=None)
-    start_angle: Angle | None = quantity("Where the sector begins, seen from the centre.", "rad", default=None)
-    span: Span | None = quantity("Angle of the sector, counter-clockwise.", "rad", default=None)
-    from_: Point | None = quantity("One end of the inner arc.", "m", default=None, alias="from")
-    to: Point | None = quantity("The other end of the inner arc.", "m", default=None)
-    side: Literal["left", "right"] | None = quantity(
-        "Side of the line from `from` to `to` on which the centre lies; the shorter arc is meant. "
-        "Positive speed runs from `from` to `to` if left, from `to` to `from` if right.",
-        default=None,
-    )
-    rails: BeltRails = quantity("Rails along the arcs.", default=BeltRails())
-
-
-Belt = Annotated[
-    Annotated[StraightBelt, Tag("(straight)")] | Annotated[CurvedBelt, Tag("(curved)")],
-    _one_of({"straight": "(straight)", "curved": "(curved)"}),
-]
-
-
-class _Rail(Part):
-    material: Name = quantity("Material, as named in `contacts`.")
-
-
-class SegmentRail(_Rail):
-    """A straight rail."""
-
-    kind: Literal["segment"] = quantity("The kind of rail.")
-    from_: Point = quantity("One end.", "m", alias="from")
-    to: Point = quantity("The other end.", "m")
-
-
-class PolylineRail(_Rail):
-    """Straight pieces joined end to end: one surface."""
-
-    kind: Literal["polyline"] = quantity("The kind of rail.")
-    points: PointList = quantity("The corners in order.", "m")
-    closed: Flag = quantity("Whether a last piece leads back to the first point.", default=False)
-
-
-class ArcRail(_Rail):
-    """A rail along an arc of a circle."""
-
-    kind: Literal["arc"] = quantity("The kind of rail.")
-    centre: Point = quantity("Centre of the arc.", "m")
-    radius: Positive = quantity("Radius of the arc.", "m")
-    start_angle: Angle = quantity("Where the arc begins, seen from the centre.", "rad")
-    span: Span = quantity("Angle of the arc, counter-clockwise.", "rad")
-
-
-Rail = Annotated[
-    Annotated[SegmentRail, Tag("(segment)")]
-    | Annotated[PolylineRail, Tag("(polyline)")]
-    | Annotated[ArcRail, Tag("(arc)")],
-    _one_of({"segment": "(segment)", "polyline": "(polyline)", "arc": "(arc)"}),
-]
 
 
 class Floor(Part):
@@ -304,7 +153,10 @@ class Source:
 
     text: str = field(default="", compare=False)
     name: str = field(default="", compare=False)
+    given: str = field(default="", compare=False)
+    """YAML of what was laid over the text."""
     overrides: str = field(default="", compare=False)
+    """The same, and what was read from other files: with the text, it gives the scene again without them."""
 
 
 def _bottle_tag(data: Any) -> str:
@@ -334,6 +186,17 @@ class Scene(Part):
     )
     step: Step = quantity("Integration within a tick.", default=Step())
     slip_limit: Positive = quantity("Speed v_lim below which friction is regularised (7)-(10).", "m/s", default=0.01)
+    friction_curve: Literal["polynomial", "atan"] = quantity(
+        "How friction grows below and about v_lim. polynomial: (7)-(10), full at v_lim; "
+        "atan: 2/pi x atan(pi x speed / v_lim), of the same slope at rest, full only in the limit. "
+        "A base that is a ring has a curve of its own.",
+        default="polynomial",
+    )
+    friction_solver: Literal["explicit", "implicit"] = quantity(
+        "explicit: friction bounds the time step; implicit: solved for the velocity at the end of a step, which does "
+        "not (semi_implicit_euler only).",
+        default="explicit",
+    )
     lever_arm: Literal["overlap", "radius"] = quantity(
         "Lever arm of friction at a contact. overlap: to the middle of the overlap, which conserves angular momentum; "
         "radius: the bottle's radius, as in the paper.",
@@ -369,6 +232,9 @@ class Scene(Part):
         Holds("a list of bottles and grids"),
     ] = quantity("Bottles that are there at the start.", default=())
     outputs: Outputs = quantity("Rates of the outputs.", default=Outputs())
+    effects: Annotated[Forced, Holds('a mapping of names of effects to "on" or "off"')] = quantity(
+        "Effects forced on or off, whatever the scene calls for; docs/effects.md lists them.", default={}
+    )
 
     _source: Source = PrivateAttr(default=Source())
 
@@ -386,8 +252,12 @@ class Scene(Part):
         """Ticks from one output of a topic to the next, 0 if there is none. KeyError if there is no such topic."""
         if topic not in self.TOPICS:
             raise KeyError(topic)
-        rate = getattr(self.outputs, topic)
+        rate = 0.0 if self._silenced(topic) else getattr(self.outputs, topic)
         return round(1e9 / (rate * self.tick_ns)) if rate else 0
+
+    def _silenced(self, topic: str) -> bool:
+        """Whether the effect behind an output is forced off."""
+        return topic == "contacts" and self.effects.get("contact_arrays") == "off"
 
     @property
     def source_text(self) -> str:
@@ -401,5 +271,10 @@ class Scene(Part):
 
     @property
     def overrides_text(self) -> str:
-        """YAML of what was changed when the scene was read, "" if nothing."""
+        """YAML of what the text does not say: what was changed when the scene was read, and tables from files."""
         return self._source.overrides
+
+    @property
+    def given_overrides(self) -> str:
+        """YAML of what was changed when the scene was read, "" if nothing."""
+        return self._source.given

@@ -48,6 +48,7 @@ def parse_angle(value: Any) -> Any:
 Number = Annotated[float, Strict(), AllowInfNan(False), Says("a number")]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Says("a number greater than 0")]
 NotNegative = Annotated[float, Strict(), AllowInfNan(False), Ge(0), Says("a number, 0 or greater")]
+Restitution = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Le(1), Says("a number greater than 0, at most 1")]
 Count = Annotated[int, Strict(), Ge(1), Says("a whole number, 1 or greater")]
 Seed = Annotated[int, Strict(), Ge(0), Le(2**64 - 1), Says("a whole number from 0 to 2^64 - 1")]
 Flag = Annotated[bool, Strict(), Says("true or false")]
@@ -61,12 +62,12 @@ Span = Annotated[
 ]
 
 _coordinate = Annotated[float, Strict(), AllowInfNan(False), Ge(-COORDINATE_LIMIT), Le(COORDINATE_LIMIT)]
-_component = Annotated[float, Strict(), AllowInfNan(False)]
+Component = Annotated[float, Strict(), AllowInfNan(False)]
 Point = Annotated[
     tuple[_coordinate, _coordinate], Says(f"a point [x, y] of two numbers within +-{COORDINATE_LIMIT:.0f}")
 ]
-Velocity = Annotated[tuple[_component, _component], Says("a velocity [vx, vy] of two numbers")]
-Limits = Annotated[tuple[_component, _component], Says("two numbers [least, greatest]")]
+Velocity = Annotated[tuple[Component, Component], Says("a velocity [vx, vy] of two numbers")]
+Limits = Annotated[tuple[Component, Component], Says("two numbers [least, greatest]")]
 
 # A name becomes part of a ROS topic, which takes these characters only and at most 255 of them.
 Name = Annotated[

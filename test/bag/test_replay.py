@@ -124,6 +124,19 @@ def test_overrides_are_replayed_too(tmp_path: Path) -> None:
     assert report.last_tick == 30
 
 
+def test_a_table_is_replayed_without_its_file(tmp_path: Path) -> None:
+    """The recording holds its points."""
+    text = SMALL_LINE.read_text(encoding="utf-8")
+    assert text.count("stiffness: 5000") == 1
+    (tmp_path / "line.yaml").write_text(text.replace("stiffness: 5000", "table: glass.csv"), encoding="utf-8")
+    (tmp_path / "glass.csv").write_text("overlap,force\n1e-3,5\n4e-3,30\n", encoding="utf-8")
+    record(load_scene(tmp_path / "line.yaml"), tmp_path / "tabled", ticks=20)
+    (tmp_path / "glass.csv").unlink()
+    report = replay(tmp_path / "tabled")
+    assert report.difference is None
+    assert report.last_tick == 20
+
+
 def stock(bag: Path, folder: Path, messages: Iterator[tuple[str, int, bytes]]) -> Path:
     """What stock rosbag2 makes of the topics of a node in the namespace /hall: stamped with the wall clock."""
     store = typestore()

@@ -8,7 +8,8 @@ import pytest
 from scenes import base, belt, bottle, scene
 from worlds import FAR, state_of
 
-from conveyor_sim.engine.base import note_carriers, surface_velocity
+from conveyor_sim.engine.belts import surface_velocity
+from conveyor_sim.engine.footing import find_carriers
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state import State
@@ -58,9 +59,9 @@ def expected_carriers(points: np.ndarray, belts: dict[str, Any]) -> np.ndarray:
 
 def carriers(state: State, count: int) -> np.ndarray:
     world = state.world
-    note_carriers(world.bottles, world.belts, world.surface)
-    floor = len(state.model.belts)
-    return np.where(world.surface.carrier == floor, -1, world.surface.carrier)[:count]
+    found = np.zeros(world.bottles.id.size, np.int32)
+    find_carriers(world.bottles, world.belts, world.surface, found)
+    return np.where(found == len(state.model.belts), -1, found)[:count]
 
 
 def test_the_last_listed_belt_under_the_axis_carries() -> None:

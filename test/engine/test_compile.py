@@ -11,8 +11,11 @@ import pytest
 import conveyor_sim
 
 FORCE = """
+import numpy as np
+from conveyor_sim.engine.arrays import ContactLaw
 from conveyor_sim.engine.contact import contact_force
-print(contact_force(0.002, 1.0, 0.0, 1.0, 5000.0, 0.3, None, None, 0.01)[1])
+law = ContactLaw(np.array([5000.0]), *[None] * 6, np.array([0.3]), None, None)
+print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, None, None)[1])
 stats = contact_force.stats
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
@@ -64,7 +67,7 @@ def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
     assert python(copied, FORCE) == ["-3.0", "1", "0"]
     friction = copied / "conveyor_sim" / "engine" / "friction.py"
     text = friction.read_text()
-    friction.write_text(text.replace("return 1.0 / slip", "return 2.0 / slip"))
+    friction.write_text(text.replace("copysign(t * (2.0 - t), slip)", "copysign(2.0, slip)"))
     assert python(copied, FORCE) == ["-6.0", "0", "1"]
     friction.write_text(text)
     assert python(copied, FORCE) == ["-3.0", "1", "0"]

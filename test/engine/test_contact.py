@@ -1,57 +1,178 @@
-"""The force in one contact."""
+"""The force in one contact: each law by itself, and how they add up."""
 
+import math
 from typing import Any
 
+import numpy as np
 import pytest
 
-from conveyor_sim.engine.contact import contact_force
+from conveyor_sim.engine.arrays import ContactLaw, Curves
+from conveyor_sim.engine.contact import contact_force, spring_after
 
 K, C, MU, LIMIT = 5000.0, 2.0, 0.3, 0.01
+K_HERTZ = 3e6
+LINE = Curves(np.array([0, 2], np.uint32), np.array([0.0, 0.01]), np.array([0.0, 0.01 * K]))
+
+
+def law(**columns: float) -> ContactLaw:
+    """Entry 1 of two has the coefficients; no column for the rest."""
+    flat: dict[str, Any] = dict.fromkeys(ContactLaw._fields)
+    for name, value in columns.items():
+        flat[name] = np.array([-1.0, value]) if name != "curve" else np.array([-1, value], np.int32)
+    return ContactLaw(**flat)
 
 
 def force(
-    overlap: float, closing: float = 0.0, slip: float = 0.0, share: float = 1.0, friction: Any = None,
-    paper: Any = None, normal: Any = None,
+    overlap: float, closing: float = 0.0, slip: float = 0.0, share: float = 1.0, *,
+    curves: Any = None, atan: Any = None, spring: Any = None, implicit: Any = None, **columns: float,
 ) -> tuple[float, float]:  # fmt: skip
-    return contact_force(overlap, share, closing, slip, K, friction, paper, normal, LIMIT)
+    return contact_force(
+        law(**(columns or {"stiffness": K})), np.uint64(1), curves, LIMIT, atan, overlap, share, closing, slip, spring,
+        implicit,
+    )  # fmt: skip
 
 
-def test_the_spring_alone() -> None:
+def test_the_linear_spring_alone() -> None:
     """N = k delta (23), in the share that the contact has; nothing along the tangent."""
     assert force(0.002, closing=0.5, slip=1.0) == (K * 0.002, 0.0)
     assert force(0.002, share=0.25) == (K * 0.002 * 0.25, 0.0)
 
 
+def test_hertz() -> None:
+    """N = k_h delta^1.5, the power from square roots alone."""
+    for overlap in (1e-9, 1e-4, 0.002):
+        assert force(overlap, 0.5, 1.0, hertz=K_HERTZ) == (pytest.approx(K_HERTZ * overlap**1.5, rel=1e-15), 0.0)
+
+
+def test_a_table_that_is_a_line_is_the_linear_spring() -> None:
+    """The same law by another way, damping and friction included."""
+    for overlap in (0.0, 0.002, 0.03):
+        expected = force(overlap, 0.5, 0.3, stiffness=K, damping_normal=C, friction=MU)
+        assert force(overlap, 0.5, 0.3, curves=LINE, curve=0, damping_normal=C, friction=MU) == pytest.approx(expected)
+
+
+def test_elastic_laws_of_other_pairs_add_nothing() -> None:
+    """A pair has one elastic law; of the others it has 0, or -1 for a table."""
+    mixed = force(0.002, stiffness=K, hertz=0.0, curve=-1, curves=LINE)
+    assert mixed == force(0.002)
+
+
 def test_paper_damping_is_isotropic_and_not_clamped() -> None:
     """-c v* (22): also against the slip, and it pulls at the end of a rebound."""
-    assert force(0.002, 0.5, -0.4, paper=C) == (pytest.approx(K * 0.002 + C * 0.5), pytest.approx(C * 0.4))
-    assert force(0.0001, -0.5, paper=C)[0] == pytest.approx(K * 0.0001 - C * 0.5)
-    assert force(0.0001, -0.5, paper=C)[0] < 0.0
+    paper = {"stiffness": K, "damping_paper": C}
+    assert force(0.002, 0.5, -0.4, **paper) == (pytest.approx(K * 0.002 + C * 0.5), pytest.approx(C * 0.4))
+    assert force(0.0001, -0.5, **paper)[0] == pytest.approx(K * 0.0001 - C * 0.5)
+    assert force(0.0001, -0.5, **paper)[0] < 0.0
 
 
-def test_normal_damping_never_pulls() -> None:
-    """N = max(0, k delta + c v_n), and none along the tangent."""
-    assert force(0.002, 0.5, -0.4, normal=C) == (pytest.approx(K * 0.002 + C * 0.5), 0.0)
-    assert force(0.0001, -0.5, normal=C) == (0.0, 0.0)
+def test_normal_damping() -> None:
+    """N = k delta + c v_n, and none along the tangent."""
+    assert force(0.002, 0.5, -0.4, stiffness=K, damping_normal=C) == (pytest.approx(K * 0.002 + C * 0.5), 0.0)
+
+
+def test_tsuji_damping() -> None:
+    """N = k_h delta^1.5 + c delta^0.25 v_n (Tsuji et al. 1992)."""
+    expected = K_HERTZ * 0.002**1.5 + C * 0.002**0.25 * 0.5
+    assert force(0.002, 0.5, -0.4, hertz=K_HERTZ, damping_tsuji=C) == (pytest.approx(expected), 0.0)
+
+
+@pytest.mark.parametrize("elastic", [{"stiffness": K}, {"hertz": K_HERTZ}])
+def test_onset_damping(elastic: dict[str, float]) -> None:
+    """N = N_elastic (1 + lambda v_n) (Hunt and Crossley 1975): it starts at nothing, with any elastic law."""
+    bare = force(0.002, **elastic)[0]
+    assert force(0.002, 0.5, -0.4, damping_onset=0.8, **elastic) == (pytest.approx(bare * (1.0 + 0.8 * 0.5)), 0.0)
+    assert force(1e-12, 0.5, damping_onset=0.8, **elastic)[0] < 1e-7
+
+
+@pytest.mark.parametrize("damping", ["damping_normal", "damping_tsuji", "damping_onset"])
+def test_damping_that_never_pulls(damping: str) -> None:
+    """All but the paper's: the total normal force is clamped at 0, friction with it."""
+    assert force(1e-5, -80.0, 0.3, stiffness=K, friction=MU, **{damping: C}) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("slip", [-0.5, 0.5])
 def test_friction_acts_against_the_slip_with_the_damped_normal_force(slip: float) -> None:
     """T = -mu N p(s) s/|s|, N with its damping."""
-    normal, tangential = force(0.002, 0.5, slip, friction=MU, normal=C)
+    normal, tangential = force(0.002, 0.5, slip, stiffness=K, friction=MU, damping_normal=C)
     assert tangential == pytest.approx(-MU * normal * (1.0 if slip > 0.0 else -1.0))
     below = 0.4 * LIMIT
-    assert force(0.002, slip=below, friction=MU)[1] == pytest.approx(-MU * K * 0.002 * (2 * 0.4 - 0.4**2))
+    p = 2 * 0.4 - 0.4**2
+    assert force(0.002, slip=below, stiffness=K, friction=MU)[1] == pytest.approx(-MU * K * 0.002 * p)
+    p = 2.0 / math.pi * math.atan(0.4 * math.pi)
+    assert force(0.002, slip=below, atan=1, stiffness=K, friction=MU)[1] == pytest.approx(-MU * K * 0.002 * p)
 
 
 def test_a_contact_that_pulls_has_no_friction() -> None:
     """Coulomb's law takes the clamped normal force; the paper's damping goes on along the tangent."""
-    normal, tangential = force(0.0001, -0.5, 0.3, friction=MU, paper=C)
+    normal, tangential = force(0.0001, -0.5, 0.3, stiffness=K, friction=MU, damping_paper=C)
     assert normal < 0.0
     assert tangential == pytest.approx(-C * 0.3)
 
 
 def test_both_dampings_in_one_table() -> None:
     """A pair of materials has one law; the other's coefficient is 0 in the table and changes nothing."""
-    assert force(0.002, 0.5, 0.3, friction=MU, paper=0.0, normal=C) == force(0.002, 0.5, 0.3, friction=MU, normal=C)
-    assert force(0.002, 0.5, 0.3, friction=MU, paper=C) == force(0.002, 0.5, 0.3, friction=MU, paper=C, normal=None)
+    clamped = force(0.002, 0.5, 0.3, stiffness=K, friction=MU, damping_normal=C)
+    assert force(0.002, 0.5, 0.3, stiffness=K, friction=MU, damping_paper=0.0, damping_normal=C) == clamped
+    paper = force(0.0001, -0.5, 0.3, stiffness=K, friction=MU, damping_paper=C)
+    assert force(0.0001, -0.5, 0.3, stiffness=K, friction=MU, damping_paper=C, damping_normal=0.0) == paper
+
+
+def test_a_share_scales_the_whole_law() -> None:
+    """Two pieces in line that halve one contact push as one, whatever the law."""
+    columns = {"hertz": K_HERTZ, "damping_tsuji": C, "friction": MU, "tangential_stiffness": 400.0}
+    whole = force(0.002, 0.5, 1e-3, spring=1e-4, **columns)
+    half = force(0.002, 0.5, 1e-3, 0.5, spring=1e-4, **columns)
+    assert (2.0 * half[0], 2.0 * half[1]) == pytest.approx(whole)
+
+
+def test_implicit_friction_takes_the_slip_after_the_step() -> None:
+    """T dt/m_t is what the slip loses: s + b v_lim p(s) = s_0 with mu N p(s) = -T."""
+    ease, slip = 5e-4, 0.6 * LIMIT
+    normal, tangential = force(0.002, 0.5, slip, implicit=ease, stiffness=K, friction=MU, damping_normal=C)
+    after = slip + ease * tangential
+    assert 0.0 < after < slip
+    assert -tangential == pytest.approx(MU * normal * (2.0 * after / LIMIT - (after / LIMIT) ** 2))
+
+
+def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
+    """T = -(k_t xi + c_t s), mu N at most in size; a pair without one keeps the friction curve."""
+    spring = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0, "tangential_damping": 6.0}
+    assert force(0.002, slip=0.01, spring=2e-4, **spring)[1] == pytest.approx(-(4000.0 * 2e-4 + 6.0 * 0.01))
+    assert force(0.002, slip=0.0, spring=-2e-4, **spring)[1] == pytest.approx(4000.0 * 2e-4)
+    for xi in (-0.1, 0.1):
+        assert force(0.002, spring=xi, **spring)[1] == pytest.approx(-math.copysign(MU * K * 0.002, xi))
+    without = {**spring, "tangential_stiffness": 0.0, "tangential_damping": 0.0}
+    assert force(0.002, slip=0.004, spring=0.1, **without) == force(0.002, slip=0.004, stiffness=K, friction=MU)
+
+
+def test_the_spring_goes_with_the_slip_and_no_further_than_it_can_hold() -> None:
+    """xi + dt s; cut to mu N/k_t while the contact slides, forgotten without a normal force."""
+    spring = law(friction=MU, tangential_stiffness=4000.0)
+    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 10.0) == pytest.approx(1e-4 + 0.02 * 1e-3)
+    for sign in (-1.0, 1.0):
+        assert spring_after(spring, 1, sign * 1e-4, sign * 5.0, 1e-3, 10.0) == pytest.approx(sign * MU * 10.0 / 4000.0)
+    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 0.0) == 0.0
+    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, -3.0) == 0.0
+    assert spring_after(law(friction=MU, tangential_stiffness=0.0), 1, 1e-4, 0.02, 1e-3, 10.0) == 0.0
+
+
+EVERYTHING = {
+    "stiffness": K, "hertz": K_HERTZ, "damping_paper": C, "damping_normal": C, "damping_tsuji": C, "damping_onset": C,
+    "friction": MU, "tangential_stiffness": 4000.0, "tangential_damping": 6.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("overlap", [0.0, -0.0, -1e-300, -0.004])
+def test_apart_there_is_no_force_at_all(overlap: float) -> None:
+    """Exactly 0 from every law, whatever the velocities: loops add it up for all listed pairs."""
+    for closing in (-3.0, 0.0, 3.0):
+        for slip in (-3.0, 0.0, 1e-3):
+            assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, implicit=1e-3) == (0.0, 0.0)
+            assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, atan=1) == (0.0, 0.0)
+
+
+def test_what_is_not_a_number_stays_visible() -> None:
+    """No clamp hides a NaN."""
+    for arguments in ((math.nan, 0.1, 0.1), (0.001, math.nan, 0.1)):
+        assert math.isnan(force(*arguments, **EVERYTHING, spring=0.01, implicit=1e-3)[0])
+    assert math.isnan(force(0.001, 0.1, math.nan, **EVERYTHING, spring=0.01, implicit=1e-3)[1])

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 from scenes import RADIUS, bottle, contact, line, scene, segment, simulation
-from worlds import FAR, state_of
+from worlds import FAR, evaluate, state_of
 
-from conveyor_sim.engine.forces import evaluate_forces
 from conveyor_sim.simulation import Simulation
 
 
@@ -29,7 +28,7 @@ def test_listed_forces_sum_up_to_the_forces_that_act() -> None:
 
 def assert_listed_forces_act(sim: Simulation) -> None:
     world, model = sim._state.world, sim.model
-    evaluate_forces(world)
+    evaluate(world)
     contacts, state = sim.contacts(), sim.bottles()
     slot = {int(id_): s for s, id_ in enumerate(world.bottles.id) if id_ >= 0}
     fx, fy, moment = (np.zeros(world.bottles.id.size) for _ in range(3))
@@ -49,8 +48,8 @@ def assert_listed_forces_act(sim: Simulation) -> None:
         s = slot[int(id_)]
         ux, uy = surface.ux[belt], surface.uy[belt]
         if belt >= 0 and surface.turn is not None:
-            ux -= surface.turn[belt] * (world.bottles.y[s] - surface.cy[belt])
-            uy += surface.turn[belt] * (world.bottles.x[s] - surface.cx[belt])
+            ux -= surface.turn[belt] * world.bottles.y[s]
+            uy += surface.turn[belt] * world.bottles.x[s]
         slip = np.array([vx - ux, vy - uy])
         speed, limit = math.hypot(*slip), model.settings.slip_limit
         share = (2.0 - speed / limit) / limit if speed < limit else 1.0 / speed
@@ -73,7 +72,7 @@ def test_newtons_third_law_in_the_sums() -> None:
         rng.normal(0.0, 1.0, (count, 2)),
         rng.normal(0.0, 10.0, count),
     )
-    evaluate_forces(state.world)
+    evaluate(state.world)
     load = state.world.load
     size = np.hypot(load.fx, load.fy).sum()
     assert size > 1e4

@@ -1,34 +1,104 @@
-"""The regularised friction law."""
+"""The regularised friction law, its two curves, and its implicit solution."""
+
+import math
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from conveyor_sim.engine.friction import regularisation
+from conveyor_sim.engine.friction import (
+    friction_share,
+    implicit_regularisation,
+    implicit_share,
+    implicit_slip,
+    regularisation,
+)
 
 LIMIT = 0.01
+CURVES = [None, 1]
+"""Polynomial and arctangent."""
 
 
-def p(slip: float) -> float:
-    """The law's p(s), from the quotient p(s)/s that the engine works with."""
-    return slip * regularisation(slip, LIMIT)
+def reference(slip: float, atan: Any) -> float:
+    """p(s) of a slip s >= 0, as the paper has it."""
+    if atan:
+        return 2.0 / math.pi * math.atan(math.pi * slip / LIMIT)
+    return 2.0 * slip / LIMIT - slip**2 / LIMIT**2 if slip < LIMIT else 1.0
 
 
-def test_it_is_zero_at_rest_and_one_from_the_limit_on() -> None:
-    """p(0) = 0, p(v_lim) = 1, and the quotient at rest is 2 / v_lim."""
-    assert p(0.0) == 0.0
-    assert regularisation(0.0, LIMIT) == pytest.approx(2.0 / LIMIT)
-    for slip in (LIMIT, 1.5 * LIMIT, 3.0):
-        assert p(slip) == pytest.approx(1.0)
+@pytest.mark.parametrize("atan", CURVES)
+def test_the_curves(atan: Any) -> None:
+    """p(0) = 0, p(s) as printed (8), 1 far beyond v_lim; the same from the quotient p/s and from the signed share."""
+    for slip in [0.0, *np.linspace(1e-9, 2.0 * LIMIT, 101), 0.5, 30.0]:
+        expected = reference(float(slip), atan)
+        assert slip * regularisation(float(slip), LIMIT, atan) == pytest.approx(expected, rel=1e-14, abs=1e-16)
+        assert friction_share(float(slip), LIMIT, atan) == pytest.approx(expected, rel=1e-14, abs=1e-16)
+        assert friction_share(-float(slip), LIMIT, atan) == -friction_share(float(slip), LIMIT, atan)
 
 
-def test_it_follows_the_papers_polynomial() -> None:
-    """p = 2 s / v_lim - s^2 / v_lim^2 (8)."""
-    for slip in np.linspace(0.0, LIMIT, 50, endpoint=False):
-        assert p(slip) == pytest.approx(2.0 * slip / LIMIT - slip**2 / LIMIT**2, abs=1e-15)
+@pytest.mark.parametrize("atan", CURVES)
+def test_at_rest_the_slope_is_two_over_the_limit(atan: Any) -> None:
+    """The quotient at rest, and next to it, is 2/v_lim: nothing is divided by a slip of 0."""
+    for slip in (0.0, 1e-300, 1e-30, 1e-12):
+        assert regularisation(slip, LIMIT, atan) == pytest.approx(2.0 / LIMIT, rel=1e-9)
 
 
-def test_it_is_smooth_at_the_limit() -> None:
+def test_the_polynomial_is_smooth_at_the_limit() -> None:
     """p'(v_lim) = 0 on both sides."""
     step = 1e-6 * LIMIT
-    assert abs(p(LIMIT) - p(LIMIT - step)) / step < 1e-5 / LIMIT
-    assert abs(p(LIMIT + step) - p(LIMIT)) / step < 1e-5 / LIMIT
+    below, at_limit, above = (friction_share(slip, LIMIT, None) for slip in (LIMIT - step, LIMIT, LIMIT + step))
+    assert at_limit == 1.0
+    assert above == 1.0
+    assert (at_limit - below) / step < 1e-5 / LIMIT
+
+
+@pytest.mark.parametrize("atan", CURVES)
+def test_a_slip_that_is_not_a_number_stays_visible(atan: Any) -> None:
+    """A clamp that swallows NaN would hide a broken run."""
+    assert math.isnan(regularisation(math.nan, LIMIT, atan))
+    assert math.isnan(friction_share(math.nan, LIMIT, atan))
+    assert math.isnan(implicit_share(math.nan, 1.0, LIMIT, atan))
+
+
+@pytest.mark.parametrize("atan", CURVES)
+@pytest.mark.parametrize("b", [1e-6, 0.01, 0.3, 1.0, 7.0, 1e3, 1e9])
+def test_the_implicit_slip_solves_its_equation(atan: Any, b: float) -> None:
+    """s + b v_lim p(s) = s_0, against a bracketing root finder; Newton's four rounds leave 6e-12 of s."""
+    for before in LIMIT * np.concatenate([np.logspace(-6, 4, 31), (1.0 + b) * np.array([0.5, 0.99, 1.0, 1.01, 2.0])]):
+        root = brentq(lambda s, s_0=before: s + b * LIMIT * reference(s, atan) - s_0, 0.0, before, xtol=1e-30)
+        after = implicit_slip(float(before), b, LIMIT, atan)
+        # Where s is the small rest of a large s_0, its own digits are lost in s_0 before it is known.
+        assert after == pytest.approx(root, rel=1e-11, abs=4e-16 * before)
+        assert implicit_share(float(before), b, LIMIT, atan) == pytest.approx(reference(root, atan), rel=1e-11)
+
+
+@pytest.mark.parametrize("atan", CURVES)
+def test_the_implicit_forms_agree(atan: Any) -> None:
+    """Slip, share and quotient are one solution; odd in the slip; at rest there is a quotient, 2/(v_lim (1 + 2 b))."""
+    for before in (1e-12, 1e-4, 0.011, 0.3):
+        for b in (1e-3, 0.4, 20.0):
+            share = implicit_share(before, b, LIMIT, atan)
+            assert implicit_slip(before, b, LIMIT, atan) == pytest.approx(before - b * LIMIT * share, abs=1e-14)
+            assert before * implicit_regularisation(before, b, LIMIT, atan) == pytest.approx(share, rel=1e-11)
+            assert implicit_share(-before, b, LIMIT, atan) == -share
+            assert implicit_slip(-before, b, LIMIT, atan) == -implicit_slip(before, b, LIMIT, atan)
+    for b in (0.0, 0.5, 1e4):
+        at_rest = implicit_regularisation(0.0, b, LIMIT, atan)
+        assert at_rest == pytest.approx(2.0 / LIMIT / (1.0 + 2.0 * b), rel=1e-11)
+
+
+@pytest.mark.parametrize("atan", CURVES)
+def test_without_a_step_the_implicit_form_is_the_explicit_one(atan: Any) -> None:
+    """b = 0: nothing happens within the step."""
+    for slip in (0.0, 1e-5, 0.004, 0.01, 0.4):
+        assert implicit_slip(slip, 0.0, LIMIT, atan) == pytest.approx(slip, rel=1e-14)
+        assert implicit_share(slip, 0.0, LIMIT, atan) == pytest.approx(friction_share(slip, LIMIT, atan), rel=1e-11)
+
+
+@pytest.mark.parametrize("atan", CURVES)
+def test_an_implicit_step_never_turns_the_slip_round(atan: Any) -> None:
+    """Whatever the step, 0 <= s <= s_0; the explicit one chatters beyond b = 1."""
+    for before in LIMIT * np.logspace(-8, 8, 33):
+        for b in np.logspace(-8, 8, 33):
+            assert 0.0 <= implicit_slip(float(before), float(b), LIMIT, atan) <= before

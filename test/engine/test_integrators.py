@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scenes import MASS, RADIUS, bottle, contact, order, scene, simulation
-from worlds import FAR, state_of
+from worlds import ALONE, FAR, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
 from conveyor_sim.errors import SimulationError
@@ -18,7 +18,12 @@ DEPTH = 0.01
 def squeezed(integrator: str, speed: float = 0.0) -> State:
     """Two bottles pressed into each other, with the paper's damping; they spin alike, so their rims slip."""
     fields = {"contacts": [contact(K, damping=("paper", C))], "floor": "none", "lever_arm": "radius"}
-    given = scene(step={"integrator": integrator}, bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)], **fields)
+    given = scene(
+        step={"integrator": integrator},
+        effects={"peaks": "on"},
+        bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
+        **fields,
+    )
     apart = 2.0 * RADIUS - DEPTH
     return state_of(given, [(0.0, 0.0), (apart, 0.0)], [(speed / 2, 0.0), (-speed / 2, 0.0)], [3.0, 3.0])
 
@@ -42,7 +47,7 @@ def test_order_within_a_lasting_damped_contact(integrator: str, expected: float)
     for n in numbers:
         state = squeezed(integrator)
         state.world.spin.omega[:] = 0.0
-        INTEGRATORS[integrator](state.world, n, end / n, START)
+        INTEGRATORS[integrator](state.world, ALONE, n, end / n, START)
         bottles = state.world.bottles
         x, rate = closed_form(end)
         overlap = 2.0 * RADIUS - (bottles.x[1] - bottles.x[0])
@@ -58,7 +63,7 @@ def test_one_step_in_free_flight(integrator: str) -> None:
     bottles.x[1], bottles.vx[1], bottles.vy[1] = 5.0, 0.25, -0.5
     state.world.neighbourhood.stale[0] = 1
     state.make_lists()
-    assert INTEGRATORS[integrator](state.world, 1, 0.5, START) == 1
+    assert INTEGRATORS[integrator](state.world, ALONE, 1, 0.5, START) == 1
     assert (bottles.x[1], bottles.y[1]) == (5.125, -0.25)
     assert spin.theta[1] == 1.5
     assert not bottles.x[2:].any()
@@ -69,11 +74,11 @@ def test_resuming_within_a_tick_leaves_no_trace(integrator: str) -> None:
     """A stale list interrupts after any step; going on with RESUME gives the bits of an uninterrupted run."""
     whole, parts = squeezed(integrator, 1.0), squeezed(integrator, 1.0)
     steps, dt = 40, 1e-4
-    assert INTEGRATORS[integrator](whole.world, steps, dt, START) == steps
+    assert INTEGRATORS[integrator](whole.world, ALONE, steps, dt, START) == steps
     done, phase, calls = 0, START, 0
     while done < steps:
         parts.world.neighbourhood.stale[0] = 1
-        done += INTEGRATORS[integrator](parts.world, steps - done, dt, phase)
+        done += INTEGRATORS[integrator](parts.world, ALONE, steps - done, dt, phase)
         parts.make_lists()
         phase = RESUME
         calls += 1
@@ -95,7 +100,7 @@ def test_a_bottle_at_rest_comes_to_rest(integrator: str) -> None:
     bottles.vx[1] = 1e-101
     state.world.neighbourhood.stale[0] = 1
     state.make_lists()
-    INTEGRATORS[integrator](state.world, 1, 1e-3, START)
+    INTEGRATORS[integrator](state.world, ALONE, 1, 1e-3, START)
     assert bottles.vx[1] == 0.0
 
 

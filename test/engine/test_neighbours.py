@@ -8,7 +8,7 @@ import pytest
 from scenes import RADIUS, arc, bottle, contact, kind, polyline, scene, segment
 from worlds import FAR, nearest_on_arc, nearest_on_segment, rail_scene, state_of
 
-from conveyor_sim.engine.neighbours import moved_too_far, rebuild
+from conveyor_sim.engine.rebuild import moved_too_far, rebuild
 from conveyor_sim.state import State
 
 RANDOM = np.random.default_rng(3)
@@ -81,10 +81,10 @@ def test_touching_pairs_are_listed_until_someone_has_moved_by_half_the_skin() ->
         moved = points + 0.9999 * reach * np.column_stack([np.cos(angle), np.sin(angle)])
         assert within(moved, radii, 0.0) <= listed(state)
         state.world.bottles.x[:300], state.world.bottles.y[:300] = moved.T
-        assert not moved_too_far(state.world.bottles, state.world.neighbourhood, state.model.settings.skin)
+        assert not moved_too_far(state.world.bottles, state.world.neighbourhood, state.model.settings.skin, 0, 300)
     state.world.bottles.x[17] = points[17, 0] + 1.0001 * reach
     state.world.bottles.y[17] = points[17, 1]
-    assert moved_too_far(state.world.bottles, state.world.neighbourhood, state.model.settings.skin)
+    assert moved_too_far(state.world.bottles, state.world.neighbourhood, state.model.settings.skin, 0, 300)
 
 
 def test_a_removed_bottle_leaves_the_lists() -> None:
@@ -112,13 +112,13 @@ def test_each_pair_has_the_constants_of_its_types() -> None:
     assert pairs.used[0] == 15
     for p in range(15):
         names = sorted("ab"[kinds[slot]] for slot in (pairs.i[p], pairs.j[p]))
-        assert pairs.stiffness[p] == stiffness[names[0], names[1]]
+        assert pairs.law.stiffness[p] == stiffness[names[0], names[1]]
 
 
 def test_a_list_too_short_is_told_and_grown() -> None:
     """`rebuild` says how many entries each list needs, and stays stale until they fit."""
     state, points, radii = crowd(40, 0.1)
-    state._replace_lists(state.world, 8)
+    state.world = state.world._replace(pairs=state._pairs(8))
     needed = rebuild(state.world)
     assert needed[0] == len(within(points, radii, state.model.settings.skin)) > 8
     assert state.world.neighbourhood.stale[0] == 1

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes import RADIUS, arc, polyline, segment
 from worlds import (
+    ALONE,
     STIFFNESS,
     nearest_of,
     nearest_on_arc,
@@ -15,8 +16,8 @@ from worlds import (
     rail_forces,
 )
 
-from conveyor_sim.engine.arrays import RailContacts
-from conveyor_sim.engine.rails import MOST_CONTACTS, _keep
+from conveyor_sim.engine.rails import keep_deepest
+from conveyor_sim.engine.team import MOST_CONTACTS
 
 RANDOM = np.random.default_rng(20240229)
 ROUNDING = 1e-9
@@ -245,12 +246,11 @@ def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
 
 def test_more_contacts_than_there_is_room_for_keep_the_deepest() -> None:
     """Given in any order, the shallowest are the ones left out."""
-    whole, real = np.zeros(MOST_CONTACTS, np.uint32), np.zeros(MOST_CONTACTS)
-    found = RailContacts(*(real.copy() for _ in range(4)), *(whole.copy() for _ in range(3)), real.copy())
+    found = ALONE.found
     overlaps = np.random.default_rng(1).permutation(np.arange(1.0, MOST_CONTACTS + 9.0))
     count = 0
     for overlap in overlaps:
-        count = _keep(found, count, overlap, 1.0, 0.0, 0, int(overlap), 0)
+        count = keep_deepest(found, count, overlap, 1.0, 0.0, 0, int(overlap), 0, 0)
     assert count == MOST_CONTACTS
     assert sorted(found.overlap) == list(np.arange(9.0, MOST_CONTACTS + 9.0))
     np.testing.assert_array_equal(found.rail, found.overlap)

@@ -4,20 +4,57 @@ Order 1 through dashpots and friction; for undamped springs its errors in energy
 of order 2. One force evaluation a step.
 """
 
-from ..arrays import World
-from ..compile import kernel
-from ..forces import evaluate_forces
-from ..motion import accumulate_peaks, drift, kick, lists_hold
+from typing import Any
+
+from numba import uint64
+
+from ..arrays import Bottles, Load, Member, World
+from ..compile import kernel, part
+from ..forces import bottle_forces, pack_all, pair_phase
+from ..motion import accumulate_peaks, lists_hold, note_moved, settle
+from ..pairs import pack_row
+from ..team import BLOCK, end_block, first_block
 
 
 @kernel
-def advance(world: World, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
+    bottles, slots = world.bottles, world.bottles.x.size
+    pack_all(world, member)
     for step in range(steps):
-        evaluate_forces(world)
-        kick(world.bottles, world.spin, world.load, dt)
-        drift(world.bottles, world.spin, dt)
-        accumulate_peaks(world.load, world.peaks, dt)
-        if not lists_hold(world):
+        pair_phase(world, member, dt, dt)
+        for block in range(first_block(member, slots), end_block(member, slots)):
+            first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
+            bottle_forces(world, member, dt, dt, block, first, end)
+            _move(bottles, world.load, dt, first, end)
+            _turn(world.spin, dt, first, end)
+            accumulate_peaks(world.load, world.peaks, dt, first, end)
+            note_moved(world, member, first, end)
+        if not lists_hold(world, member):
             return step + 1
     return steps
+
+
+@part
+def _move(bottles: Bottles, load: Load, dt: float, first: int, end: int) -> None:
+    """Move bottles first to end, and pack them for the next step, all in one pass."""
+    for i in range(uint64(first), uint64(end)):
+        vx = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
+        vy = settle(bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i]))
+        x = bottles.x[i] + dt * vx
+        y = bottles.y[i] + dt * vy
+        bottles.vx[i] = vx
+        bottles.vy[i] = vy
+        bottles.x[i] = x
+        bottles.y[i] = y
+        pack_row(bottles.packed, i, x, y, vx, vy)
+
+
+@part
+def _turn(spin: Any, dt: float, first: int, end: int) -> None:
+    if spin is None:
+        return
+    for i in range(uint64(first), uint64(end)):
+        omega = settle(spin.omega[i] + dt * (spin.moment[i] * spin.inverse_inertia[i]))
+        spin.omega[i] = omega
+        spin.theta[i] += dt * omega

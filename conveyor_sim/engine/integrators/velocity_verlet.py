@@ -5,30 +5,49 @@ be first order in damping; the prediction to the end of the step is second. Orde
 damping; 1 through a dashpot that sets in with a jump at first touch. One force evaluation a step and one more a tick.
 """
 
-from ..arrays import World
+from ..arrays import Member, World
 from ..compile import kernel
-from ..forces import evaluate_forces
-from ..motion import accumulate_peaks, drift, kick, lists_hold, recall_velocities, store_velocities
+from ..forces import bottle_forces, evaluate_forces, pack_all, pair_phase
+from ..motion import (
+    accumulate_peaks,
+    drift,
+    kick,
+    lists_hold,
+    note_moved,
+    recall_velocities,
+    store_velocities,
+)
+from ..team import BLOCK, end_block, first_block
 from .phase import RESUME, START
 
 
 @kernel
-def advance(world: World, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
+    bottles, slots, half = world.bottles, world.bottles.x.size, 0.5 * dt
+    begin, stop = first_block(member, slots), end_block(member, slots)
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
-        evaluate_forces(world)
-    half = 0.5 * dt
+        evaluate_forces(world, member, dt)
     for step in range(steps):
         if phase != RESUME or step > 0:
-            kick(world.bottles, world.spin, world.load, half)
-            drift(world.bottles, world.spin, dt)
-            if not lists_hold(world):
+            for block in range(begin, stop):
+                first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
+                kick(bottles, world.spin, world.load, half, first, end)
+                drift(bottles, world.spin, dt, first, end)
+                note_moved(world, member, first, end)
+            if not lists_hold(world, member):
                 return step
-        store_velocities(world.stage, world.bottles, world.spin)
-        kick(world.bottles, world.spin, world.load, half)
-        evaluate_forces(world)
-        recall_velocities(world.stage, world.bottles, world.spin)
-        kick(world.bottles, world.spin, world.load, half)
-        accumulate_peaks(world.load, world.peaks, dt)
+        for block in range(begin, stop):
+            first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
+            store_velocities(world.stage, bottles, world.spin, first, end)
+            kick(bottles, world.spin, world.load, half, first, end)
+        pack_all(world, member)
+        pair_phase(world, member, dt, dt)
+        for block in range(begin, stop):
+            first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
+            bottle_forces(world, member, dt, dt, block, first, end)
+            recall_velocities(world.stage, bottles, world.spin, first, end)
+            kick(bottles, world.spin, world.load, half, first, end)
+            accumulate_peaks(world.load, world.peaks, dt, first, end)
     return steps

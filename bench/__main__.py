@@ -1,0 +1,82 @@
+"""`python -m bench [PART ...]`: measures, keeps raw numbers as CSV, renews the tables of docs/performance.md."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Protocol
+
+import click
+
+from bench import dense, growth, markdown, memory, node, plant, start, targets
+from bench.machine import machine
+from bench.measure import Effort, say
+from bench.rows import Row, Rows
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCUMENT = ROOT / "docs" / "performance.md"
+QUICK_FOLDER = Path("runs") / "bench_quick"
+MACHINES = "machines.json"
+FULL = Effort(rounds=5, piece=0.4, quick=False)
+QUICK = Effort(rounds=2, piece=0.05, quick=True)
+
+
+class Part(Protocol):
+    """A module that measures something."""
+
+    def measure(self, effort: Effort, /) -> list[Row]: ...
+    def tables(self, rows: Rows, /) -> str: ...
+
+
+PARTS: dict[str, Part] = {
+    "dense": dense,
+    "plant": plant,
+    "growth": growth,
+    "memory": memory,
+    "start": start,
+    "node": node,
+}
+
+
+@click.command()
+@click.argument("parts", nargs=-1, type=click.Choice([*PARTS]))
+@click.option("--quick", is_flag=True, help=f"Little of everything, to see that it works: to {QUICK_FOLDER} only.")
+@click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the tables from the raw numbers.")
+def main(parts: tuple[str, ...], quick: bool, only_tables: bool) -> None:
+    """Measure PARTS (default: all, about 20 minutes) on a machine that does nothing else."""
+    folder = QUICK_FOLDER if quick else DOCUMENT.with_suffix("")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in [] if only_tables else parts or PARTS:
+        rows = Rows(PARTS[name].measure(QUICK if quick else FULL))
+        rows.write(folder / f"{name}.csv")
+        _note_machine(folder, name)
+        click.echo(f"\n## {name}\n\n{PARTS[name].tables(rows)}\n")
+    found = {name: Rows.read(folder / f"{name}.csv") for name in PARTS}
+    summary = targets.tables(found)
+    click.echo(summary)
+    if quick:
+        return
+    machines = _machines(folder)
+    for name, part in PARTS.items():
+        if found[name].all:
+            raw = f"raw numbers in [performance/{name}.csv](performance/{name}.csv)"
+            origin = f"Measured by `python -m bench {name}` on {machines[name]}; {raw}."
+            markdown.insert(DOCUMENT, name, f"{part.tables(found[name])}\n\n{origin}")
+    markdown.insert(DOCUMENT, "summary", summary)
+    say(f"tables in {DOCUMENT.relative_to(ROOT)}, raw numbers in {folder.relative_to(ROOT)}/")
+
+
+def _note_machine(folder: Path, part: str) -> None:
+    (folder / MACHINES).write_text(json.dumps({**_machines(folder), part: machine()}, indent=1) + "\n")
+
+
+def _machines(folder: Path) -> dict[str, str]:
+    """By part: what it was last measured on."""
+    path = folder / MACHINES
+    found: dict[str, str] = json.loads(path.read_text()) if path.is_file() else {}
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+"""What the engine should reach, beside what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from bench import dense, growth, node, plant, start
+from bench.markdown import table as markdown
+from bench.measure import RATE
+from bench.rows import Rows, Spread
+
+LEAST, MOST = "at least", "at most"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A bound on one figure."""
+
+    what: str
+    part: str
+    bound: str
+    """LEAST or MOST."""
+    value: float
+    figure: Callable[[Rows], float | None]
+    """None if it wasn't measured."""
+
+    def line(self, parts: Mapping[str, Rows]) -> list[str | None]:
+        """For the table."""
+        found = self.figure(parts[self.part])
+        wanted = f"{self.bound} {self.value:g}"
+        if found is None:
+            return [self.what, wanted, None, "not measured"]
+        reached = found >= self.value if self.bound == LEAST else found <= self.value
+        return [self.what, wanted, f"{found:.3g}", "reached" if reached else "**not reached**"]
+
+
+def _ratio(n: float, one: str, other: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.ratio(dense.CASE, n, one, other, RATE))
+
+
+def _plant(contestant: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(plant.CASE, 0, contestant, plant.FACTOR))
+
+
+def _first_step(rows: Rows) -> float | None:
+    return _middle(rows.spread(start.CASE, 0, start.CACHED, start.SECONDS))
+
+
+def _node(rows: Rows) -> float | None:
+    return _middle(rows.spread(node.CASE, 1_000, node.REAL_TIME, node.OVERHEAD))
+
+
+def _middle(spread: Spread | None) -> float | None:
+    return None if spread is None else spread.middle
+
+
+def _rise(case: str, least: float, most: float) -> Callable[[Rows], float | None]:
+    """The dearest over the cheapest bottle-step within a range, less one."""
+
+    def figure(rows: Rows) -> float | None:
+        found = [growth.nanoseconds(rows, case, n) for n in rows.ns(case) if least <= n <= most]
+        costs = [cost.middle for cost in found if cost is not None]
+        return max(costs) / min(costs) - 1.0 if len(costs) > 1 else None
+
+    return figure
+
+
+def _same_bits(rows: Rows) -> float | None:
+    found = [row.value for row in rows.all if row.quantity == dense.SAME_BITS]
+    return min(found) if found else None
+
+
+PAPER, PAPER_2 = dense.name_of("paper", 1), dense.name_of("paper", 2)
+EVERYTHING = dense.name_of("everything", 1)
+
+TARGETS = (
+    *(
+        Target(f"paper's effects over LAMMPS, one thread, N = {n}", "dense", LEAST, v, _ratio(n, PAPER, dense.LAMMPS))
+        for n, v in ((100, 5.0), (1_000, 6.0), (10_000, 6.0))
+    ),
+    *(
+        Target(f"everything over LAMMPS, one thread, N = {n}", "dense", LEAST, 3.0, _ratio(n, EVERYTHING, dense.LAMMPS))
+        for n in (100, 1_000, 10_000)
+    ),
+    *(
+        Target(f"paper's effects over NumPy all pairs, N = {n}", "dense", LEAST, v, _ratio(n, PAPER, dense.ALL_PAIRS))
+        for n, v in ((100, 80.0), (1_000, 500.0))
+    ),
+    *(
+        Target(f"second thread, paper's effects, N = {n}", "dense", LEAST, v, _ratio(n, PAPER_2, PAPER))
+        for n, v in ((1_000, 1.5), (10_000, 1.6))
+    ),
+    Target("the same bits on two threads (1: yes)", "dense", LEAST, 1.0, _same_bits),
+    Target("paper's plant, times real time", "plant", LEAST, 25.0, _plant(plant.PAPER)),
+    Target(
+        "plant of glass, 1e8 N/m, 20 steps, times real time", "plant", LEAST, 3.0, _plant(plant.glass_name(1e8, 20))
+    ),
+    Target("rise of the cost from N = 100 to 10 000", "growth", MOST, 0.25, _rise(growth.BOTTLES, 100, 10_000)),
+    Target("rise of the cost from 1 to 1 000 belts", "growth", MOST, 0.15, _rise(growth.BELTS, 1, 1_000)),
+    Target("rise of the cost from 1 to 1 000 rails", "growth", MOST, 0.15, _rise(growth.RAILS, 1, 1_000)),
+    Target("s to the first step, cached", "start", MOST, 1.0, _first_step),
+    Target("cores of the node beside the kernels, N = 1 000, 50 Hz, real time", "node", MOST, 0.1, _node),
+)
+
+
+def tables(parts: Mapping[str, Rows]) -> str:
+    """One line a target; figures are medians."""
+    return markdown(["", "wanted", "measured", ""], [target.line(parts) for target in TARGETS])

@@ -1,0 +1,104 @@
+"""The effects: what law each adds, what in a scene calls for it, what it needs, how it bounds the time step.
+
+What no scene asks for is absent: its arrays are None and its branch is not compiled (engine/compile.py). Families of
+effects have a file each; `laws.py` and `model.py` build their arrays, the laws are files in `engine/`.
+"""
+
+from collections.abc import Sequence
+
+from conveyor_sim.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
+from conveyor_sim.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
+from conveyor_sim.effects.damping import NORMAL_DAMPING, ONSET_DAMPING, PAPER_DAMPING, TSUJI_DAMPING
+from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
+from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
+from conveyor_sim.effects.geometry import ARC_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
+from conveyor_sim.effects.observers import CONTACT_ARRAYS, PEAKS
+from conveyor_sim.effects.rotation import ROTATION
+from conveyor_sim.effects.supply import INFEED, OUTFEED
+from conveyor_sim.effects.terms import Terms, most_bottles
+from conveyor_sim.errors import SceneError
+from conveyor_sim.scene.effect_names import EffectName
+from conveyor_sim.scene.places import Places
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.timestep import Bound
+
+__all__ = ["EFFECTS", "Cause", "Effect", "EffectChoice", "Terms", "bounds_of", "choose_effects", "most_bottles"]
+
+EFFECTS: tuple[Effect, ...] = (
+    BOTTLE_CONTACT,
+    SEGMENT_RAILS,
+    ARC_RAILS,
+    UNEQUAL_RADII,
+    LINEAR,
+    HERTZ,
+    TABLE,
+    PAPER_DAMPING,
+    NORMAL_DAMPING,
+    TSUJI_DAMPING,
+    ONSET_DAMPING,
+    CONTACT_FRICTION,
+    BASE_FRICTION,
+    ATAN_FRICTION,
+    IMPLICIT_FRICTION,
+    TANGENTIAL_SPRING,
+    RING_BASE,
+    BELTS,
+    CURVED_BELTS,
+    ROTATION,
+    INFEED,
+    OUTFEED,
+    PEAKS,
+    CONTACT_ARRAYS,
+)
+"""In the order in which they are decided: what is on may call for those after it."""
+
+
+def choose_effects(scene: Scene) -> tuple[EffectChoice, ...]:
+    """Decide every effect for a scene, in the order of EFFECTS. SceneError if one can't be forced as the scene says."""
+    choices: list[EffectChoice] = []
+    refused: list[EffectName] = []
+    on: set[str] = set()
+    for effect in EFFECTS:
+        choice = _choose(effect, scene, on)
+        if choice is None:
+            refused.append(effect.name)
+            continue
+        choices.append(choice)
+        if choice.on:
+            on.add(effect.name)
+    if refused:
+        raise SceneError("\n".join(_refusals(scene, refused)))
+    return tuple(choices)
+
+
+def bounds_of(terms: Terms) -> tuple[Bound, ...]:
+    """The bounds on dt of all effects that are on, each the tightest over types and materials."""
+    found = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
+    return tuple(bound for bounds in found for bound in bounds)
+
+
+def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:
+    """The choice; None if the scene forces what can't be."""
+    cause = effect.called_for(scene, on)
+    forced = scene.effects.get(effect.name)
+    if forced is None:
+        why = effect.absent if cause is None else str(cause)
+        return EffectChoice(effect.name, cause is not None, why, None if cause is None else cause.path)
+    possible = effect.can_force_off if forced == "off" else effect.can_force_on
+    if not possible and (cause is not None) != (forced == "on"):
+        return None
+    why = f"forced {forced} by effects.{effect.name}" + (f"; {cause} calls for it" if cause is not None else "")
+    return EffectChoice(effect.name, forced == "on", why, ("effects", effect.name), forced=True)
+
+
+def _refusals(scene: Scene, names: Sequence[EffectName]) -> list[str]:
+    """A line for each effect that can't be forced, in the order of the scene's lines."""
+    places = Places(scene)
+    absent = {effect.name: effect.absent for effect in EFFECTS}
+    lines = []
+    for name in sorted(names, key=lambda name: places.line_of(("effects", name)) or 0):
+        reason = f'"on" given, expected "off": {absent[name]}'
+        if scene.effects[name] == "off":
+            reason = f'"off" given, expected "on": what calls for {name} makes no sense without it'
+        lines.append(f"{places.of(('effects', name))}: effects.{name}: {reason}")
+    return lines

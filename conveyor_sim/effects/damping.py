@@ -1,0 +1,97 @@
+"""Effects of damping in contacts."""
+
+from collections.abc import Callable, Collection
+
+from conveyor_sim.effects.contacts import contacts_in_use
+from conveyor_sim.effects.declaration import Cause, Effect
+from conveyor_sim.effects.terms import Meeting, Terms, deepest, impact_speed, meetings, tightest
+from conveyor_sim.laws import damping_effect
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.timestep import Bound, damping_bound
+
+
+def _called_for(effect: str, unit: str) -> Callable[[Scene, Collection[str]], Cause | None]:
+    def called_for(scene: Scene, on: Collection[str]) -> Cause | None:
+        for index, contact in contacts_in_use(scene, on):
+            if damping_effect(contact) == effect:
+                damping = contact.damping
+                if damping.restitution is None:
+                    return Cause(("contacts", index, "damping"), f"{damping.coefficient:g} {unit}")
+                return Cause(("contacts", index, "damping", "restitution"), f"{damping.restitution:g}")
+        return None
+
+    return called_for
+
+
+def _bounds(name: str, dashpot: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Terms], list[Bound]]:
+    """Bounds from a function that gives a meeting's dashpot, in kg/s, and how it is said."""
+
+    def bounds(terms: Terms) -> list[Bound]:
+        found = [(*dashpot(meeting, terms), meeting.reduced_mass) for meeting in meetings(terms)]
+        return tightest(name, [(damping_bound(c, reduced), said) for c, said, reduced in found if c > 0.0])
+
+    return bounds
+
+
+def _paper(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    c = meeting.value(meeting.law.damping_paper)
+    return c, f"m_r / (2 c) at c = {c:g} kg/s"
+
+
+def _normal(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    c = meeting.value(meeting.law.damping_normal)
+    return c, f"m_r / (2 c) at c = {c:g} kg/s"
+
+
+def _tsuji(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    speed = impact_speed(terms.scene)
+    c = meeting.value(meeting.law.damping_tsuji) * deepest(meeting, terms, speed)[0] ** 0.25
+    return c, f"m_r / (2 c delta^0.25), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
+
+
+def _onset(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    speed = impact_speed(terms.scene)
+    c = meeting.value(meeting.law.damping_onset) * deepest(meeting, terms, speed)[1]
+    return c, f"m_r / (2 lambda N), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
+
+
+PAPER_DAMPING = Effect(
+    name="paper_damping",
+    law="-c v*, v* the relative velocity of the contact points, in all directions",
+    source="(22)",
+    called_for=_called_for("paper_damping", "kg/s"),
+    absent="no contact with damping law paper",
+    needs="c by pair of materials",
+    bounds=_bounds("paper damping", _paper),
+    bound="m_r / (2 c)",
+)
+NORMAL_DAMPING = Effect(
+    name="normal_damping",
+    law="N = max(0, N_elastic + c v_n)",
+    source="added",
+    called_for=_called_for("normal_damping", "kg/s"),
+    absent="no contact with damping law normal",
+    needs="c by pair of materials",
+    bounds=_bounds("normal damping", _normal),
+    bound="m_r / (2 c)",
+)
+TSUJI_DAMPING = Effect(
+    name="tsuji_damping",
+    law="N = max(0, k delta^1.5 + c delta^0.25 v_n), of the same restitution at any speed",
+    source="Tsuji, Tanaka and Ishida 1992",
+    called_for=_called_for("tsuji_damping", ""),
+    absent="no contact with hertz_stiffness and the restitution of law normal",
+    needs="c by pair of materials, from the restitution",
+    bounds=_bounds("Tsuji damping", _tsuji),
+    bound="m_r / (2 c delta^0.25), delta the deepest of an impact at v (as for hertz)",
+)
+ONSET_DAMPING = Effect(
+    name="onset_damping",
+    law="N = max(0, N_elastic (1 + lambda v_n)), which sets in at zero",
+    source="Hunt and Crossley 1975",
+    called_for=_called_for("onset_damping", "s/m"),
+    absent="no contact with damping law onset",
+    needs="lambda by pair of materials",
+    bounds=_bounds("onset damping", _onset),
+    bound="m_r / (2 lambda N), N the largest of an impact at v (as for hertz)",
+)

@@ -1,0 +1,114 @@
+"""Effects of friction: in contacts, its curve, how it is solved, and the spring with history."""
+
+from collections.abc import Collection
+
+from conveyor_sim.effects.contacts import contacts_in_use
+from conveyor_sim.effects.declaration import Cause, Effect
+from conveyor_sim.effects.terms import Terms, meetings, queue_force, queue_length, tightest
+from conveyor_sim.scene.schema import BottleType, Scene
+from conveyor_sim.timestep import STEPS_PER_CONTACT, Bound, contact_bound, contact_friction_bound, damping_bound
+
+
+def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
+    for index, contact in contacts_in_use(scene, on):
+        if contact.friction > 0.0:
+            return Cause(("contacts", index, "friction"), f"{contact.friction:g}")
+    return None
+
+
+def _contact_friction_bounds(terms: Terms) -> list[Bound]:
+    """At the force with which a single-file queue of all bottles presses."""
+    force, queue = queue_force(terms), queue_length(terms.scene)
+    if force == 0.0 or "implicit_friction" in terms.on:
+        return []
+    candidates = []
+    for meeting in meetings(terms):
+        mu, kind = meeting.value(meeting.law.friction), meeting.first
+        if mu > 0.0 and meeting.value(meeting.law.tangential_stiffness) == 0.0:
+            dt = contact_friction_bound(
+                mu, force, kind.mass, kind.moment_of_inertia, kind.radius, terms.scene.slip_limit
+            )
+            at = f"at mu = {mu:g} and N = {force:.3g} N, a single-file queue of {queue}"
+            candidates.append((dt, f"v_lim / [2 mu (1/m + R^2/J) N] {at}"))
+    return tightest("contact friction", candidates)
+
+
+def _chosen(field: str, value: str, scene: Scene, on: Collection[str]) -> Cause | None:
+    if getattr(scene, field) == value and ("contact_friction" in on or "base_friction" in on):
+        return Cause((field,), value)
+    return None
+
+
+def _atan(scene: Scene, on: Collection[str]) -> Cause | None:
+    return _chosen("friction_curve", "atan", scene, on)
+
+
+def _implicit(scene: Scene, on: Collection[str]) -> Cause | None:
+    return _chosen("friction_solver", "implicit", scene, on)
+
+
+def _spring(scene: Scene, on: Collection[str]) -> Cause | None:
+    if "contact_friction" not in on:
+        return None
+    for index, contact in contacts_in_use(scene, on):
+        if contact.tangential is not None:
+            return Cause(("contacts", index, "tangential"), f"{contact.tangential.stiffness:g} N/m")
+    return None
+
+
+def _rim_mobility(kind: BottleType | None) -> float:
+    """1/m + R^2/J, how easily the rim of a bottle moves along itself, 1/kg; 0 for a rail."""
+    return 0.0 if kind is None else 1.0 / kind.mass + kind.radius**2 / kind.moment_of_inertia
+
+
+def _spring_bounds(terms: Terms) -> list[Bound]:
+    springs, dashpots = [], []
+    for meeting in meetings(terms):
+        k, c = (meeting.value(column) for column in (meeting.law.tangential_stiffness, meeting.law.tangential_damping))
+        mass = 1.0 / (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
+        if k > 0.0:
+            reason = f"{STEPS_PER_CONTACT} steps in pi sqrt(m_t / k_t) of {meeting.what} at k_t = {k:g} N/m"
+            springs.append((contact_bound(k, mass), reason))
+        if c > 0.0:
+            dashpots.append((damping_bound(c, mass), f"m_t / (2 c_t) at c_t = {c:g} kg/s"))
+    return [*tightest("tangential spring", springs), *tightest("tangential damping", dashpots)]
+
+
+CONTACT_FRICTION = Effect(
+    name="contact_friction",
+    law="mu N p(s), at the rim",
+    source="(7)-(10)",
+    called_for=_contact_friction,
+    absent="no contact with friction",
+    needs="mu by pair of materials",
+    bounds=_contact_friction_bounds,
+    bound="v_lim / [2 mu (1/m + R^2/J) N], N the force of all bottles in a single-file queue",
+)
+ATAN_FRICTION = Effect(
+    name="atan_friction",
+    law="p(s) = 2/pi atan(pi s / v_lim), in contacts and under bottles that stand on points",
+    source="named in the paper",
+    called_for=_atan,
+    absent="friction_curve is polynomial, or nothing has friction",
+    needs="nothing beside v_lim",
+    can_force_on=True,
+)
+IMPLICIT_FRICTION = Effect(
+    name="implicit_friction",
+    law="friction of the slip at the end of a step, with the mass of a bottle split among its contacts",
+    source="added",
+    called_for=_implicit,
+    absent="friction_solver is explicit, or nothing has friction",
+    needs="closed contacts and 1/m + R^2/J of each bottle",
+    bound="none, and lifts those of contact_friction and, under points, base_friction",
+)
+TANGENTIAL_SPRING = Effect(
+    name="tangential_spring",
+    law="a spring along the contact, drawn out by the slip, its force at most mu N",
+    source="Cundall and Strack 1979",
+    called_for=_spring,
+    absent="no contact with tangential, or no friction in contacts",
+    needs="elongation of each contact, kept through rebuilds; k_t, c_t and mu by pair of materials",
+    bounds=_spring_bounds,
+    bound="20 steps in pi sqrt(m_t / k_t), m_t / (2 c_t), with 1/m_t the sum of 1/m + R^2/J of those that touch",
+)

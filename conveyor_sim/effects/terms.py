@@ -1,0 +1,145 @@
+"""What the bounds on the time step are computed from, and what bounds of several effects share."""
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from conveyor_sim.engine.arrays import F8, ContactLaw
+from conveyor_sim.laws import Laws
+from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.schema import BottleType, Scene, Single
+from conveyor_sim.timestep import Bound
+
+ENDLESS_QUEUE = 100
+"""Bottles assumed to press on each other where an infeed has no end."""
+
+SPEED_AT_REST = 1.0
+"""m/s, assumed of impacts where nothing in a scene moves at first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """A scene, its coefficients, and which effects are on."""
+
+    scene: Scene
+    laws: Laws
+    on: Collection[str]
+
+    @property
+    def types(self) -> list[BottleType]:
+        """The bottle types, T of them, in the scene's order."""
+        return list(self.scene.bottle_types.values())
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """One entry of a ContactLaw: two bottle types, or a type and a rail material, and their coefficients."""
+
+    what: str
+    """`two bottles`, or `a bottle and a rail`."""
+    law: ContactLaw
+    entry: int
+    reduced_mass: float
+    """kg"""
+    first: BottleType
+    second: BottleType | None
+    """None: a rail."""
+
+    def value(self, column: F8 | None) -> float:
+        """The coefficient of this meeting, 0 if it has none."""
+        return 0.0 if column is None else float(column[self.entry])
+
+
+def meetings(terms: Terms) -> Iterator[Meeting]:
+    """Every pair of types that can touch, then every type and rail material."""
+    types = terms.types
+    if terms.laws.pair is not None:
+        for a, one in enumerate(types):
+            for b, other in enumerate(types):
+                reduced = one.mass * other.mass / (one.mass + other.mass)
+                yield Meeting("two bottles", terms.laws.pair, a * len(types) + b, reduced, one, other)
+    if terms.laws.rail is not None:
+        columns = [column for column in terms.laws.rail if column is not None]
+        materials = columns[0].size // len(types) if columns else 0
+        for a, one in enumerate(types):
+            for material in range(materials):
+                entry = a * materials + material
+                yield Meeting("a bottle and a rail", terms.laws.rail, entry, one.mass, one, None)
+
+
+def tightest(name: str, candidates: Sequence[tuple[float, str]]) -> list[Bound]:
+    """The least of some bounds (s, reason) as a list; empty if there are none."""
+    if not candidates:
+        return []
+    dt, reason = min(candidates)
+    return [Bound(name, dt, reason)]
+
+
+def most_bottles(scene: Scene) -> int | None:
+    """Bottles that a run can hold at most, None if an infeed has no end."""
+    fed = 0
+    for infeed in scene.infeeds.values():
+        if infeed.count is None:
+            return None
+        fed += infeed.count
+    return fed + len(initial_bottles(scene))
+
+
+def queue_length(scene: Scene) -> int:
+    """Bottles that may press on each other in a single file."""
+    most = most_bottles(scene)
+    return ENDLESS_QUEUE if most is None else most
+
+
+def queue_force(terms: Terms) -> float:
+    """Force with which a single-file queue of all bottles presses, N; 0 without friction under them."""
+    if terms.laws.base_friction is None:
+        return 0.0
+    # Which types queue behind which is not known: the heaviest may press on the lightest.
+    heaviest = max(kind.mass for kind in terms.types)
+    return queue_length(terms.scene) * float(terms.laws.base_friction.max()) * heaviest * terms.scene.gravity
+
+
+def impact_speed(scene: Scene) -> float:
+    """The fastest of belts, infeeds and bottles as they start, m/s; SPEED_AT_REST if all rest."""
+    speeds = [abs(belt.speed) for belt in scene.belts.values()]
+    speeds += [infeed.speed for infeed in scene.infeeds.values()]
+    speeds += [math.hypot(*entry.velocity) for entry in scene.bottles if isinstance(entry, Single)]
+    return max(speeds, default=0.0) or SPEED_AT_REST
+
+
+def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:
+    """Overlap (m) and force (N) at the turning point of an undamped head-on impact at a speed in m/s."""
+    energy = 0.5 * meeting.reduced_mass * speed * speed
+    law = meeting.law
+    if (k := meeting.value(law.stiffness)) > 0.0:
+        overlap = math.sqrt(2.0 * energy / k)
+        return overlap, k * overlap
+    if (k := meeting.value(law.hertz)) > 0.0:
+        overlap = (2.5 * energy / k) ** 0.4
+        return overlap, k * overlap**1.5
+    points = table_of(meeting, terms)
+    return _deepest_in_table(points[0], points[1], energy) if points is not None else (0.0, 0.0)
+
+
+def table_of(meeting: Meeting, terms: Terms) -> tuple[F8, F8] | None:
+    """Overlaps (m) and forces (N) of a meeting's table; None if it has none."""
+    curve, curves = meeting.law.curve, terms.laws.curves
+    if curve is None or curves is None or curve[meeting.entry] < 0:
+        return None
+    index = int(curve[meeting.entry])
+    points = slice(int(curves.start[index]), int(curves.start[index + 1]))
+    return curves.overlap[points], curves.force[points]
+
+
+def _deepest_in_table(overlap: F8, force: F8, energy: float) -> tuple[float, float]:
+    steps = np.diff(overlap)
+    stored = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * steps)])
+    piece = min(int(np.searchsorted(stored, energy, side="right")) - 1, len(steps) - 1)
+    slope = float((force[piece + 1] - force[piece]) / steps[piece])
+    left, start = energy - float(stored[piece]), float(force[piece])
+    # start d + slope d^2 / 2 = left, in the form that does not divide by a slope of 0.
+    deeper = 2.0 * left / (start + math.sqrt(start * start + 2.0 * slope * left))
+    return float(overlap[piece]) + deeper, start + slope * deeper

@@ -1,0 +1,61 @@
+"""The threads behind a team (`team.py`): they wait in Python between ticks, and take the steps of a tick together."""
+
+import threading
+import weakref
+from collections.abc import Callable
+from queue import SimpleQueue
+
+from .arrays import Member, World
+from .team import members
+
+Advance = Callable[[World, Member, int, float, int], int]
+Task = tuple[Advance, World, Member, int, float, int]
+
+
+class Crew:
+    """Teams of up to `most` threads, the calling one among them. The others start when first needed."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._teams: dict[int, tuple[Member, ...]] = {}
+        self._tasks: list[SimpleQueue[Task | None]] = []
+        self._done: SimpleQueue[int] = SimpleQueue()
+        self._finalizer = weakref.finalize(self, _dismiss, self._tasks)
+
+    def advance(self, size: int, function: Advance, world: World, steps: int, dt: float, phase: int) -> int:
+        """Run an integrator on `size` threads; return the steps that it took. Raises ValueError beyond `most`."""
+        team = self.team(size)
+        for task, member in zip(self._workers(size - 1), team[1:], strict=True):
+            task.put((function, world, member, steps, dt, phase))
+        taken = function(world, team[0], steps, dt, phase)
+        for _ in team[1:]:
+            self._done.get()
+        return taken
+
+    def team(self, size: int) -> tuple[Member, ...]:
+        """Members of a team of `size`; those of one size are always the same."""
+        if not 1 <= size <= self.most:
+            raise ValueError(f"a team of {size} threads, expected 1 to {self.most}")
+        if size not in self._teams:
+            self._teams[size] = members(size)
+        return self._teams[size]
+
+    def _workers(self, count: int) -> list["SimpleQueue[Task | None]"]:
+        while len(self._tasks) < count:
+            tasks: SimpleQueue[Task | None] = SimpleQueue()
+            self._tasks.append(tasks)
+            threading.Thread(target=_work, args=(tasks, self._done), name="conveyor_sim steps", daemon=True).start()
+        return self._tasks[:count]
+
+
+def _work(tasks: "SimpleQueue[Task | None]", done: "SimpleQueue[int]") -> None:
+    while (task := tasks.get()) is not None:
+        function, world, member, steps, dt, phase = task
+        done.put(function(world, member, steps, dt, phase))
+        # While it waits it must not keep the arrays of a run that has ended.
+        del task, function, world, member
+
+
+def _dismiss(tasks: list["SimpleQueue[Task | None]"]) -> None:
+    for queue in tasks:
+        queue.put(None)

@@ -1,0 +1,143 @@
+"""Which rail pieces are near each bottle, within its radius and half the skin; made at each rebuild."""
+
+import math
+from typing import Any
+
+from .arrays import Bottles, Listed, Near
+from .compile import kernel, part
+from .static_grid import static_cell
+from .team import BLOCK
+
+
+@part
+def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, margin: float) -> int:
+    """List the straight rail pieces within radius + margin of each bottle; return how many entries that takes."""
+    if segments is None:
+        return 0
+    _keep_springs(near, near.springs)
+    count = 0
+    for i in range(bottles.x.size):
+        near.start[i] = min(count, near.piece.size)
+        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        if home < 0:
+            continue
+        reach = bottles.radius[i] + margin
+        for entry in range(grid.segment_start[home], grid.segment_start[home + 1]):
+            g = grid.segment[entry]
+            dx = bottles.x[i] - segments.x[g]
+            dy = bottles.y[i] - segments.y[g]
+            along = dx * segments.tx[g] + dy * segments.ty[g]
+            along = min(max(along, 0.0), segments.length[g])
+            dx -= along * segments.tx[g]
+            dy -= along * segments.ty[g]
+            if dx * dx + dy * dy <= reach * reach:
+                if count < near.piece.size:
+                    near.piece[count] = g
+                count += 1
+    near.start[bottles.x.size] = min(count, near.piece.size)
+    if count <= near.piece.size:
+        _put_springs_back(near, near.springs)
+    return count
+
+
+@part
+def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: float) -> int:
+    """List the arcs within radius + margin of each bottle; return how many entries that takes."""
+    if arcs is None:
+        return 0
+    _keep_springs(near, near.springs)
+    count = 0
+    for i in range(bottles.x.size):
+        near.start[i] = min(count, near.piece.size)
+        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        if home < 0:
+            continue
+        reach = bottles.radius[i] + margin
+        for entry in range(grid.arc_start[home], grid.arc_start[home + 1]):
+            k = grid.arc[entry]
+            dx = bottles.x[i] - arcs.x[k]
+            dy = bottles.y[i] - arcs.y[k]
+            # The whole circle stands for the arc here: never too few candidates.
+            if abs(math.sqrt(dx * dx + dy * dy) - arcs.radius[k]) <= reach:
+                if count < near.piece.size:
+                    near.piece[count] = k
+                count += 1
+    near.start[bottles.x.size] = min(count, near.piece.size)
+    if count <= near.piece.size:
+        _put_springs_back(near, near.springs)
+    return count
+
+
+@part
+def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, railed: Any) -> None:
+    """List the bottles that have any rail near, by block."""
+    if railed is None:
+        return
+    count = 0
+    for i in range(bottles.x.size):
+        if i % BLOCK == 0:
+            railed.first[i // BLOCK] = count
+        if _has_near(near_segments, i) or _has_near(near_arcs, i):
+            railed.bottle[count] = i
+            count += 1
+    end_list(railed, bottles.x.size, count)
+
+
+@part
+def end_list(listed: Listed, bottles: int, count: int) -> None:
+    """Close a list by block that holds `count` of all bottles."""
+    for block in range((bottles + BLOCK - 1) // BLOCK, listed.first.size):
+        listed.first[block] = count
+
+
+@part
+def _has_near(near: Any, i: int) -> bool:
+    if near is None:
+        return False
+    return near.start[i] < near.start[i + 1]
+
+
+@part
+def _keep_springs(near: Near, springs: Any) -> None:
+    """Copy the springs by bottle and piece, unless that was done and the list then turned out too short."""
+    if springs is None:
+        return
+    if springs.kept_count[0] >= 0:
+        return
+    kept = 0
+    for i in range(near.start.size - 1):
+        for entry in range(near.start[i], near.start[i + 1]):
+            if springs.elongation[entry] != 0.0:
+                springs.kept_bottle[kept] = i
+                springs.kept_piece[kept] = near.piece[entry]
+                springs.kept[kept] = springs.elongation[entry]
+                kept += 1
+    springs.kept_count[0] = kept
+
+
+@part
+def _put_springs_back(near: Near, springs: Any) -> None:
+    """Give entries that are still listed their springs; both lists are by bottle."""
+    if springs is None:
+        return
+    k, kept = 0, springs.kept_count[0]
+    for i in range(near.start.size - 1):
+        while k < kept and springs.kept_bottle[k] < i:
+            k += 1
+        for entry in range(near.start[i], near.start[i + 1]):
+            springs.elongation[entry] = 0.0
+            same = k
+            while same < kept and springs.kept_bottle[same] == i:
+                if springs.kept_piece[same] == near.piece[entry]:
+                    springs.elongation[entry] = springs.kept[same]
+                same += 1
+    springs.kept_count[0] = -1
+
+
+@kernel
+def drop_near_springs(near: Any, springs: Any, slot: int) -> None:
+    """Forget the springs of a bottle that is taken away."""
+    if springs is None:
+        return
+    for entry in range(near.start[slot], near.start[slot + 1]):
+        springs.elongation[entry] = 0.0

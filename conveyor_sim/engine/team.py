@@ -1,0 +1,150 @@
+"""Threads that take steps together: who does which block of the work, and where they wait for each other.
+
+Every thread runs the same integrator on the same World with a Member of its own. Work is cut into blocks of fixed size
+and place, whatever the number of threads: pairs into blocks of pairs, bottles into blocks of bottles. No block reads
+what another writes in the same phase, and no sum runs over blocks, so the bits do not depend on who did which.
+"""
+
+from typing import Any
+
+import numba
+import numpy as np
+from numba.extending import intrinsic
+
+from .arrays import F8, U4, Gathered, Member, RailContacts
+from .compile import part
+
+BLOCK = 512
+"""Pairs, or bottles, in a block: what a thread holds of them stays in the first cache."""
+
+MOST_CONTACTS = 32
+"""Of one bottle with rails at a time, the deepest ones; as many touch only in a pocket drawn as a fine polyline."""
+
+# Places in `Member.sync`, a cache line apart.
+ARRIVED, TURN, MOVED = 0, 8, 16
+SYNC_SIZE = 24
+
+SPINS = 2000
+"""Looks at the barrier before a thread offers its core to others: about 20 us."""
+
+
+def members(size: int) -> tuple[Member, ...]:
+    """Return `size` members of one team."""
+    sync = np.zeros(SYNC_SIZE, np.int64)
+    return tuple(Member(rank, size, sync, _gathered(), _rail_contacts()) for rank in range(size))
+
+
+def _gathered() -> Gathered:
+    return Gathered(np.zeros(4 * BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(BLOCK))
+
+
+def _rail_contacts() -> RailContacts:
+    def reals() -> F8:
+        return np.zeros(MOST_CONTACTS)
+
+    def whole() -> U4:
+        return np.zeros(MOST_CONTACTS, np.uint32)
+
+    return RailContacts(
+        nx=reals(),
+        ny=reals(),
+        overlap=reals(),
+        share=reals(),
+        material=whole(),
+        rail=whole(),
+        surface=whole(),
+        entry=np.zeros(MOST_CONTACTS, np.int64),
+        solution=reals(),
+    )
+
+
+@part
+def blocks(count: int) -> int:
+    """Blocks that `count` things make."""
+    return (count + BLOCK - 1) // BLOCK
+
+
+@part
+def first_block(member: Member, count: int) -> int:
+    """First block of this member's share of `count` things; the next member's first block ends it."""
+    return member.rank * blocks(count) // member.size
+
+
+@part
+def end_block(member: Member, count: int) -> int:
+    """Block after the last of this member's share."""
+    return (member.rank + 1) * blocks(count) // member.size
+
+
+@part
+def wait_for_all(member: Member) -> None:
+    """Return when all members have called it; what they wrote before is then seen by all."""
+    if member.size == 1:
+        return
+    turn = _load(member.sync, TURN)
+    if _add(member.sync, ARRIVED, 1) == member.size - 1:
+        _store(member.sync, ARRIVED, 0)
+        _store(member.sync, TURN, turn + 1)
+        return
+    spins = 0
+    while _load(member.sync, TURN) == turn:
+        spins += 1
+        if spins > SPINS:
+            _sched_yield()
+
+
+@part
+def raise_flag(member: Member, flag: int) -> None:
+    """Set a flag that all see after the next `wait_for_all`."""
+    _store(member.sync, flag, 1)
+
+
+@part
+def lower_flag(member: Member, flag: int) -> None:
+    """Clear a flag; by one member, between two barriers."""
+    _store(member.sync, flag, 0)
+
+
+@part
+def flag_raised(member: Member, flag: int) -> bool:
+    """Whether a flag is set."""
+    return _load(member.sync, flag) != 0
+
+
+_sched_yield = numba.types.ExternalFunction("sched_yield", numba.types.int32())
+
+
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+    data = context.make_array(array_type)(context, builder, array).data
+    return builder.gep(data, [index])
+
+
+def _load_atomic(typing: Any, array: Any, index: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pointer = _pointer(context, builder, signature.args[0], args[0], args[1])
+        return builder.load_atomic(pointer, "seq_cst", 8)
+
+    return numba.types.int64(array, numba.types.intp), generate
+
+
+def _store_atomic(typing: Any, array: Any, index: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pointer = _pointer(context, builder, signature.args[0], args[0], args[1])
+        builder.store_atomic(args[2], pointer, "seq_cst", 8)
+        return context.get_dummy_value()
+
+    return numba.types.void(array, numba.types.intp, numba.types.int64), generate
+
+
+def _add_atomic(typing: Any, array: Any, index: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pointer = _pointer(context, builder, signature.args[0], args[0], args[1])
+        return builder.atomic_rmw("add", pointer, args[2], "seq_cst")
+
+    return numba.types.int64(array, numba.types.intp, numba.types.int64), generate
+
+
+# Numba has no atomic access to arrays on a CPU; these three are what a barrier takes.
+_load: Any = intrinsic(_load_atomic)
+_store: Any = intrinsic(_store_atomic)
+_add: Any = intrinsic(_add_atomic)

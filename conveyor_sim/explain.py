@@ -1,0 +1,100 @@
+"""Tells why a scene is simulated as it is: its effects, its time step, and what each effect costs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE
+from rich.console import Group
+from rich.table import Table
+
+from conveyor_sim.effects import EFFECTS
+from conveyor_sim.model import Model
+from conveyor_sim.scene import Scene
+from conveyor_sim.scene.places import Places
+
+if TYPE_CHECKING:
+    from conveyor_sim.price import Price, PriceList
+
+
+def explanation(scene: Scene, model: Model) -> Group:
+    """Effects on and off with the lines that decide, bounds on dt with the one that rules, steps and integrator."""
+    steps = Table.grid(padding=(0, 2))
+    steps.add_row("scene", f"{model.name} ({scene.source_name})")
+    steps.add_row("time step", f"{model.dt:.4g} s: {model.dt_reason}")
+    steps.add_row("integrator", model.integrator)
+    return Group(_effects(scene, model), _bounds(scene, model), steps)
+
+
+def price_table(prices: PriceList) -> Group:
+    """What was measured, the dearest effect first."""
+    table = Table(box=SIMPLE)
+    for heading in ("effect", "with", "without", "cost", f"{prices.confidence:.0%} within", ""):
+        left = heading in ("effect", "")
+        table.add_column(heading, justify="left" if left else "right", no_wrap=heading != "", overflow="fold")
+    for price in prices.prices:
+        table.add_row(price.effect, *_numbers(price), "" if price.certain else "noise")
+    if prices.together is not None:
+        table.add_section()
+        table.add_row(prices.together.effect, *_numbers(prices.together), "not the sum")
+    lines = [
+        f"In ns per bottle and step, of {prices.full:.1f} with all effects: {prices.bottles} bottles "
+        f"at {prices.time:g} s, on one thread, each effect with and without, in turn, from the same state and at the "
+        "same time step. Prices overlap; noise is what can't be told from 0."
+    ]
+    lines += [
+        f"{price.effect} takes along {', '.join(price.takes_along)}" for price in prices.prices if price.takes_along
+    ]
+    lines += [f"{name}: not priced, the scene does not run without it: {why}" for name, why in prices.failed.items()]
+    if prices.fixed:
+        lines.append(f"not priced, as they can't be forced off: {', '.join(prices.fixed)}")
+    return Group(table, *lines)
+
+
+def _effects(scene: Scene, model: Model) -> Table:
+    places = Places(scene)
+    declared = {effect.name: effect for effect in EFFECTS}
+    table = Table(box=SIMPLE)
+    table.add_column("effect", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    table.add_column("line", justify="right", no_wrap=True)
+    table.add_column("why, and for what is on: law; source", overflow="fold")
+    for choice in model.effects:
+        line = None if choice.path is None else places.line_of(choice.path)
+        why = choice.why
+        if choice.path is not None and line is None:
+            why += f" ({places.unwritten(choice.path)})"
+        if choice.on:
+            why += f"\n  {declared[choice.name].law}; {declared[choice.name].source}"
+        table.add_row(
+            choice.name,
+            "on" if choice.on else "off",
+            "" if line is None else str(line),
+            why,
+            style=None if choice.on else "dim",
+        )
+    return table
+
+
+def _bounds(scene: Scene, model: Model) -> Table | str:
+    if not model.bounds:
+        return "nothing in the scene bounds the time step\n"
+    table = Table(box=SIMPLE)
+    table.add_column("bound on the time step")
+    table.add_column("at most", justify="right", no_wrap=True)
+    table.add_column("steps a tick", justify="right")
+    table.add_column("why", overflow="fold")
+    for bound in sorted(model.bounds, key=lambda bound: bound.dt):
+        rules = bound is min(model.bounds, key=lambda bound: bound.dt)
+        table.add_row(
+            bound.name,
+            f"{bound.dt * 1e6:.4g} us",
+            str(max(1, math.ceil(scene.tick / bound.dt * (1.0 - 1e-12)))),
+            f"{bound.reason}{' (rules)' if rules else ''}",
+        )
+    return table
+
+
+def _numbers(price: Price) -> tuple[str, str, str, str]:
+    return f"{price.on:.1f}", f"{price.off:.1f}", f"{price.cost:+.1f}", f"{price.low:+.1f} .. {price.high:+.1f}"

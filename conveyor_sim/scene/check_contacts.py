@@ -1,0 +1,95 @@
+"""Contacts that can't be: laws that exclude each other, restitution that has no closed form, tables that fall."""
+
+import math
+from collections.abc import Iterator
+
+from conveyor_sim.scene.contacts import ELASTIC, Contact
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.words import listed, shown
+
+_RESTITUTION = {
+    "normal": ("stiffness", "hertz_stiffness"),
+    "paper": ("stiffness",),
+    "onset": ELASTIC,
+}
+"""Laws of damping, and the elastic laws beside which they have a restitution."""
+
+
+def contact_problems(scene: Scene) -> Iterator[Problem]:
+    """Problems of contacts, of rings that bottles stand on, and of how friction is solved."""
+    for index, contact in enumerate(scene.contacts):
+        path: Path = ("contacts", index)
+        yield from _elastic(path, contact)
+        yield from _damping((*path, "damping"), contact)
+        if contact.table is not None:
+            yield from _table((*path, "table"), contact.table)
+        if contact.tangential is not None and contact.friction == 0.0:
+            yield Problem((*path, "tangential"), "given without friction, expected friction greater than 0 beside it")
+    for name, kind in scene.bottle_types.items():
+        if kind.base_radius is not None and kind.base_radius > kind.radius:
+            yield Problem(
+                ("bottle_types", name, "base_radius"),
+                f"{shown(kind.base_radius)} given, expected at most the radius, {kind.radius:g} (m)",
+            )
+    if scene.friction_solver == "implicit" and scene.step.integrator != "semi_implicit_euler":
+        yield Problem(
+            ("friction_solver",), f'"implicit" given, expected "explicit" with integrator {scene.step.integrator}'
+        )
+
+
+def _elastic(path: Path, contact: Contact) -> Iterator[Problem]:
+    given = [field for field in ELASTIC if getattr(contact, field) is not None]
+    if len(given) != 1:
+        yield Problem(path, f"{' and '.join(given) or 'no stiffness'} given, expected one of {listed(list(ELASTIC))}")
+
+
+def _damping(path: Path, contact: Contact) -> Iterator[Problem]:
+    damping = contact.damping
+    if damping.law == "none":
+        for field in ("coefficient", "restitution", "speed"):
+            value = getattr(damping, field)
+            if value:
+                yield Problem(
+                    (*path, field),
+                    f'{shown(value)} given, expected law "paper", "normal" or "onset" beside it (the law is "none")',
+                )
+        return
+    if damping.restitution is None:
+        if damping.speed is not None:
+            yield Problem((*path, "speed"), f"{shown(damping.speed)} given, expected it with restitution only")
+        return
+    if "coefficient" in damping.model_fields_set:
+        yield Problem(path, "coefficient and restitution given, expected one of them")
+    elastic = next((field for field in ELASTIC if getattr(contact, field) is not None), "stiffness")
+    if elastic not in _RESTITUTION[damping.law]:
+        laws = [f'"{law}"' for law, beside in _RESTITUTION.items() if elastic in beside]
+        yield Problem(
+            (*path, "restitution"),
+            f"{shown(damping.restitution)} given, expected a coefficient, or law {listed(laws)}: "
+            f'with {elastic} the restitution of law "{damping.law}" depends on speed',
+        )
+    elif damping.law == "onset" and damping.speed is None:
+        yield Problem((*path, "speed"), "missing, expected the speed at which the restitution holds (m/s)")
+    elif damping.law != "onset" and damping.speed is not None:
+        yield Problem(
+            (*path, "speed"),
+            f'{shown(damping.speed)} given, expected none: the restitution of law "{damping.law}" holds at any speed',
+        )
+
+
+def _table(path: Path, points: tuple[tuple[float, float], ...]) -> Iterator[Problem]:
+    before = (0.0, 0.0)
+    for index, point in enumerate(points):
+        if point == before and index == 0:
+            continue
+        if not all(math.isfinite(value) for value in point) or point[0] <= before[0] or point[1] < before[1]:
+            yield Problem(
+                path,
+                f"point {index + 1}, {shown(point)}, follows {shown(before)}: "
+                "expected overlaps that grow from 0 and forces that do not fall (m, N)",
+            )
+            return
+        before = point
+    if before[1] == 0.0:
+        yield Problem(path, "no force at any overlap given, expected one greater than 0 (N)")

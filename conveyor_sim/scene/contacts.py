@@ -1,0 +1,78 @@
+"""What a scene says where two materials meet: contacts with their laws, and friction of bottles on belts."""
+
+from typing import Annotated, Literal
+
+from annotated_types import Len
+
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.types import Component, NotNegative, Pair, Positive, Restitution, Says, quantity
+
+ELASTIC = ("stiffness", "hertz_stiffness", "table")
+"""The fields of a contact that each choose an elastic law."""
+
+TablePoints = Annotated[
+    tuple[tuple[Component, Component], ...],
+    Len(1),
+    Says("the path of a CSV file with columns overlap and force, or a list of points [overlap, force]"),
+]
+
+
+class Damping(Part):
+    """Damping of a contact, by a coefficient or by the restitution of a head-on impact.
+
+    A restitution can be given with law `normal` for linear and Hertz contacts, with `paper` for linear ones, and with
+    `onset`, at a speed, for all.
+    """
+
+    law: Literal["none", "paper", "normal", "onset"] = quantity(
+        "none; paper: -c v*, v* the relative velocity of the contact points, in all directions (22); "
+        "normal: along the normal only, and a contact never pulls; "
+        "onset: the elastic force times 1 + c x speed of approach (Hunt and Crossley), so that it sets in at zero.",
+        default="none",
+    )
+    coefficient: NotNegative = quantity("Damping coefficient c; for onset in s/m.", "kg/s", default=0.0)
+    restitution: Restitution | None = quantity(
+        "Instead of the coefficient: speed after over speed before a head-on impact.", "1", default=None
+    )
+    speed: Positive | None = quantity(
+        "Speed of impact at which the restitution holds; needed for onset, where it depends on it.", "m/s", default=None
+    )
+
+
+class Tangential(Part):
+    """A spring along the contact that remembers (Cundall and Strack): bottles can rest on it, and arch."""
+
+    stiffness: Positive = quantity("Stiffness of the spring.", "N/m")
+    damping: NotNegative = quantity("Damping coefficient beside the spring.", "kg/s", default=0.0)
+
+
+class Contact(Part):
+    """What happens where two materials touch: bottle and bottle, or bottle and rail.
+
+    One of `stiffness`, `hertz_stiffness` and `table` is needed.
+    """
+
+    between: Pair = quantity("The two materials, in any order.")
+    stiffness: Positive | None = quantity("Stiffness k of a linear contact, N = k x overlap (23).", "N/m", default=None)
+    hertz_stiffness: Positive | None = quantity(
+        "Stiffness of a Hertz contact, N = k x overlap^1.5.", "N/m^1.5", default=None
+    )
+    table: TablePoints | None = quantity(
+        "Force at each overlap, measured or computed; straight between the points and on beyond the last. "
+        "A path is taken from the scene file's folder.",
+        "m, N",
+        default=None,
+    )
+    damping: Damping = quantity("Damping of the contact.", default=Damping())
+    friction: NotNegative = quantity("Coefficient of friction of the contact.", "1", default=0.0)
+    tangential: Tangential | None = quantity(
+        "A tangential spring with history in place of the friction curve; needs friction. Left out: none.",
+        default=None,
+    )
+
+
+class Base(Part):
+    """Friction of bottles that stand on a belt."""
+
+    between: Pair = quantity("The bottle's material, then the belt's.")
+    friction: NotNegative = quantity("Coefficient of friction of the bottle's base on the belt.", "1")

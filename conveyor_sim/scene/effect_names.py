@@ -1,0 +1,40 @@
+"""The names of the effects, as a scene may write them; what each is stands in `conveyor_sim/effects/`."""
+
+from typing import Annotated, Literal, get_args
+
+from conveyor_sim.scene.types import Says
+from conveyor_sim.scene.words import listed
+
+EffectName = Literal[
+    "bottle_contact",
+    "segment_rails",
+    "arc_rails",
+    "unequal_radii",
+    "linear",
+    "hertz",
+    "table",
+    "paper_damping",
+    "normal_damping",
+    "tsuji_damping",
+    "onset_damping",
+    "contact_friction",
+    "base_friction",
+    "atan_friction",
+    "implicit_friction",
+    "tangential_spring",
+    "ring_base",
+    "belts",
+    "curved_belts",
+    "rotation",
+    "infeed",
+    "outfeed",
+    "peaks",
+    "contact_arrays",
+]
+
+EFFECT_NAMES: tuple[EffectName, ...] = get_args(EffectName)
+
+Forced = dict[
+    Annotated[EffectName, Says(f"the name of an effect: {listed(list(EFFECT_NAMES))}")],
+    Annotated[Literal["on", "off"], Says('"on" or "off"')],
+]

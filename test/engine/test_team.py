@@ -1,0 +1,92 @@
+"""Threads: the same bits on any number of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import base, belt, contact, kind, polyline, scene
+
+from conveyor_sim.engine.crew import Crew
+from conveyor_sim.engine.team import BLOCK
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+ROWS, COLUMNS, PITCH = 30, 40, 0.131
+
+
+def crowd(**fields: Any) -> Scene:
+    """1200 bottles in a box on two belts that run against each other: several blocks of bottles and of pairs."""
+    width, height = COLUMNS * PITCH + 0.1, ROWS * PITCH + 0.1
+    box = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+    laws = {"damping": ("normal", 1.0), "friction": 0.2}
+    given: dict[str, Any] = {
+        "bottle_types": {"bottle": kind(), "slim": kind(0.06, 0.15)},
+        "contacts": [contact(5000.0, **laws), contact(8000.0, "steel", **laws)],
+        "base": base(0.4),
+        "belts": {
+            "left": belt(0.9, (-0.5, -0.5), width / 2 + 0.5, height + 1.0),
+            "right": belt(-0.9, (width / 2, -0.5), width / 2 + 0.5, height + 1.0),
+        },
+        "rails": {"box": polyline(box, closed=True)},
+        "bottles": [
+            {"grid": {"type": name, "origin": [0.1, 0.1 + first * PITCH], "rows": ROWS // 2, "columns": COLUMNS,
+                      "pitch": PITCH}}
+            for name, first in (("bottle", 0), ("slim", ROWS // 2))
+        ],
+        "step": {"per_tick": 100},
+        "effects": {"peaks": "on"},
+    }  # fmt: skip
+    return scene(**{**given, **fields})
+
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "as it is": {},
+    "velocity Verlet": {"step": {"per_tick": 100, "integrator": "velocity_verlet"}},
+    "implicit friction": {"friction_solver": "implicit"},
+    "springs and rings": {
+        "bottle_types": {"bottle": kind(base_radius=0.04), "slim": kind(0.06, 0.15, base_radius=0.03)},
+        "contacts": [
+            contact(5000.0, friction=0.2, tangential={"stiffness": 2000.0, "damping": 0.5}),
+            contact(8000.0, "steel", friction=0.2, tangential={"stiffness": 2000.0, "damping": 0.5}),
+        ],
+    },
+}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_the_same_bits_on_any_number_of_threads(name: str) -> None:
+    """Long enough for bottles to meet and lists to be rebuilt; more threads than blocks are fine."""
+    ticks, given = 15, crowd(**VARIANTS[name])
+    one = Simulation(given, threads=1)
+    one.advance(ticks)
+    assert one._state.world.bottles.id.size > 2 * BLOCK
+    assert one.contacts().kind.size > 100
+    for threads in (2, 3, 7):
+        other = Simulation(given, threads=threads)
+        other.advance(ticks)
+        assert other.state_hash() == one.state_hash(), threads
+        np.testing.assert_array_equal(other.bottles().peak_force, one.bottles().peak_force)
+        np.testing.assert_array_equal(other.bottles().impulse, one.bottles().impulse)
+        np.testing.assert_array_equal(other.contacts().tangential_force, one.contacts().tangential_force)
+
+
+def test_the_number_may_change_from_tick_to_tick() -> None:
+    given = crowd()
+    one, other = Simulation(given, threads=1), Simulation(given, threads=3)
+    one.advance(9)
+    crew, sizes = other._crew, [1, 3, 2, 2, 1, 3, 1, 2, 3]
+    for size in sizes:
+        steps = other.model.steps_per_tick
+        other._apply_commands()
+        assert crew.advance(size, other._advance, other._state.world, steps, other.model.dt, 0) == steps
+        other.tick += 1
+    assert other.state_hash() == one.state_hash()
+
+
+def test_a_team_has_a_size() -> None:
+    with pytest.raises(ValueError, match="a team of 3 threads, expected 1 to 2"):
+        Crew(2).team(3)
+    with pytest.raises(ValueError, match="threads: 0, expected 1 or more"):
+        Simulation(crowd(), threads=0)

@@ -1,0 +1,140 @@
+"""Loops over the laws are vectorised: several pairs to one instruction, which is most of the engine's speed.
+
+LLVM gives up without a word: at a branch, a call, too many arrays. Its vectorised loops are known by a block that it
+names `vector.body`, and by packed instructions.
+"""
+
+import platform
+import re
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from numba import uint64
+
+from conveyor_sim.engine.arrays import ContactLaw
+from conveyor_sim.engine.contact import contact_force, spring_after
+from conveyor_sim.engine.friction import implicit_regularisation, regularisation
+from conveyor_sim.engine.ring import ring_means, ring_share
+
+pytestmark = pytest.mark.skipif(
+    platform.machine().lower() not in ("x86_64", "amd64"), reason="packed instructions go by other names"
+)
+
+COUNT = 64
+
+
+def compiled(function: Any) -> Any:
+    """As a kernel is compiled, but not from the cache, for numba shows no code that it did not compile itself."""
+    return numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
+
+
+def assert_vectorised(loop: Any) -> None:
+    """That the only loop of a function that was called once is."""
+    (ir,) = loop.inspect_llvm().values()
+    (assembly,) = loop.inspect_asm().values()
+    assert "vector.body" in ir
+    assert re.search(r"\bv?(mul|sqrt|div)pd\b", assembly)
+
+
+def column(value: float = 0.1) -> Any:
+    return np.full(COUNT, value)
+
+
+LINEAR = ["stiffness", "friction"]
+SPRING = [*LINEAR, "damping_normal", "tangential_stiffness", "tangential_damping"]
+ALL = [name for name in ContactLaw._fields if name != "curve"]
+
+
+@pytest.mark.parametrize(
+    ("names", "atan", "spring", "implicit"),
+    [
+        (["stiffness", "damping_paper"], False, False, False),
+        ([*LINEAR, "damping_paper"], False, False, False),
+        ([*LINEAR, "damping_normal"], False, False, False),
+        ([*LINEAR, "damping_onset"], False, False, False),
+        (["hertz", "damping_tsuji", "friction"], False, False, False),
+        ([*LINEAR, "damping_paper"], True, False, False),
+        ([*LINEAR, "damping_paper"], False, False, True),
+        ([*LINEAR, "damping_paper"], True, False, True),
+        (SPRING, False, True, False),
+        (ALL, False, True, False),
+        (ALL, False, True, True),
+        (ALL, True, True, True),
+    ],
+)
+def test_contacts(names: list[str], atan: bool, spring: bool, implicit: bool) -> None:
+    """Every law but the table, which is searched."""
+
+    @compiled
+    def loop(
+        count: int, law: Any, atan: Any, overlap: Any, closing: Any, slip: Any, elongation: Any, ease: Any, found: Any
+    ) -> None:
+        for c in range(uint64(count)):
+            normal, tangential = contact_force(
+                law, c, None, 0.01, atan, overlap[c], 1.0, closing[c], slip[c], at(elongation, c), at(ease, c)
+            )
+            found[c] = normal
+            found[c + uint64(COUNT)] = tangential
+
+    law = ContactLaw(**{name: column() if name in names else None for name in ContactLaw._fields})  # type: ignore[arg-type]
+    loop(
+        COUNT,
+        law,
+        1 if atan else None,
+        column(),
+        column(),
+        column(),
+        column() if spring else None,
+        column() if implicit else None,
+        np.zeros(2 * COUNT),
+    )
+    assert_vectorised(loop)
+
+
+@compiled
+def at(values: Any, c: int) -> Any:
+    if values is None:
+        return None
+    return values[c]
+
+
+def test_tangential_springs() -> None:
+    """How they go with the slip."""
+
+    @compiled
+    def loop(count: int, law: Any, spring: Any, slip: Any, normal: Any) -> None:
+        for c in range(uint64(count)):
+            spring[c] = spring_after(law, c, spring[c], slip[c], 1e-4, normal[c])
+
+    law = ContactLaw(*[None] * 7, column(), column(), None)
+    loop(COUNT, law, column(), column(), column())
+    assert_vectorised(loop)
+
+
+@pytest.mark.parametrize("atan", [None, 1])
+def test_friction_of_points(atan: Any) -> None:
+    """Explicit and implicit quotients, on both curves."""
+
+    @compiled
+    def loop(count: int, atan: Any, slip: Any, b: Any, found: Any) -> None:
+        for c in range(uint64(count)):
+            found[c] = regularisation(slip[c], 0.01, atan) - implicit_regularisation(slip[c], b[c], 0.01, atan)
+
+    loop(COUNT, atan, column(), column(), column())
+    assert_vectorised(loop)
+
+
+def test_friction_of_rings() -> None:
+    """Force and moment of a ring on one belt."""
+
+    @compiled
+    def loop(count: int, slide: Any, spin: Any, force: Any, moment: Any) -> None:
+        for c in range(uint64(count)):
+            limit, first, rest = ring_means(slide[c], spin[c], 0.01)
+            force[c] = ring_share(slide[c], spin[c], limit, first, rest)
+            moment[c] = ring_share(spin[c], slide[c], limit, first, rest)
+
+    loop(COUNT, column(), column(), column(), column())
+    assert_vectorised(loop)

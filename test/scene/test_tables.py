@@ -1,0 +1,119 @@
+"""Tables of contacts in CSV files: read with the scene, and not needed to read it again."""
+
+from pathlib import Path
+
+import pytest
+
+from conveyor_sim.errors import SceneError
+from conveyor_sim.scene import load_scene, parse_overrides, parse_scene
+from conveyor_sim.scene.places import Places
+
+GOOD = (Path(__file__).parent / "good.yaml").read_text(encoding="utf-8")
+TEXT = GOOD.replace("stiffness: 10000}", "table: data/glass.csv}")
+LINE = 1 + TEXT[: TEXT.index("data/glass.csv")].count("\n")
+POINTS = ((0.0, 0.0), (0.001, 5.0), (0.002, 15.5))
+
+
+def written(folder: Path, content: str | bytes) -> Path:
+    """A scene in a folder, with its table."""
+    (folder / "data").mkdir(exist_ok=True)
+    data = content if isinstance(content, bytes) else content.encode()
+    (folder / "data" / "glass.csv").write_bytes(data)
+    path = folder / "plant.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "0,0\n0.001,5\n0.002,15.5\n",
+        "overlap (m),force (N)\n0,0\n0.001,5\n0.002,15.5",
+        b"\xef\xbb\xbfoverlap,force\r\n 0 , 0 \r\n\r\n1e-3,5\r\n2e-3,15.5\r\n",
+    ],
+    ids=["bare", "header", "spreadsheet"],
+)
+def test_points_are_read_beside_the_scene(content: str | bytes, tmp_path: Path) -> None:
+    assert load_scene(written(tmp_path, content)).contacts[1].table == POINTS
+
+
+def test_a_table_that_starts_above_zero_is_kept_as_it_is(tmp_path: Path) -> None:
+    """Its first point (0, 0) is filled in where the columns are built."""
+    assert load_scene(written(tmp_path, "0.001,5\n0.002,15.5")).contacts[1].table == POINTS[1:]
+
+
+def test_points_can_stand_in_the_scene() -> None:
+    text = GOOD.replace("stiffness: 10000}", "table: [[0, 0], [0.001, 5], [2.0e-3, 15.5]]}")
+    scene = parse_scene(text)
+    assert scene.contacts[1].table == POINTS
+    assert scene.overrides_text == ""
+
+
+def test_what_is_recorded_gives_the_scene_without_the_file(tmp_path: Path) -> None:
+    """A recording holds the text and the overrides; a replay reads them elsewhere, with the file gone."""
+    path = written(tmp_path, "0,0\n0.001,5\n0.002,15.5\n")
+    scene = load_scene(path, {"seed": 3})
+    (tmp_path / "data" / "glass.csv").unlink()
+    again = parse_scene(scene.source_text, "a recording", parse_overrides(scene.overrides_text))
+    assert again == scene
+    assert again.overrides_text == scene.overrides_text
+    assert again.seed == 3
+
+
+def test_a_table_can_be_an_override(tmp_path: Path) -> None:
+    """Paths in overrides are taken from the scene's folder, too."""
+    path = written(tmp_path, "0.001,5\n")
+    path.write_text(GOOD, encoding="utf-8")
+    contacts = [
+        {"between": ["glass", "glass"], "stiffness": 5000},
+        {"between": ["glass", "steel"], "table": "data/glass.csv"},
+    ]
+    scene = load_scene(path, {"contacts": contacts})
+    assert scene.contacts[1].table == ((0.001, 5.0),)
+    assert parse_scene(scene.source_text, overrides=parse_overrides(scene.overrides_text)) == scene
+
+
+def test_lines_stay_those_of_the_scene(tmp_path: Path) -> None:
+    """That the table was read does not make the contacts overrides."""
+    places = Places(load_scene(written(tmp_path, "0.001,5\n"), {"seed": 3}))
+    assert places.line_of(("contacts", 1, "table")) == LINE
+    assert places.line_of(("seed",)) is None
+    assert places.unwritten(("seed",)) == "override"
+    assert places.unwritten(("gravity",)) == "default"
+    assert places.of(("seed",)).endswith("plant.yaml (override)")
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("0,0\n0.001,x\n", 'expected two numbers a line, overlap and force (m, N): line 2 of it is "0.001,x"'),
+        ("0,0\n0.001\n", 'expected two numbers a line, overlap and force (m, N): line 2 of it is "0.001"'),
+        ("0,0,0\n1,1,1\n", 'expected two numbers a line, overlap and force (m, N): line 2 of it is "1,1,1"'),
+        ("overlap,force\n", "expected two numbers a line, overlap and force (m, N): it has none"),
+        ("", "expected two numbers a line, overlap and force (m, N): it has none"),
+        (b"\xff\xfe", "expected a CSV file in UTF-8"),
+    ],
+    ids=["word", "one column", "three columns", "header only", "empty", "not text"],
+)
+def test_what_is_wrong_in_the_file_is_told_at_the_scenes_line(content: str | bytes, says: str, tmp_path: Path) -> None:
+    path = written(tmp_path, content)
+    with pytest.raises(SceneError) as error:
+        load_scene(path)
+    assert str(error.value) == f'{path}:{LINE}: contacts[1].table: "data/glass.csv" given, {says}'
+
+
+def test_numbers_that_make_no_table_are_told_as_for_points(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"contacts\[1\].table: point 2, \[0.001, 20\], follows \[0.001, 10\]"):
+        load_scene(written(tmp_path, "0.001,10\n0.001,20\n"))
+    with pytest.raises(SceneError, match=r"contacts\[1\].table: .* given, expected the path of a CSV file"):
+        load_scene(written(tmp_path, "0.001,inf\n"))
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    path = written(tmp_path, "")
+    (tmp_path / "data" / "glass.csv").unlink()
+    with pytest.raises(SceneError, match=r'"data/glass.csv" given, expected a CSV file beside .*No such file'):
+        load_scene(path)
+    (tmp_path / "data" / "glass.csv").mkdir()
+    with pytest.raises(SceneError, match="Is a directory"):
+        load_scene(path)

@@ -1,0 +1,125 @@
+"""What `explain` tells: each effect with the line that decides, the bounds and the one that rules, prices."""
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from conveyor_sim.cli import main
+from conveyor_sim.explain import explanation, price_table
+from conveyor_sim.model import build_model
+from conveyor_sim.price import ALL, Price, PriceList
+from conveyor_sim.scene import parse_scene
+
+TEXT = """\
+name: small
+duration: 1.0
+contacts:
+  - between: [glass, glass]
+    stiffness: 5000
+    friction: 0.1
+bottle_types:
+  jar: {radius: 0.05, mass: 0.2, material: glass}
+bottles:
+  - {type: jar, position: [0, 0]}
+  - {type: jar, position: [1, 0]}
+floor: {friction: 0.4}
+outputs: {contacts: 0}
+effects:
+  rotation: off
+"""
+
+
+def shown(content: object, width: int = 140) -> list[str]:
+    """Lines as a terminal would show them, without the space around."""
+    console = Console(width=width, markup=False, highlight=False, force_terminal=False)
+    with console.capture() as capture:
+        console.print(content)
+    return [" ".join(line.split()) for line in capture.get().splitlines()]
+
+
+def explained(text: str = TEXT, width: int = 140, **overrides: object) -> list[str]:
+    scene = parse_scene(text, "plant.yaml", overrides)
+    return shown(explanation(scene, build_model(scene)), width)
+
+
+def test_effects_are_told_with_line_field_law_and_source() -> None:
+    lines = explained()
+    for line in (
+        "bottle_contact on 9 bottles: 2 bottles in all",
+        "contact between bottles; (22)-(23)",
+        "linear on 5 contacts[0].stiffness: 5000 N/m",
+        "N = k delta; (22)-(23)",
+        "hertz off no contact with hertz_stiffness",
+        "base_friction on 12 floor: friction 0.4",
+        "rotation off 15 forced off by effects.rotation; contacts[0].friction: 0.1 calls for it",
+        "contact_arrays off outputs.contacts is 0",
+    ):
+        assert line in lines
+
+
+def test_what_is_not_in_the_file_has_no_line() -> None:
+    """Defaults and overrides call for effects, too."""
+    assert "peaks on outputs.bottles: 50 Hz (default)" in explained()
+    lines = explained(outputs={"bottles": 20}, friction_curve="atan")
+    assert "peaks on outputs.bottles: 20 Hz (override)" in lines
+    assert "atan_friction on friction_curve: atan (override)" in lines
+
+
+def test_bounds_are_told_with_the_one_that_rules() -> None:
+    lines = explained(TEXT.replace("friction: 0.1", "friction: 0.0"))
+    rows = [line for line in lines if (" us " in line and "20 steps" in line) or "hexagonal" in line]
+    assert [line.split(" us ")[0].rsplit(" ", 1)[0] for line in rows] == [
+        "base friction", "contact time", "lattice stability",
+    ]  # fmt: skip
+    assert rows[0].endswith("79 20 steps in v_lim / (mu g) at mu = 0.4 (rules)")
+    assert not any(row.endswith("(rules)") for row in rows[1:])
+    assert "integrator semi_implicit_euler" in lines
+    assert any(line.startswith("time step 0.0001266 s: 79 steps a tick, the fewest") for line in lines)
+
+
+def test_a_scene_without_bounds() -> None:
+    text = TEXT.split("contacts:")[0] + "bottle_types:\n  jar: {radius: 0.05, mass: 0.2, material: glass}\n"
+    assert "nothing in the scene bounds the time step" in explained(text)
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_nothing_is_cut_off_on_a_narrow_terminal(width: int) -> None:
+    assert "…" not in "".join(explained(width=width))
+
+
+def price(effect: str, cost: float, spread: float, *takes_along: str) -> Price:
+    return Price(effect, takes_along, 50.0, 50.0 - cost, cost, cost - spread, cost + spread)
+
+
+def test_prices_tell_what_is_noise() -> None:
+    prices = PriceList(
+        time=1.5, bottles=7, full=50.0,
+        prices=(price("contact_friction", 20.0, 1.0, "rotation"), price("peaks", 0.4, 0.5)),
+        together=price(ALL, 30.0, 2.0), failed={"belts": "it diverged"}, fixed=("linear", "curved_belts"),
+    )  # fmt: skip
+    lines = shown(price_table(prices))
+    for line in (
+        "contact_friction 50.0 30.0 +20.0 +19.0 .. +21.0",
+        "peaks 50.0 49.6 +0.4 -0.1 .. +0.9 noise",
+        "all of these 50.0 20.0 +30.0 +28.0 .. +32.0 not the sum",
+        "contact_friction takes along rotation",
+        "belts: not priced, the scene does not run without it: it diverged",
+        "not priced, as they can't be forced off: linear, curved_belts",
+    ):
+        assert line in lines
+    assert "In ns per bottle and step, of 50.0 with all effects: 7 bottles at 1.5 s, on one thread" in " ".join(lines)
+    assert "…" not in "".join(shown(price_table(prices), 80))
+
+
+def test_the_command() -> None:
+    result = CliRunner().invoke(main, ["explain", "two_bottles"])
+    assert result.exit_code == 0, result.output
+    assert "normal_damping" in result.output
+
+
+@pytest.mark.parametrize("arguments", [["--at", "1"], ["--price", "--at", "-1"], ["--price", "--at", "1e9"]])
+def test_a_moment_that_can_not_be_measured_is_refused(arguments: list[str]) -> None:
+    result = CliRunner().invoke(main, ["explain", "two_bottles", *arguments])
+    assert result.exit_code == 1
+    assert "--at" in result.output
+    assert "Traceback" not in result.output
