@@ -84,6 +84,7 @@ class Simulation:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
         self._feed()
         self._state.make_lists()
+        self._set_surfaces()
 
     @property
     def time(self) -> float:
@@ -151,6 +152,7 @@ class Simulation:
         self._actual[:] = other._actual
         self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
         self._state.take(other._state)
+        self._set_surfaces()
 
     def due(self, output: str) -> bool:
         """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""
@@ -252,8 +254,9 @@ class Simulation:
                 self._commanded[index] = 0.0
                 name = speed_command(self.model.belts[index])
                 self._outcomes.append(CommandOutcome(self.tick, "watchdog", (name,), (0.0,), True, ""))
-        self._actual[:] = self._commanded
-        self._set_surfaces()
+        if not np.array_equal(self._actual, self._commanded):
+            self._actual[:] = self._commanded
+            self._set_surfaces()
 
     def _set_surfaces(self) -> None:
         world, surface = self._state.world, self._state.world.surface

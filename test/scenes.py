@@ -15,13 +15,14 @@ from conveyor_sim.simulation import Simulation
 RADIUS = 0.065
 MASS = 0.2
 NO_FLOOR: dict[str, Any] = {"floor": "none"}
+PEAKS: dict[str, Any] = {"effects": {"peaks": "on"}}
 NO_OUTPUTS = dict.fromkeys(Scene.TOPICS, 0)
 
 
 def scene(**fields: Any) -> Scene:
     """A scene with one bottle type, `bottle` of `glass` (the paper's radius and mass), and no outputs.
 
-    Peaks then add up from the start. The duration is a thousand ticks, which binds nobody here.
+    Without the output of bottles there are no peaks; with PEAKS they add up from the start. The duration is a thousand ticks, which binds nobody here.
     """
     duration = 1000 * fields.get("tick", 0.01)
     defaults = {"name": "test", "duration": duration, "bottle_types": {"bottle": kind()}, "outputs": NO_OUTPUTS}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scenes import RADIUS, bottle, contact, segment, simulation
+from scenes import PEAKS, RADIUS, bottle, contact, segment, simulation
 
 from conveyor_sim.simulation import Simulation
 
@@ -13,6 +13,7 @@ def three_bottles(tick: float, steps: int, rate: float, integrator: str, damped:
     """Two bottles in a row before a rail; a third runs into them, and all three into the rail."""
     damping = ("normal", 1.0) if damped else None
     return simulation(
+        **PEAKS,
         tick=tick,
         step={"per_tick": steps, "integrator": integrator},
         contacts=[contact(4000.0, damping=damping), contact(6000.0, "steel", damping=damping)],
@@ -83,6 +84,7 @@ def test_peaks_start_anew_after_an_output_tick_and_only_then() -> None:
 def test_the_impulse_is_the_change_of_momentum() -> None:
     """Head on, with no other force: the sum of normal forces over time is what each partner's momentum changed by."""
     sim = simulation(
+        **PEAKS,
         tick=0.05,
         step={"per_tick": 400},
         contacts=[contact(4000.0, damping=("normal", 1.0)), contact(6000.0, "steel", damping=("normal", 1.0))],

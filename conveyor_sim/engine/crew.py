@@ -4,6 +4,9 @@ import threading
 import weakref
 from collections.abc import Callable
 from queue import SimpleQueue
+from typing import Any
+
+import numba
 
 from .arrays import Member, World
 from .team import members
@@ -11,12 +14,18 @@ from .team import members
 Advance = Callable[[World, Member, int, float, int], int]
 Task = tuple[Advance, World, Member, int, float, int]
 
+_typeof: Any = numba.typeof
+
 
 class Crew:
-    """Teams of up to `most` threads, the calling one among them. The others start when first needed."""
+    """Teams of up to `most` threads, the calling one among them. The others start when first needed.
+
+    A crew is for Worlds of one scene: their arrays may be replaced, their types not.
+    """
 
     def __init__(self, most: int) -> None:
         self.most = most
+        self._entries: dict[Any, Advance] = {}
         self._teams: dict[int, tuple[Member, ...]] = {}
         self._tasks: list[SimpleQueue[Task | None]] = []
         self._done: SimpleQueue[int] = SimpleQueue()
@@ -25,6 +34,7 @@ class Crew:
     def advance(self, size: int, function: Advance, world: World, steps: int, dt: float, phase: int) -> int:
         """Run an integrator on `size` threads; return the steps that it took. Raises ValueError beyond `most`."""
         team = self.team(size)
+        function = self._compiled(function, world, team[0], steps, dt, phase)
         for task, member in zip(self._workers(size - 1), team[1:], strict=True):
             task.put((function, world, member, steps, dt, phase))
         taken = function(world, team[0], steps, dt, phase)
@@ -39,6 +49,15 @@ class Crew:
         if size not in self._teams:
             self._teams[size] = members(size)
         return self._teams[size]
+
+    def _compiled(self, function: Any, *arguments: Any) -> Advance:
+        """The machine code for arguments of these types, which never change in a crew's life.
+
+        Numba would look at the type of each of a hundred arrays at every call: 20 us against 1.
+        """
+        if function not in self._entries:
+            self._entries[function] = function.compile(tuple(_typeof(argument) for argument in arguments))
+        return self._entries[function]
 
     def _workers(self, count: int) -> list["SimpleQueue[Task | None]"]:
         while len(self._tasks) < count:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, segment, simulation
+from scenes import MASS, PEAKS, RADIUS, base, belt, bottle, contact, segment, simulation
 
 from conveyor_sim.simulation import Simulation
 
@@ -15,6 +15,7 @@ PULL = MU * MASS * G
 def queue(damping: float, step: int = 200) -> Simulation:
     """N bottles in a row, touching each other and the stop."""
     return simulation(
+        **PEAKS,
         tick=0.01,
         step={"per_tick": step},
         gravity=G,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, NO_FLOOR, RADIUS, arc, base, belt, bottle, contact, polyline, segment, simulation
+from scenes import MASS, NO_FLOOR, PEAKS, RADIUS, arc, base, belt, bottle, contact, polyline, segment, simulation
 
 from conveyor_sim.simulation import Simulation
 
@@ -19,6 +19,7 @@ def frictionless(rails: dict[str, Any], start: dict[str, Any], steps: int = 100,
     laws = {law: (law, coefficient) for law, coefficient in damping.items()}
     tick = 0.005
     return simulation(
+        **PEAKS,
         tick=tick,
         step={"per_tick": math.ceil(tick / CONTACT_TIME * steps)},
         contacts=[contact(STIFFNESS, "steel", laws.get("normal"))],
@@ -40,6 +41,7 @@ def test_a_straight_rail_of_many_pieces_is_felt_as_one() -> None:
 
     def along(rail: dict[str, Any]) -> Simulation:
         return simulation(
+            **PEAKS,
             tick=0.01,
             step={"per_tick": 100},
             base=base(0.4),
