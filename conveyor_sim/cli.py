@@ -72,8 +72,12 @@ def explain(scene: str, price: bool, at: float | None) -> None:
     from conveyor_sim.scene import load_scene
 
     loaded = load_scene(scene_path(scene))
-    if at is not None and not (price and 0.0 < at <= loaded.duration):
-        raise ConveyorError(f"--at: {at:g} given, expected --price and a time of at most {loaded.duration:g} (s)")
+    if at is not None and not price:
+        raise ConveyorError(f"--at: {at:g} given, expected --price with it, for it is the time to measure at")
+    if at is not None and not 0.0 < at <= loaded.duration:
+        raise ConveyorError(
+            f"--at: {at:g} given, expected a time greater than 0 and at most the duration, {loaded.duration:g} (s)"
+        )
     _print(explanation(loaded, build_model(loaded)))
     if not price:
         return

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE
 from rich.console import Group
+from rich.padding import Padding
 from rich.table import Table
 
 from conveyor_sim.effects import EFFECTS
@@ -22,7 +23,7 @@ def explanation(scene: Scene, model: Model) -> Group:
     """Effects on and off with the lines that decide, bounds on dt with the one that rules, steps and integrator."""
     steps = Table.grid(padding=(0, 2))
     steps.add_row("scene", f"{model.name} ({scene.source_name})")
-    steps.add_row("time step", f"{model.dt:.4g} s: {model.dt_reason}")
+    steps.add_row("time step", f"{_time(model.dt)}: {model.dt_reason}")
     steps.add_row("integrator", model.integrator)
     return Group(_effects(scene, model), _bounds(scene, model), steps)
 
@@ -46,6 +47,9 @@ def price_table(prices: PriceList) -> Group:
     lines += [
         f"{price.effect} takes along {', '.join(price.takes_along)}" for price in prices.prices if price.takes_along
     ]
+    supply = [price.effect for price in prices.prices if price.effect in ("infeed", "outfeed")]
+    if supply:
+        lines.append(f"{', '.join(supply)}: without, there are other bottles, among whom a step's fixed cost is shared")
     lines += [f"{name}: not priced, the scene does not run without it: {why}" for name, why in prices.failed.items()]
     if prices.fixed:
         lines.append(f"not priced, as they can't be forced off: {', '.join(prices.fixed)}")
@@ -65,13 +69,12 @@ def _effects(scene: Scene, model: Model) -> Table:
         why = choice.why
         if choice.path is not None and line is None:
             why += f" ({places.unwritten(choice.path)})"
-        if choice.on:
-            why += f"\n  {declared[choice.name].law}; {declared[choice.name].source}"
+        law = f"{declared[choice.name].law}; {declared[choice.name].source}"
         table.add_row(
             choice.name,
             "on" if choice.on else "off",
             "" if line is None else str(line),
-            why,
+            Group(why, Padding(law, (0, 0, 0, 2))) if choice.on else why,
             style=None if choice.on else "dim",
         )
     return table
@@ -81,19 +84,25 @@ def _bounds(scene: Scene, model: Model) -> Table | str:
     if not model.bounds:
         return "nothing in the scene bounds the time step\n"
     table = Table(box=SIMPLE)
-    table.add_column("bound on the time step")
+    table.add_column("bound on the\ntime step", no_wrap=True)
     table.add_column("at most", justify="right", no_wrap=True)
-    table.add_column("steps a tick", justify="right")
+    table.add_column("steps\na tick", justify="right")
     table.add_column("why", overflow="fold")
     for bound in sorted(model.bounds, key=lambda bound: bound.dt):
         rules = bound is min(model.bounds, key=lambda bound: bound.dt)
         table.add_row(
             bound.name,
-            f"{bound.dt * 1e6:.4g} us",
+            _time(bound.dt),
             str(max(1, math.ceil(scene.tick / bound.dt * (1.0 - 1e-12)))),
             f"{bound.reason}{' (rules)' if rules else ''}",
         )
     return table
+
+
+def _time(seconds: float) -> str:
+    """A time of four digits in a unit in which it takes no exponent."""
+    scale, unit = (1e6, "us") if seconds < 1e-3 else (1e3, "ms") if seconds < 1.0 else (1.0, "s")
+    return f"{seconds * scale:.4g} {unit}"
 
 
 def _numbers(price: Price) -> tuple[str, str, str, str]:

@@ -126,7 +126,7 @@ def build_model(scene: Scene) -> Model:
         friction_solver="implicit" if "implicit_friction" in on else "explicit",
         segments=segments if "segment_rails" in on else None,
         arcs=arcs if "arc_rails" in on else None,
-        grid=plant_grid(rails, belts if "belts" in on else [], float(radius.max()), skin),
+        grid=plant_grid(rails, belts if "belts" in on else [], float(radius.max()), _largest(laws.base_radius), skin),
         base_friction=laws.base_friction,
         gravity=scene.gravity,
         engine_hash=ENGINE_HASH,
@@ -136,6 +136,11 @@ def build_model(scene: Scene) -> Model:
         ),
         machine=_machine(),
     )
+
+
+def _largest(radii: F8 | None) -> float:
+    """The largest of some radii, m; 0 if there are none."""
+    return 0.0 if radii is None else float(radii.max())
 
 
 def _machine() -> str:

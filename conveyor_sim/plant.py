@@ -100,7 +100,11 @@ def listed(slots: int) -> Listed:
 
 
 def plant_grid(
-    rails: Sequence[RailShape], belts: Sequence[BeltShape], largest_radius: float, skin: float
+    rails: Sequence[RailShape],
+    belts: Sequence[BeltShape],
+    largest_radius: float,
+    largest_base_radius: float,
+    skin: float,
 ) -> StaticGrid | None:
     """The static grid over all rails and belts; None if there are none."""
     if not rails and not belts:
@@ -111,7 +115,7 @@ def plant_grid(
         _boxes([_arc_extremes(piece) for piece in pieces if isinstance(piece, ArcPiece)]),
         _boxes([_belt_extremes(shape) for shape in belts]),
         rail_reach=largest_radius + skin,
-        belt_reach=skin,
+        belt_reach=skin + largest_base_radius,
         cell=4.0 * largest_radius,
     )
 

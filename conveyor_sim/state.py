@@ -75,10 +75,10 @@ class State:
                     np.asarray(column)[slot] = 0
         world.bottles.id[slot] = -1
         heapq.heappush(self._free, slot)
-        if world.pairs is not None:
+        if world.pairs is not None and world.pairs.spring is not None:
             drop_springs(world.pairs, world.pairs.spring, slot)
         for near in (world.near_segments, world.near_arcs):
-            if near is not None:
+            if near is not None and near.springs is not None:
                 drop_near_springs(near, near.springs, slot)
         world.neighbourhood.stale[0] = 1
 

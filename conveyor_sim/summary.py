@@ -74,9 +74,9 @@ class Summary:
     belts: dict[str, BeltFlow]
     loop: Loop | None
     """None if no bottle came back."""
-    peak_force: float
-    """N, the largest normal contact force of the run (accumulated every step)."""
-    peak_force_99: float
+    peak_force: float | None
+    """N, the largest normal contact force of the run (accumulated every step); None if the scene has no peaks."""
+    peak_force_99: float | None
     """N, 99th percentile over bottles and output intervals with a contact of the peak force in the interval."""
     commands: int
     refused: int
@@ -112,6 +112,7 @@ class _Tally:
         self._last_tick = 0
         self._itinerary = _Itinerary(len(bag.line.belts))
         self._forces: list[NDArray[np.float64]] = []
+        self._unknown = False
         self._bottles: BottleColumns | None = None
         self._signals: NDArray[np.float64] | None = None
         self._outcomes: Counter[bool] = Counter()
@@ -127,6 +128,7 @@ class _Tally:
             self._bottles = to_columns(BottleColumns, message)
             self._itinerary.take(self._bag.time(message.tick), self._bottles)
             self._forces.append(self._bottles.peak_force[self._bottles.peak_force > 0.0])
+            self._unknown = self._unknown or bool(np.isnan(self._bottles.peak_force).any())
         elif kind == SIGNALS:
             self._signals = message.values
         else:
@@ -146,8 +148,8 @@ class _Tally:
             on_floor=int(np.count_nonzero(belt < 0)),
             belts=self._belts(belt),
             loop=self._loop(),
-            peak_force=float(forces.max()) if len(forces) else 0.0,
-            peak_force_99=float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
+            peak_force=None if self._unknown else float(forces.max(initial=0.0)),
+            peak_force_99=None if self._unknown else float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
@@ -240,6 +242,9 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
     wall, factor = summary.wall, summary.real_time_factor
     fed = "not recorded" if summary.fed is None else str(summary.fed)
     removed = "not recorded" if summary.removed is None else str(summary.removed)
+    force = "not recorded"
+    if summary.peak_force is not None:
+        force = f"peak {summary.peak_force:.2f} N, 99th percentile of peaks {summary.peak_force_99:.2f} N"
     loop = "no bottle has come round"
     if summary.loop is not None:
         loop = (
@@ -254,7 +259,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("real-time factor", "not known" if factor is None else f"{factor:.2f}"),
         ("bottles", f"{fed} fed, {removed} removed, {summary.present} present ({summary.on_floor} on no belt)"),
         ("loop", loop),
-        ("contact force", f"peak {summary.peak_force:.2f} N, 99th percentile of peaks {summary.peak_force_99:.2f} N"),
+        ("contact force", force),
         ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
     ]
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.joint import ANSWERS, FREE, SILENT
 from conveyor_sim.scene.geometry import Piece
+from conveyor_sim.scene.overlaps import near_pieces, overlapping
 
 JOINT_TOLERANCE = 1e-6
 """m; well above the rounding of coordinates, well below anything a bottle can feel."""
@@ -61,27 +62,25 @@ def find_joints(pieces: Sequence[Piece], inward: NDArray[np.float64]) -> Joints:
 def _ends_on_pieces(pieces: Sequence[Piece], ends: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Pairs (piece, other) where an end of `other` lies on `piece`, be it at an end or between."""
     found: list[tuple[int, int]] = []
-    for index, piece in enumerate(pieces):
-        touching = (piece.distance(ends.reshape(-1, 2)) <= JOINT_TOLERANCE).reshape(-1, 2).any(axis=1)
-        found.extend((index, int(other)) for other in np.flatnonzero(touching) if other != index)
+    for index, near, apart in near_pieces(ends.reshape(-1, 2), pieces, JOINT_TOLERANCE):
+        touching = np.unique(near[apart <= JOINT_TOLERANCE] // 2)
+        found.extend((index, other) for other in touching.tolist() if other != index)
     return found
 
 
 def _meeting_ends(ends: NDArray[np.float64]) -> list[list[tuple[int, int]]]:
     """Groups of two or more (piece, end) that share a point."""
     points = ends.reshape(-1, 2)
-    order = np.argsort(points[:, 0], kind="stable")
+    near: dict[int, list[int]] = {}
+    for one, other in zip(*overlapping(points, np.full(len(points), JOINT_TOLERANCE / 2), 0.0), strict=True):
+        near.setdefault(int(one), []).append(int(other))
+        near.setdefault(int(other), []).append(int(one))
     taken: set[int] = set()
     groups = []
-    for position, index in enumerate(order):
-        if int(index) in taken:
+    for index in sorted(near, key=lambda end: (points[end, 0], end)):
+        if index in taken:
             continue
-        group = [int(index)]
-        for other in order[position + 1 :]:
-            if points[other, 0] - points[index, 0] > JOINT_TOLERANCE:
-                break
-            if int(other) not in taken and np.hypot(*(points[other] - points[index])) <= JOINT_TOLERANCE:
-                group.append(int(other))
+        group = [index, *(other for other in near[index] if other not in taken)]
         if len(group) > 1:
             taken.update(group)
             groups.append(sorted((flat // 2, flat % 2) for flat in group))

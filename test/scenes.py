@@ -22,7 +22,8 @@ NO_OUTPUTS = dict.fromkeys(Scene.TOPICS, 0)
 def scene(**fields: Any) -> Scene:
     """A scene with one bottle type, `bottle` of `glass` (the paper's radius and mass), and no outputs.
 
-    Without the output of bottles there are no peaks; with PEAKS they add up from the start. The duration is a thousand ticks, which binds nobody here.
+    Without the output of bottles there are no peaks; with PEAKS they add up from the start. The duration is a thousand
+    ticks, which binds nobody here.
     """
     duration = 1000 * fields.get("tick", 0.01)
     defaults = {"name": "test", "duration": duration, "bottle_types": {"bottle": kind()}, "outputs": NO_OUTPUTS}

@@ -126,7 +126,7 @@ def _seconds(message: Any) -> str:
 def _unequal(then: NDArray[Any], now: NDArray[Any], tolerance: float | None) -> NDArray[np.bool_]:
     if tolerance is not None:
         near: NDArray[np.bool_] = np.abs(then - now) <= tolerance + RELATIVE * np.abs(then)
-        return ~near  # NaN is not near anything
+        return np.asarray(~near & ~(np.isnan(then) & np.isnan(now)))  # NaN is near NaN only
     if then.dtype.kind == "f":  # as integers: a NaN equals itself, and the two zeros differ
         return np.asarray(then.view(np.uint64) != now.view(np.uint64))
     return np.asarray(then != now)

@@ -21,6 +21,22 @@ forced where a scene makes no sense without. What an effect calls for goes with 
 be left that turns a bottle.
 
 Numbers in brackets are equations of the paper (docs/paper.md).
+
+## Choosing effects
+
+The paper's scene is a line of fields: `stiffness`, `damping` of law paper, `friction`. Another law is another field in its
+place, and nothing else of the scene changes. Glass that springs back as glass does, stick and slip with history, a base
+that turns with its belt, and no columns of contacts that nobody reads:
+
+```yaml
+{EXAMPLE}```
+
+- `hertz_stiffness` instead of `stiffness` makes contacts stiffer the deeper they are; `table` takes a measured curve.
+- `restitution` instead of `coefficient` is what a drop test gives; the coefficient follows from it.
+- `tangential` holds bottles at rest that friction below v_lim lets creep, in queues that stand for long.
+- `base_radius` makes bottles turn that straddle two belts, and lets a spin slow down. Give it to all types: those
+  without stand on rings of radius 0 then.
+- `effects` is for what a scene calls for and a study does without; each costs what `--price` says.
 """
 
 

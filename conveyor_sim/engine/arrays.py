@@ -324,7 +324,7 @@ class Footing(NamedTuple):
     uy: F8
     turn: F8 | None
     pull: F8
-    """mu m g, N; 0 where a ring straddles belts and is summed point by point."""
+    """mu m g, N; 0 where a ring may straddle belts and is summed point by point."""
 
 
 class Ring(NamedTuple):

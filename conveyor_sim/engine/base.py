@@ -37,7 +37,9 @@ def add_base_friction(
     if ring is None:
         _point_friction(settings, settings.atan, bottles, load, footing, footing.turn, implicit, dt, first, end)
     if ring is not None:
-        _ring_friction(settings, bottles, spin, load, footing, footing.turn, ring, first, end)
+        _ring_friction(
+            settings, settings.atan, bottles, spin, load, footing, footing.turn, ring, implicit, dt, first, end
+        )
         _straddling(settings, bottles, spin, load, belts, surface, ring, block)
 
 
@@ -87,22 +89,27 @@ def _quotient(
 @part
 def _ring_friction(
     settings: Settings,
+    atan: Any,
     bottles: Bottles,
     spin: Any,
     load: Load,
     footing: Any,
     turn: Any,
     ring: Any,
+    implicit: Any,
+    dt: float,
     begin: int,
     end: int,
 ) -> None:
+    """A bottle with a base radius of 0 stands on a point beside others on rings."""
     for i in range(uint64(begin), uint64(end)):
         vx, vy = _relative(bottles, footing, turn, i)
         turning = spin.omega[i] - _turn(turn, i)
         rim = abs(turning) * ring.radius[i]
         slide = math.sqrt(vx * vx + vy * vy)
         limit, first, rest = ring_means(slide, rim, settings.slip_limit)
-        pull = footing.pull[i] * ring_share(slide, rim, limit, first, rest)
+        point = _quotient(settings, atan, bottles, footing, implicit, dt, i, slide)
+        pull = footing.pull[i] * (ring_share(slide, rim, limit, first, rest) if ring.radius[i] > 0.0 else point)
         twist = footing.pull[i] * ring_share(rim, slide, limit, first, rest)
         load.fx[i] -= pull * vx
         load.fy[i] -= pull * vy
@@ -124,6 +131,8 @@ def _straddling(
         return
     for entry in range(belts.uncertain.first[block], belts.uncertain.first[block + 1]):
         i = belts.uncertain.bottle[entry]
+        if ring.radius[i] == 0.0:
+            continue
         fx, fy, moment = straddling_ring(
             i,
             belts,

@@ -32,13 +32,13 @@ def engine_hash() -> str:
 
 def cache_dir() -> Path:
     """Where compiled kernels are kept: under NUMBA_CACHE_DIR, XDG_CACHE_HOME or the home's cache, else a temporary."""
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(base) / "conveyor_sim" / ENGINE_HASH
     try:
+        base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+        folder = Path(base) / "conveyor_sim" / ENGINE_HASH
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
-    except OSError:
+    except (OSError, RuntimeError):  # RuntimeError: nobody knows this user's home
         return Path(tempfile.gettempdir()) / f"conveyor_sim-{os.getuid()}" / ENGINE_HASH
 
 
@@ -79,7 +79,7 @@ def _compiled(function: Function, **options: bool) -> Function:
     try:
         compiled: Function = _njit(
             nogil=True,
-            cache=True,
+            cache=not options["no_cpython_wrapper"],
             error_model="numpy",
             forceinline=True,
             no_cfunc_wrapper=True,

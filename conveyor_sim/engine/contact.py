@@ -142,8 +142,16 @@ def _add_damping(force: float, damping: Any, e: int, slip: float) -> float:
     return force + damping[e] * slip
 
 
+@part
+def stretched(spring: Any, slip: float, dt: float) -> Any:
+    """Elongation (m) with which a step acts, or None: with that of its own slip, or the spring would pump energy."""
+    if spring is None:
+        return None
+    return spring + dt * slip
+
+
 @kernel
-def spring_after(law: ContactLaw, e: int, spring: float, slip: float, dt: float, normal: float) -> float:
+def spring_after(law: ContactLaw, e: int, spring: float, slip: float, dt: float, normal: float, share: float) -> float:
     """Elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N (Cundall and Strack 1979).
 
     normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
@@ -151,6 +159,8 @@ def spring_after(law: ContactLaw, e: int, spring: float, slip: float, dt: float,
     stiffness = law.tangential_stiffness[e]  # type: ignore[index]
     longer = spring + dt * slip
     most = law.friction[e] * (0.0 if normal < 0.0 else normal)  # type: ignore[index]
-    cut = math.copysign(most, longer) / (stiffness if stiffness > 0.0 else 1.0)
-    kept = cut if stiffness * abs(longer) > most else longer
+    # The force is that of the share of a spring, as is N.
+    scaled = share * stiffness
+    cut = math.copysign(most, longer) / (scaled if scaled > 0.0 else 1.0)
+    kept = cut if scaled * abs(longer) > most else longer
     return kept if stiffness > 0.0 else 0.0

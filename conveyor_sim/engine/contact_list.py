@@ -100,7 +100,18 @@ def _rail_contacts(
                         law.tangential_stiffness, world.near_segments, world.near_arcs, found.entry[c]
                     )
                     normal, tangential, _ = rail_contact(
-                        c, i, world.settings, world.settings.atan, bottles, spin, found, law, world.curves, spring, None
+                        c,
+                        i,
+                        world.settings,
+                        world.settings.atan,
+                        bottles,
+                        spin,
+                        found,
+                        law,
+                        world.curves,
+                        spring,
+                        0.0,
+                        None,
                     )
                     nx, ny, overlap = found.nx[c], found.ny[c], found.overlap[c]
                     kind[count] = BOTTLE_RAIL

@@ -1,5 +1,6 @@
 """The threads behind a team (`team.py`): they wait in Python between ticks, and take the steps of a tick together."""
 
+import os
 import threading
 import weakref
 from collections.abc import Callable
@@ -26,20 +27,28 @@ class Crew:
     def __init__(self, most: int) -> None:
         self.most = most
         self._entries: dict[Any, Advance] = {}
+        self._process = os.getpid()
         self._teams: dict[int, tuple[Member, ...]] = {}
         self._tasks: list[SimpleQueue[Task | None]] = []
-        self._done: SimpleQueue[int] = SimpleQueue()
-        self._finalizer = weakref.finalize(self, _dismiss, self._tasks)
+        self._done: SimpleQueue[BaseException | None] = SimpleQueue()
+        weakref.finalize(self, _dismiss, self._tasks)
 
     def advance(self, size: int, function: Advance, world: World, steps: int, dt: float, phase: int) -> int:
         """Run an integrator on `size` threads; return the steps that it took. Raises ValueError beyond `most`."""
         team = self.team(size)
         function = self._compiled(function, world, team[0], steps, dt, phase)
-        for task, member in zip(self._workers(size - 1), team[1:], strict=True):
-            task.put((function, world, member, steps, dt, phase))
-        taken = function(world, team[0], steps, dt, phase)
-        for _ in team[1:]:
-            self._done.get()
+        others = self._workers(size - 1)
+        try:
+            for task, member in zip(others, team[1:], strict=True):
+                task.put((function, world, member, steps, dt, phase))
+            taken = function(world, team[0], steps, dt, phase)
+            for _ in others:
+                if (error := self._done.get()) is not None:
+                    raise error
+        except BaseException:
+            # Interrupted in between: who is where is not known, so the next call begins with others.
+            self._disband()
+            raise
         return taken
 
     def team(self, size: int) -> tuple[Member, ...]:
@@ -59,7 +68,16 @@ class Crew:
             self._entries[function] = function.compile(tuple(_typeof(argument) for argument in arguments))
         return self._entries[function]
 
+    def _disband(self) -> None:
+        _dismiss(self._tasks)
+        self._tasks.clear()
+        self._teams, self._done = {}, SimpleQueue()
+
     def _workers(self, count: int) -> list["SimpleQueue[Task | None]"]:
+        if self._process != os.getpid():
+            # A fork copies the queues, not the threads.
+            self._process = os.getpid()
+            self._disband()
         while len(self._tasks) < count:
             tasks: SimpleQueue[Task | None] = SimpleQueue()
             self._tasks.append(tasks)
@@ -67,10 +85,15 @@ class Crew:
         return self._tasks[:count]
 
 
-def _work(tasks: "SimpleQueue[Task | None]", done: "SimpleQueue[int]") -> None:
+def _work(tasks: "SimpleQueue[Task | None]", done: "SimpleQueue[BaseException | None]") -> None:
     while (task := tasks.get()) is not None:
         function, world, member, steps, dt, phase = task
-        done.put(function(world, member, steps, dt, phase))
+        try:
+            function(world, member, steps, dt, phase)
+        except BaseException as error:
+            done.put(error)
+        else:
+            done.put(None)
         # While it waits it must not keep the arrays of a run that has ended.
         del task, function, world, member
 

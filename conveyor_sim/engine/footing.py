@@ -20,7 +20,7 @@ def stand_on(footing: Footing, surface: Surface, bottles: Bottles, ring: Any, i:
     _turn_with(footing.turn, surface.turn, i, h)
     footing.pull[i] = surface.friction[h, bottles.type[i]] * bottles.weight[i]
     if ring is not None:
-        if not alone:
+        if not alone and ring.radius[i] > 0.0:
             footing.pull[i] = 0.0
 
 

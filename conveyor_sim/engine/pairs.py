@@ -22,7 +22,7 @@ from numba import uint64
 
 from .arrays import Bottles, Member, Pairs, Settings
 from .compile import part
-from .contact import contact_force, spring_after
+from .contact import contact_force, spring_after, stretched
 from .team import BLOCK, end_block, first_block
 
 # Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
@@ -170,7 +170,7 @@ def _law(
             1.0,
             closing,
             slip,
-            elongation(springs, p),
+            stretched(elongation(springs, p), slip, spring_dt),
             _ease(implicit, gathered, c),
         )
         fx = -normal * nx - tangential * ny
@@ -188,7 +188,7 @@ def _law(
             normals[q] = normal
         if springs is not None:
             before = springs.elongation[p]
-            after = spring_after(pairs.law, p, before, slip, spring_dt, normal)
+            after = spring_after(pairs.law, p, before, slip, spring_dt, normal, 1.0)
             springs.elongation[p] = after if spring_dt > 0.0 else before
 
 

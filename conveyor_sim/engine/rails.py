@@ -5,7 +5,7 @@ from typing import Any
 from .arc import arc_contact
 from .arrays import Bottles, ContactLaw, Load, RailContacts, Settings
 from .compile import kernel, part
-from .contact import contact_force, spring_after
+from .contact import contact_force, spring_after, stretched
 from .segment import segment_contact
 from .shares import share_overlaps
 from .team import MOST_CONTACTS
@@ -93,11 +93,12 @@ def rail_contact(
     law: ContactLaw,
     curves: Any,
     spring: Any,
+    spring_dt: float,
     implicit: Any,
 ) -> tuple[float, float, float]:
     """N and T (N) on bottle i in its contact c with a rail at rest, and its slip (m/s).
 
-    spring: m, or None; implicit: s/kg, or None (see `contact_force`).
+    spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: s/kg, or None (see `contact_force`).
     """
     nx, ny = found.nx[c], found.ny[c]
     closing = bottles.vx[i] * nx + bottles.vy[i] * ny
@@ -106,7 +107,17 @@ def rail_contact(
         slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
     entry = law_entry(settings, bottles, found, c, i)
     normal, tangential = contact_force(
-        law, entry, curves, settings.slip_limit, atan, found.overlap[c], found.share[c], closing, slip, spring, implicit
+        law,
+        entry,
+        curves,
+        settings.slip_limit,
+        atan,
+        found.overlap[c],
+        found.share[c],
+        closing,
+        slip,
+        stretched(spring, slip, spring_dt),
+        implicit,
     )
     return normal, tangential, slip
 
@@ -176,7 +187,7 @@ def add_rail_forces(
                 spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, found.entry[c])
                 ease = _ease(implicit, i)
                 normal, tangential, slip = rail_contact(
-                    c, i, settings, settings.atan, bottles, spin, found, law, curves, spring, ease
+                    c, i, settings, settings.atan, bottles, spin, found, law, curves, spring, spring_dt, ease
                 )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
@@ -184,16 +195,18 @@ def add_rail_forces(
                 if spin is not None:
                     spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
                 entry = law_entry(settings, bottles, found, c, i)
-                found.solution[c] = _spring_after(law, entry, spring, slip, spring_dt, normal)
+                found.solution[c] = _spring_after(law, entry, spring, slip, spring_dt, normal, found.share[c])
         if spring_dt > 0.0:
             _store_springs(law.tangential_stiffness, near_segments, near_arcs, found, count, i)
 
 
 @part
-def _spring_after(law: ContactLaw, entry: int, spring: Any, slip: float, dt: float, normal: float) -> float:
+def _spring_after(
+    law: ContactLaw, entry: int, spring: Any, slip: float, dt: float, normal: float, share: float
+) -> float:
     if spring is None:
         return 0.0
-    return spring_after(law, entry, spring, slip, dt, normal)
+    return spring_after(law, entry, spring, slip, dt, normal, share)
 
 
 @part

@@ -67,13 +67,13 @@ def blocks(count: int) -> int:
 @part
 def first_block(member: Member, count: int) -> int:
     """First block of this member's share of `count` things; the next member's first block ends it."""
-    return member.rank * blocks(count) // member.size
+    return (member.rank * blocks(count) + member.size - 1) // member.size
 
 
 @part
 def end_block(member: Member, count: int) -> int:
     """Block after the last of this member's share."""
-    return (member.rank + 1) * blocks(count) // member.size
+    return ((member.rank + 1) * blocks(count) + member.size - 1) // member.size
 
 
 @part

@@ -67,7 +67,7 @@ class CurvedBelt(_Belt):
         "Positive speed runs from `from` to `to` if left, from `to` to `from` if right.",
         default=None,
     )
-    rails: BeltRails = quantity("Rails along the arcs.", default=BeltRails())
+    rails: BeltRails = quantity("Rails along the arcs.", default=BeltRails.model_construct())
 
 
 Belt = Annotated[

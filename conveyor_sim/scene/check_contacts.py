@@ -26,6 +26,9 @@ def contact_problems(scene: Scene) -> Iterator[Problem]:
             yield from _table((*path, "table"), contact.table)
         if contact.tangential is not None and contact.friction == 0.0:
             yield Problem((*path, "tangential"), "given without friction, expected friction greater than 0 beside it")
+        if contact.tangential is not None and scene.step.integrator != "semi_implicit_euler":
+            # Its slip at the middle of the step is not at hand: with that at the end the spring would lose energy.
+            yield Problem((*path, "tangential"), f"given, expected none with integrator {scene.step.integrator}")
     for name, kind in scene.bottle_types.items():
         if kind.base_radius is not None and kind.base_radius > kind.radius:
             yield Problem(

@@ -19,7 +19,7 @@ from conveyor_sim.scene.geometry import (
     rail_pieces,
     rails_of_curved,
 )
-from conveyor_sim.scene.overlaps import overlapping
+from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.polygons import why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.rails import PolylineRail, SegmentRail
@@ -172,34 +172,76 @@ def _grid_problem(scene: Scene, index: int, entry: Grid) -> Problem | None:
     return None
 
 
+@dataclass(frozen=True)
+class _All:
+    """The points of many groups, one behind the other."""
+
+    points: Array
+    radius: Array
+    owner: NDArray[np.intp]
+    """The group of each point."""
+    start: NDArray[np.intp]
+    """Where each group's points begin."""
+
+    @classmethod
+    def of(cls, groups: list[_Group]) -> "_All":
+        sizes = [len(group.points) for group in groups]
+        return cls(
+            np.vstack([np.empty((0, 2)), *(group.points for group in groups)]),
+            np.repeat([group.radius for group in groups], sizes),
+            np.repeat(np.arange(len(groups)), sizes),
+            np.cumsum([0, *sizes]),
+        )
+
+
 def _in_rails(groups: list[_Group], rails: list[RailShape]) -> Iterator[Problem]:
-    for group in groups:
-        for rail in rails:
-            apart = _distance(group.points, rail)
-            inside = np.flatnonzero(apart < group.radius - TOUCH)
-            if len(inside):
-                yield Problem(
-                    group.path,
-                    f"{_at(group, inside)} given, expected at least {group.radius:g} m between a bottle's axis "
-                    f"and rail {rail.name} ({_metres(apart[inside[0]])})",
-                )
+    for index, rail, inside, apart in _inside(_All.of(groups), rails):
+        group = groups[index]
+        yield Problem(
+            group.path,
+            f"{_at(group, inside)} given, expected at least {group.radius:g} m between a bottle's axis "
+            f"and rail {rail.name} ({_metres(apart[0])})",
+        )
 
 
 def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]:
-    for name, feed in scene.infeeds.items():
-        if feed.bottle not in scene.bottle_types:
-            continue
-        radius = scene.bottle_types[feed.bottle].radius
-        points = _births(feed)
-        for rail in rails:
-            apart = float(_distance(points, rail).min())
-            if apart < radius - TOUCH:
-                jitter = ", lateral_jitter included" if feed.lateral_jitter else ""
-                yield Problem(
-                    ("infeeds", name, "position"),
-                    f"{shown(feed.position)} given, expected at least {radius:g} m between a bottle's axis "
-                    f"and rail {rail.name} ({_metres(apart)}{jitter})",
-                )
+    feeds = {name: feed for name, feed in scene.infeeds.items() if feed.bottle in scene.bottle_types}
+    groups = [
+        _Group(("infeeds", name, "position"), _births(feed), scene.bottle_types[feed.bottle].radius)
+        for name, feed in feeds.items()
+    ]
+    for index, rail, _, apart in _inside(_All.of(groups), rails):
+        group, feed = groups[index], scene.infeeds[str(groups[index].path[1])]
+        jitter = ", lateral_jitter included" if feed.lateral_jitter else ""
+        yield Problem(
+            group.path,
+            f"{shown(feed.position)} given, expected at least {group.radius:g} m between a bottle's axis "
+            f"and rail {rail.name} ({_metres(apart.min())}{jitter})",
+        )
+
+
+def _inside(every: _All, rails: list[RailShape]) -> Iterator[tuple[int, RailShape, NDArray[np.intp], Array]]:
+    """By group, then by rail: the group, the rail, which of its points are in it, and how far from it each is (m)."""
+    if not len(every.points):
+        return
+    pieces = [piece for rail in rails for piece in rail.pieces]
+    rail_of = [index for index, rail in enumerate(rails) for _ in rail.pieces]
+    hits: list[tuple[NDArray[np.intp], NDArray[np.intp], Array]] = []
+    for piece, near, apart in near_pieces(every.points, pieces, float(every.radius.max())):
+        inside = apart < every.radius[near] - TOUCH
+        hits.append((near[inside], np.full(inside.sum(), rail_of[piece]), apart[inside]))
+    if not hits:
+        return
+    point, rail, distance = (np.concatenate(columns) for columns in zip(*hits, strict=True))
+    order = np.lexsort((distance, point, rail, every.owner[point]))
+    point, rail, distance = point[order], rail[order], distance[order]
+    # Of a rail's pieces the nearest has the say.
+    first = np.append(True, (np.diff(point) != 0) | (np.diff(rail) != 0))[: len(point)]
+    point, rail, distance = point[first], rail[first], distance[first]
+    changes = np.flatnonzero((np.diff(every.owner[point]) != 0) | (np.diff(rail) != 0)) + 1
+    for some in np.split(np.arange(len(point)), changes) if len(point) else []:
+        group = int(every.owner[point[some[0]]])
+        yield group, rails[rail[some[0]]], point[some] - every.start[group], distance[some]
 
 
 def _births(feed: Infeed) -> Array:
@@ -210,13 +252,8 @@ def _births(feed: Infeed) -> Array:
 
 
 def _in_each_other(groups: list[_Group]) -> Iterator[Problem]:
-    if not groups:
-        return
-    sizes = [len(group.points) for group in groups]
-    starts = np.cumsum([0, *sizes])
-    owner = np.repeat(np.arange(len(groups)), sizes)
-    centres = np.vstack([group.points for group in groups])
-    radii = np.repeat([group.radius for group in groups], sizes)
+    every = _All.of(groups)
+    centres, radii, owner = every.points, every.radius, every.owner
     first, second = overlapping(centres, radii, TOUCH)
     order = np.lexsort((first, second))
     first, second = first[order], second[order]
@@ -226,15 +263,10 @@ def _in_each_other(groups: list[_Group]) -> Iterator[Problem]:
         apart = float(np.hypot(*(centres[i] - centres[j])))
         yield Problem(
             groups[entry].path,
-            f"{_at(groups[entry], np.unique(second[where]) - starts[entry])} given, "
+            f"{_at(groups[entry], np.unique(second[where]) - every.start[entry])} given, "
             f"expected at least {radii[i] + radii[j]:g} m between the axes of two bottles, "
             f"as to that at {_xy(centres[i])} ({_metres(apart)})",
         )
-
-
-def _distance(points: Array, rail: RailShape) -> Array:
-    nearest: Array = np.min([piece.distance(points) for piece in rail.pieces], axis=0)
-    return nearest
 
 
 def _at(group: _Group, hit: NDArray[np.intp]) -> str:

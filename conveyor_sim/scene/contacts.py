@@ -63,7 +63,7 @@ class Contact(Part):
         "m, N",
         default=None,
     )
-    damping: Damping = quantity("Damping of the contact.", default=Damping())
+    damping: Damping = quantity("Damping of the contact.", default=Damping.model_construct())
     friction: NotNegative = quantity("Coefficient of friction of the contact.", "1", default=0.0)
     tangential: Tangential | None = quantity(
         "A tangential spring with history in place of the friction curve; needs friction. Left out: none.",

@@ -84,6 +84,12 @@ class SegmentPiece:
         """The end points, (2, 2)."""
         return np.array([self.p1, self.p2])
 
+    @property
+    def box(self) -> tuple[XY, XY]:
+        """Lower left and upper right corner of a box that holds the piece."""
+        (x1, y1), (x2, y2) = self.p1, self.p2
+        return (min(x1, x2), min(y1, y2)), (max(x1, x2), max(y1, y2))
+
     def distance(self, points: Array) -> Array:
         """Distance (k,) of points (k, 2) from the piece, its end points included."""
         start = np.array(self.p1)
@@ -110,6 +116,12 @@ class ArcPiece:
     def points(self, n: int = 64) -> Array:
         """Points along the arc, (n, 2)."""
         return arc_points(self.centre, self.radius, self.start_angle, self.span, n)
+
+    @property
+    def box(self) -> tuple[XY, XY]:
+        """Lower left and upper right corner of a box that holds the piece: that of the whole circle."""
+        (x, y), radius = self.centre, self.radius
+        return (x - radius, y - radius), (x + radius, y + radius)
 
     def distance(self, points: Array) -> Array:
         """Distance (k,) of points (k, 2) from the arc, its end points included."""

@@ -1,7 +1,11 @@
-"""Which of many circles overlap: cell grid, vectorised."""
+"""Which of many circles overlap, and which of many points are near rails: by cells and boxes, vectorised."""
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+from conveyor_sim.scene.geometry import Piece
 
 _MOST_CELLS = 1e6  # along one axis, so that the number of a cell fits 64 bits; coarser cells are only slower
 # Half of a cell's neighbours: the other half sees the pair from its own side.
@@ -33,6 +37,29 @@ def overlapping(
     pairs = np.vstack(found)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     return pairs[:, 0], pairs[:, 1]
+
+
+def near_pieces(
+    points: NDArray[np.float64], pieces: Sequence[Piece], within: float
+) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.float64]]]:
+    """For each piece that points (n, 2) may be near: its index, their indices in order, and their distances (m).
+
+    All that are `within` (m) of a piece are among them; others may be.
+    """
+    if not len(points) or not pieces:
+        return
+    order = np.argsort(points[:, 0], kind="stable")
+    x = points[order, 0]
+    boxes = np.array([piece.box for piece in pieces])
+    # Twice the distance: a box's own rounding does not matter then.
+    low, high = boxes[:, 0] - 2 * within, boxes[:, 1] + 2 * within
+    begin, end = np.searchsorted(x, low[:, 0], "left"), np.searchsorted(x, high[:, 0], "right")
+    for index in np.flatnonzero(begin < end).tolist():
+        some = order[begin[index] : end[index]]
+        y = points[some, 1]
+        some = np.sort(some[(y >= low[index, 1]) & (y <= high[index, 1])])
+        if len(some):
+            yield index, some, pieces[index].distance(points[some])
 
 
 def _ranges(begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -11,7 +11,7 @@ from conveyor_sim.scene.words import in_words, listed
 class Part(BaseModel):
     """A mapping in a scene file: frozen, no unknown fields, its errors in plain words."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, defer_build=True)
 
     @model_validator(mode="wrap")
     @classmethod

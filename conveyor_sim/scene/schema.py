@@ -53,8 +53,10 @@ class BottleType(Part):
         "Moment of inertia about the axis. Left out: m R^2, a thin-walled cylinder.", "kg m^2", default=None
     )
     base_radius: Positive | None = quantity(
-        "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion. "
-        "Left out: it stands on a point, as in the paper.",
+        "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion, solved explicitly "
+        "whatever the friction_solver. Left out: it stands on a point, as in the paper; beside types with a ring, on "
+        "a ring of radius 0, whose friction is v / sqrt(v^2 + (v_lim / 2)^2) of its full value instead of the "
+        "friction_curve.",
         "m",
         default=None,
     )
@@ -184,17 +186,17 @@ class Scene(Part):
     tick: Positive = quantity(
         "Scan cycle, in whole nanoseconds: commands act and outputs appear at ticks.", "s", default=0.01
     )
-    step: Step = quantity("Integration within a tick.", default=Step())
+    step: Step = quantity("Integration within a tick.", default=Step.model_construct())
     slip_limit: Positive = quantity("Speed v_lim below which friction is regularised (7)-(10).", "m/s", default=0.01)
     friction_curve: Literal["polynomial", "atan"] = quantity(
         "How friction grows below and about v_lim. polynomial: (7)-(10), full at v_lim; "
         "atan: 2/pi x atan(pi x speed / v_lim), of the same slope at rest, full only in the limit. "
-        "A base that is a ring has a curve of its own.",
+        "Where a bottle type has a base_radius, all bases have the curve of a ring.",
         default="polynomial",
     )
     friction_solver: Literal["explicit", "implicit"] = quantity(
         "explicit: friction bounds the time step; implicit: solved for the velocity at the end of a step, which does "
-        "not (semi_implicit_euler only).",
+        "not (semi_implicit_euler only; bases that are rings stay explicit).",
         default="explicit",
     )
     lever_arm: Literal["overlap", "radius"] = quantity(
@@ -221,7 +223,10 @@ class Scene(Part):
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],
         Discriminator(_floor_tag),
         Holds('a mapping with the field friction, or "none"'),
-    ] = quantity('What is under bottles that no belt carries; "none": nothing, they slide freely.', default=Floor())
+    ] = quantity(
+        'What is under bottles that no belt carries; "none": nothing, they slide freely.',
+        default=Floor.model_construct(),
+    )
     infeeds: Annotated[dict[Name, Infeed], _named("infeeds")] = quantity("Where bottles enter.", default={})
     outfeeds: Annotated[dict[Name, Outfeed], _named("outfeeds")] = quantity("Where bottles leave.", default={})
     bottles: Annotated[
@@ -231,7 +236,7 @@ class Scene(Part):
         ],
         Holds("a list of bottles and grids"),
     ] = quantity("Bottles that are there at the start.", default=())
-    outputs: Outputs = quantity("Rates of the outputs.", default=Outputs())
+    outputs: Outputs = quantity("Rates of the outputs.", default=Outputs.model_construct())
     effects: Annotated[Forced, Holds('a mapping of names of effects to "on" or "off"')] = quantity(
         "Effects forced on or off, whatever the scene calls for; docs/effects.md lists them.", default={}
     )

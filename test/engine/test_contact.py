@@ -148,12 +148,14 @@ def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
 def test_the_spring_goes_with_the_slip_and_no_further_than_it_can_hold() -> None:
     """xi + dt s; cut to mu N/k_t while the contact slides, forgotten without a normal force."""
     spring = law(friction=MU, tangential_stiffness=4000.0)
-    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 10.0) == pytest.approx(1e-4 + 0.02 * 1e-3)
+    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 10.0, 1.0) == pytest.approx(1e-4 + 0.02 * 1e-3)
     for sign in (-1.0, 1.0):
-        assert spring_after(spring, 1, sign * 1e-4, sign * 5.0, 1e-3, 10.0) == pytest.approx(sign * MU * 10.0 / 4000.0)
-    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 0.0) == 0.0
-    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, -3.0) == 0.0
-    assert spring_after(law(friction=MU, tangential_stiffness=0.0), 1, 1e-4, 0.02, 1e-3, 10.0) == 0.0
+        assert spring_after(spring, 1, sign * 1e-4, sign * 5.0, 1e-3, 10.0, 1.0) == pytest.approx(
+            sign * MU * 10.0 / 4000.0
+        )
+    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 0.0, 1.0) == 0.0
+    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, -3.0, 1.0) == 0.0
+    assert spring_after(law(friction=MU, tangential_stiffness=0.0), 1, 1e-4, 0.02, 1e-3, 10.0, 1.0) == 0.0
 
 
 EVERYTHING = {
@@ -176,3 +178,12 @@ def test_what_is_not_a_number_stays_visible() -> None:
     for arguments in ((math.nan, 0.1, 0.1), (0.001, math.nan, 0.1)):
         assert math.isnan(force(*arguments, **EVERYTHING, spring=0.01, implicit=1e-3)[0])
     assert math.isnan(force(0.001, 0.1, math.nan, **EVERYTHING, spring=0.01, implicit=1e-3)[1])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
+def test_a_share_of_a_contact_slides_at_mu_times_what_it_presses_with(share: float) -> None:
+    """What a long slip leaves of the spring holds mu N of that share, no less."""
+    given = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0}
+    normal = force(0.002, share=share, **given)[0]
+    held = spring_after(law(**given), 1, 0.0, 1.0, 1.0, normal, share)
+    assert force(0.002, share=share, spring=held, **given)[1] == pytest.approx(-MU * normal, rel=1e-12)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -90,3 +93,39 @@ def test_a_team_has_a_size() -> None:
         Crew(2).team(3)
     with pytest.raises(ValueError, match="threads: 0, expected 1 or more"):
         Simulation(crowd(), threads=0)
+
+
+def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
+    """What a worker raises reaches the caller; the next call finds a new team."""
+
+    def failing(_world: Any, member: Any, _steps: int, _dt: float, _phase: int) -> int:
+        if member.rank > 0:
+            raise ArithmeticError("rank 1")
+        return 0
+
+    sim = Simulation(crowd(), threads=2)
+    crew, world = sim._crew, sim._state.world
+    crew._entries[failing] = failing
+    with pytest.raises(ArithmeticError, match="rank 1"):
+        crew.advance(2, failing, world, 1, 1e-5, 0)
+    other = Simulation(crowd(), threads=1)
+    sim.advance(3)
+    other.advance(3)
+    assert sim.state_hash() == other.state_hash()
+
+
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    """A fork copies queues, not threads: the child must not wait for those of its parent."""
+    code = (
+        "import os, sys; sys.path[:0] = sys.argv[1:]; from test_team import crowd; "
+        "from conveyor_sim.simulation import Simulation; "
+        "sim = Simulation(crowd(), threads=2); sim.advance(2); child = os.fork(); sim.advance(1); "
+        "print(sim.state_hash(), flush=True); child and os.waitpid(child, 0)"
+    )
+    here = Path(__file__).parent
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code, str(here), str(here.parent)],
+        capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    first, second = done.stdout.split()
+    assert first == second

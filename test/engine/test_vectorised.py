@@ -106,7 +106,7 @@ def test_tangential_springs() -> None:
     @compiled
     def loop(count: int, law: Any, spring: Any, slip: Any, normal: Any) -> None:
         for c in range(uint64(count)):
-            spring[c] = spring_after(law, c, spring[c], slip[c], 1e-4, normal[c])
+            spring[c] = spring_after(law, c, spring[c], slip[c], 1e-4, normal[c], 1.0)
 
     law = ContactLaw(*[None] * 7, column(), column(), None)
     loop(COUNT, law, column(), column(), column())

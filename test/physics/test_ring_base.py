@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, kind, simulation
+from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, simulation
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -169,3 +169,36 @@ def test_on_a_turning_belt_it_turns_with_it() -> None:
     sim.advance(100)
     # Omega = speed at the centre line, 0.5 m, over its radius. The creep outward takes a little of it, of order s / u.
     assert sim.bottles().omega[0] == pytest.approx(1.0, rel=2e-3)
+
+
+@pytest.mark.parametrize("gap", [0.001, 0.02, 0.049])
+def test_a_belt_that_only_the_rim_reaches_drags_it(gap: float) -> None:
+    """The axis stands beside the belt, on a floor without friction, up to a base radius away."""
+    sim = standing({"belt": belt(1.0, (-5.0, 0.0), 10.0, 0.5)}, [bottle(0.0, -gap)], floor={"friction": 0.0})
+    sim.advance()
+    assert sim.bottles().vx[0] > 0.0
+    beyond = standing({"belt": belt(1.0, (-5.0, 0.0), 10.0, 0.5)}, [bottle(0.0, -0.0501)], floor={"friction": 0.0})
+    beyond.advance()
+    assert beyond.bottles().vx[0] == 0.0
+
+
+@pytest.mark.parametrize("fields", [{}, {"friction_curve": "atan"}, {"friction_solver": "implicit"}])
+def test_a_point_stays_a_point_beside_rings(fields: dict[str, Any]) -> None:
+    """The same bits as alone, on and off the belt's edge."""
+    points = [bottle(-1.0, -0.01, 0.3, 0.02), bottle(1.0, 0.2, 0.1, 0.0)]
+    belts = {"belt": belt(0.5, (-5.0, 0.0), 10.0, 0.5)}
+    fields = {**fields, "contacts": [contact(5000.0)]}
+    alone = standing(belts, points, ring=None, **fields)
+    types = {"bottle": kind(), "ring": kind(base_radius=RING)}
+    beside = simulation(
+        **{"step": {"per_tick": 200}, "gravity": G, "slip_limit": SLIP_LIMIT, **fields},
+        bottle_types=types,
+        base=base(MU),
+        belts=belts,
+        bottles=[*points, bottle(3.0, 0.2, type="ring")],
+    )
+    for _ in range(30):
+        alone.advance()
+        beside.advance()
+        np.testing.assert_array_equal(beside.bottles().vx[:2], alone.bottles().vx)
+        np.testing.assert_array_equal(beside.bottles().vy[:2], alone.bottles().vy)

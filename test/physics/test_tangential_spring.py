@@ -126,3 +126,20 @@ def test_an_oblique_impact_comes_back_along_the_surface() -> None:
     assert state.vy[0] == pytest.approx(0.5, rel=1e-3)
     # The step at which the contact ends cuts up to a step's share of the wave off, 1/1590 of it.
     assert state.vx[0] == pytest.approx(-0.3, rel=5e-3)
+
+
+def test_a_spring_without_a_dashpot_pumps_no_energy() -> None:
+    """At the step that is chosen by itself: a held bottle that is nudged along the rail swings no wider for it.
+
+    Taken with the slip of the step before, the spring would make its swing grow tenfold in this time.
+    """
+    bare = {"tangential": {"stiffness": 20e3}}
+    sim = leaning("rail", 0.3, **bare)
+    sim.advance(20)
+    sim._state.world.bottles.vx[0] += 1e-3
+    speeds = []
+    for _ in range(80):
+        sim.advance()
+        speeds.append(abs(sim.bottles().vx[0]))
+    assert max(speeds[:20]) > 1e-4
+    assert max(speeds[-20:]) < 1.05 * max(speeds[:20])

@@ -1,9 +1,10 @@
-"""Overlapping circles found through cells are those that comparing all with all finds."""
+"""What is found through cells and boxes is what comparing all with all finds."""
 
 import numpy as np
 import pytest
 
-from conveyor_sim.scene.overlaps import overlapping
+from conveyor_sim.scene.geometry import ArcPiece, Piece, SegmentPiece
+from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.polygons import why_not_simple
 
 
@@ -32,6 +33,32 @@ def test_neighbours_far_apart_along_one_axis_only() -> None:
 @pytest.mark.parametrize("number", [0, 1])
 def test_too_few_to_overlap(number: int) -> None:
     assert len(overlapping(np.zeros((number, 2)), np.ones(number), 0.0)[0]) == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_points_near_pieces_are_those_of_all_against_all(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    points = random.uniform(-2, 2, (200, 2))
+    points[:20, 0] = points[0, 0]  # points one above the other share their place in the order by x
+    pieces: list[Piece] = [SegmentPiece((x, y), (x + dx, y + dy)) for x, y, dx, dy in random.uniform(-1, 1, (20, 4))]
+    for x, y, start in random.uniform(-2, 2, (20, 3)):
+        pieces.append(ArcPiece((x, y), random.uniform(0.1, 1.5), start, random.uniform(0.1, 6.28)))
+    within = 0.1
+    expected = {(i, k) for i, piece in enumerate(pieces) for k in np.flatnonzero(piece.distance(points) <= within)}
+    assert len(expected) > 20
+    found = set()
+    for index, near, apart in near_pieces(points, pieces, within):
+        # One point or all of them: numpy adds the two products of a dot in another order, a rounding apart.
+        np.testing.assert_allclose(apart, pieces[index].distance(points)[near], rtol=0, atol=1e-14)
+        assert np.all(np.diff(near) > 0)
+        found |= {(index, k) for k in near[apart <= within]}
+    assert found == expected
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_nothing_is_near_where_there_is_nothing(number: int) -> None:
+    assert not list(near_pieces(np.zeros((number, 2)), [], 1.0))
+    assert not list(near_pieces(np.zeros((number, 2)), [SegmentPiece((9.0, 9.0), (9.0, 8.0))], 1.0))
 
 
 @pytest.mark.parametrize(
