@@ -60,8 +60,8 @@ def box_for(count: int) -> Box:
     return Box(min(LONGEST, rows * row / FILL + PITCH), (across + 0.5) * PITCH, rows, across, count)
 
 
-def table(count: int, effects: str, dt: float = DT) -> Scene:
-    """The dense table with one of EFFECTS; steps of dt (s)."""
+def table(count: int, effects: str, dt: float = DT, **changes: Any) -> Scene:
+    """The dense table with one of EFFECTS; steps of dt (s). changes: fields of the scene, in place of its own."""
     box = box_for(count)
     fields: dict[str, Any] = {
         "name": f"table_{effects}",
@@ -83,7 +83,7 @@ def table(count: int, effects: str, dt: float = DT) -> Scene:
         "outputs": NO_OUTPUTS,
     }  # fmt: skip
     fields |= {"minimal": _minimal, "paper": _paper, "everything": _everything}[effects](box)
-    return parse_scene(json.dumps(fields))
+    return parse_scene(json.dumps({**fields, **changes}))
 
 
 def _minimal(box: Box) -> dict[str, Any]:

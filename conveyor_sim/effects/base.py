@@ -80,9 +80,9 @@ BASE_FRICTION = Effect(
 )
 RING_BASE = Effect(
     name="ring_base",
-    law="the base is a ring: sliding and spinning share its friction, and it may straddle two belts; always explicit, "
-    "whatever the friction_solver; a type without base_radius is a ring of radius 0, of which "
-    "v / sqrt(v^2 + (v_lim / 2)^2) drags instead of p(s)",
+    law="the base is a ring: sliding and spinning share its friction, and it may straddle two belts; v / sqrt(v^2 + "
+    "(v_lim / 2)^2) of each part of it drags in place of p(s); always explicit, whatever the friction_solver; types "
+    "without base_radius beside it stand on points",
     source="added",
     called_for=_ring,
     absent="no bottle type with base_radius, no friction under the bottles, or rotation forced off",

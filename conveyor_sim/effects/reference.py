@@ -20,23 +20,41 @@ An effect that needs parameters of its own is called for by giving them and can'
 forced where a scene makes no sense without. What an effect calls for goes with it: without contact friction nothing may
 be left that turns a bottle.
 
-Numbers in brackets are equations of the paper (docs/paper.md).
-
 ## Choosing effects
 
-The paper's scene is a line of fields: `stiffness`, `damping` of law paper, `friction`. Another law is another field in its
-place, and nothing else of the scene changes. Glass that springs back as glass does, stick and slip with history, a base
-that turns with its belt, and no columns of contacts that nobody reads:
+An effect is chosen by a field of the scene; the rest of the scene stays as it is. examples/effects.yaml has laws other
+than the paper's:
 
 ```yaml
-{EXAMPLE}```
+name: glass_on_two_belts
+duration: 5.0                                                       # s
+contacts:
+  - between: [glass, glass]
+    hertz_stiffness: 200000                                         # N/m^1.5, instead of `stiffness`
+    damping: {law: normal, restitution: 0.8}                        # instead of a coefficient
+    friction: 0.15
+    tangential: {stiffness: 2000, damping: 0.5}                     # N/m, kg/s: a spring in place of the friction curve
+base: [{between: [glass, chain], friction: 0.3}]
+bottle_types:
+  half_litre: {radius: 0.033, mass: 0.35, material: glass, base_radius: 0.028}  # m, kg: stands on a ring
+belts:
+  slow: {kind: straight, start: [0, 0], angle: 0 deg, length: 2, width: 0.15, speed: 0.2, material: chain}
+  fast: {kind: straight, start: [0, 0.15], angle: 0 deg, length: 2, width: 0.15, speed: 0.3, material: chain}
+infeeds:
+  filler: {bottle: half_litre, position: [0.05, 0.15], direction: 0 deg, speed: 0.2, count: 20, rate: 3}
+effects: {contact_arrays: off, peaks: off}                          # nobody reads them
+```
 
-- `hertz_stiffness` instead of `stiffness` makes contacts stiffer the deeper they are; `table` takes a measured curve.
-- `restitution` instead of `coefficient` is what a drop test gives; the coefficient follows from it.
-- `tangential` holds bottles at rest that friction below v_lim lets creep, in queues that stand for long.
-- `base_radius` makes bottles turn that straddle two belts, and lets a spin slow down. Give it to all types: those
-  without stand on rings of radius 0 then.
-- `effects` is for what a scene calls for and a study does without; each costs what `--price` says.
+- `hertz_stiffness` in place of `stiffness`: the deeper a contact, the stiffer it is. `table` takes a measured curve.
+- `restitution` in place of `coefficient`: speed after over speed before an impact; the coefficient follows from it.
+- `tangential`: contacts that stick remember how far they were pushed. The friction curve, without memory, lets them
+  creep.
+- `base_radius`: a bottle that straddles two belts turns, and its base brakes its spin. A type without it stands on a
+  point, the paper's base.
+- `effects`: what the scene calls for and nobody needs is off; here, the outputs of contacts and of peaks.
+
+`conveyor-sim explain` tells what came of it. In the list below, numbers in brackets are equations of the paper
+(docs/paper.md).
 """
 
 

@@ -1,4 +1,8 @@
-"""Which rail pieces are near each bottle, within its radius and half the skin; made at each rebuild."""
+"""Which rail pieces are near each bottle, within its radius and half the skin; made at each rebuild.
+
+Tangential springs at rails are kept by piece: a bottle that goes from one piece of a surface to the next, over a joint,
+starts a new spring there.
+"""
 
 import math
 from typing import Any

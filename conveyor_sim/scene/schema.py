@@ -54,9 +54,8 @@ class BottleType(Part):
     )
     base_radius: Positive | None = quantity(
         "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion, solved explicitly "
-        "whatever the friction_solver. Left out: it stands on a point, as in the paper; beside types with a ring, on "
-        "a ring of radius 0, whose friction is v / sqrt(v^2 + (v_lim / 2)^2) of its full value instead of the "
-        "friction_curve.",
+        "whatever the friction_solver, with a curve of its own. Left out: it stands on a point, as in the paper, "
+        "beside types with a ring as well.",
         "m",
         default=None,
     )
@@ -191,7 +190,7 @@ class Scene(Part):
     friction_curve: Literal["polynomial", "atan"] = quantity(
         "How friction grows below and about v_lim. polynomial: (7)-(10), full at v_lim; "
         "atan: 2/pi x atan(pi x speed / v_lim), of the same slope at rest, full only in the limit. "
-        "Where a bottle type has a base_radius, all bases have the curve of a ring.",
+        "A base that is a ring has a curve of its own.",
         default="polynomial",
     )
     friction_solver: Literal["explicit", "implicit"] = quantity(
