@@ -49,6 +49,7 @@ CACHE_DIR = cache_dir()
 _config: Any = numba.config
 _njit: Any = numba.njit
 
+# These are settings of the process: they act on every numba function that is compiled after this import.
 # Numba leaves this part of LLVM off: it joins neighbouring loads, sums and stores to packed ones, which gathers by row
 # of `Bottles.packed` live on.
 _config.SLP_VECTORIZE = 1

@@ -3,16 +3,15 @@
 import os
 import threading
 import weakref
-from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any
 
 import numba
 
 from .arrays import Member, World
+from .integrators import Advance
 from .team import members
 
-Advance = Callable[[World, Member, int, float, int], int]
 Task = tuple[Advance, World, Member, int, float, int]
 
 _typeof: Any = numba.typeof

@@ -1,8 +1,8 @@
 """Friction of a base that is a ring: sliding and spinning share it (physics.md; the paper's base is a point).
 
 Every point of the ring drags with its share of mu m g along its own slip v, smoothed to v/sqrt(v^2 + eps^2) with
-eps = v_lim/2: the slope at rest, 2/v_lim, is that of the regularised point. A ring that only slides drags as a point
-does; one that spins as well slides the more easily, and its spin slows down.
+eps = v_lim/2: the slope at rest, 2/v_lim, is that of the regularised point. A ring that spins as well
+slides the more easily, and its spin slows down.
 """
 
 import math
