@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays import F8, Arcs, Belts, Ends, Listed, Sectors, Segments, StaticGrid
 from conveyor_sim.engine.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
 from conveyor_sim.engine.static_grid import build_static_grid
-from conveyor_sim.engine.team import BLOCK
+from conveyor_sim.engine.team import UNIT
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
 from conveyor_sim.surfaces import Joints, find_joints
 
@@ -95,8 +95,8 @@ def belt_arrays(shapes: Sequence[BeltShape], slots: int, candidates: int) -> Bel
 
 
 def listed(slots: int) -> Listed:
-    """Room for a list of bottles by block, empty."""
-    return Listed(np.zeros(slots, np.uint32), np.zeros(slots // BLOCK + 2, np.uint32))
+    """Room for a list of bottles by unit, empty."""
+    return Listed(np.zeros(slots, np.uint32), np.zeros(slots // UNIT + 2, np.uint32))
 
 
 def plant_grid(

@@ -227,7 +227,7 @@ class Arcs(NamedTuple):
 
 
 class Listed(NamedTuple):
-    """Some of the bottles, in order; those of the c-th block of bottles are bottle[first[c]:first[c + 1]]."""
+    """Some of the bottles, in order; those of the u-th unit (`team.py`) are bottle[first[u]:first[u + 1]]."""
 
     bottle: U4
     first: U4

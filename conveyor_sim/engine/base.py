@@ -13,6 +13,7 @@ from .arrays import Bottles, Load, Settings
 from .compile import part
 from .friction import implicit_regularisation, regularisation
 from .ring import ring_means, ring_share, straddling_ring
+from .team import units
 
 
 @part
@@ -27,11 +28,10 @@ def add_base_friction(
     ring: Any,
     implicit: Any,
     dt: float,
-    block: int,
     first: int,
     end: int,
 ) -> None:
-    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end, a block."""
+    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end."""
     if footing is None:
         return
     if ring is None:
@@ -40,7 +40,7 @@ def add_base_friction(
         _ring_friction(
             settings, settings.atan, bottles, spin, load, footing, footing.turn, ring, implicit, dt, first, end
         )
-        _straddling(settings, bottles, spin, load, belts, surface, ring, block)
+        _straddling(settings, bottles, spin, load, belts, surface, ring, first, end)
 
 
 @part
@@ -125,11 +125,20 @@ def _turn(turn: Any, i: int) -> float:
 
 @part
 def _straddling(
-    settings: Settings, bottles: Bottles, spin: Any, load: Load, belts: Any, surface: Any, ring: Any, block: int
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    load: Load,
+    belts: Any,
+    surface: Any,
+    ring: Any,
+    first: int,
+    end: int,
 ) -> None:
     if belts is None:
         return
-    for entry in range(belts.uncertain.first[block], belts.uncertain.first[block + 1]):
+    begin, stop = units(first, end)
+    for entry in range(belts.uncertain.first[begin], belts.uncertain.first[stop]):
         i = belts.uncertain.bottle[entry]
         if ring.radius[i] == 0.0:
             continue

@@ -8,7 +8,7 @@ from .compile import kernel, part
 from .near import end_list
 from .sector import span_distance
 from .static_grid import static_cell
-from .team import BLOCK
+from .team import UNIT
 
 
 @part
@@ -71,8 +71,8 @@ def list_belts(bottles: Bottles, grid: Any, belts: Any, ring: Any, floor: int, m
     count = 0
     uncertain = 0
     for i in range(bottles.x.size):
-        if i % BLOCK == 0:
-            belts.uncertain.first[i // BLOCK] = uncertain
+        if i % UNIT == 0:
+            belts.uncertain.first[i // UNIT] = uncertain
         belts.start[i] = min(count, belts.candidate.size)
         belts.certain[i] = floor
         home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1

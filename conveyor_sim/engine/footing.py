@@ -9,6 +9,7 @@ from typing import Any
 from .arrays import Bottles, Footing, Surface
 from .belts import carrier
 from .compile import kernel, part
+from .team import units
 
 
 @part
@@ -49,12 +50,13 @@ def _certain(belts: Any, i: int) -> bool:
 
 
 @part
-def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any, block: int) -> None:
-    """Put those bottles of a block that may have changed belts on the one under their axes."""
+def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any, first: int, end: int) -> None:
+    """Put those of bottles first to end that may have changed belts on the one under their axes."""
     if belts is None:
         return
     floor = surface.ux.size - 1
-    for entry in range(belts.uncertain.first[block], belts.uncertain.first[block + 1]):
+    begin, stop = units(first, end)
+    for entry in range(belts.uncertain.first[begin], belts.uncertain.first[stop]):
         i = belts.uncertain.bottle[entry]
         h = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
         if h != footing.carrier[i]:

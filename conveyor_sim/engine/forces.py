@@ -1,7 +1,7 @@
 """One evaluation of all forces: a function of positions, velocities and springs, whatever integrator asks.
 
 Two phases, with a barrier between: `pair_phase` reads every bottle and writes pairs, `bottle_forces` reads pairs and
-writes the bottles of one block. Sums run in a fixed order (pairs by partner, segments, arcs, base).
+writes bottles, some at a time. Sums run in a fixed order (pairs by partner, segments, arcs, base).
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from .footing import check_footing
 from .pairs import find_touching, pack, pair_forces
 from .rails import add_rail_forces, count_rail_contacts
 from .slots import sum_pair_forces, sum_slots
-from .team import BLOCK, end_block, first_block, wait_for_all
+from .team import BLOCK, share, wait_for_all
 
 
 @kernel
@@ -21,18 +21,17 @@ def evaluate_forces(world: World, member: Member, dt: float) -> None:
     """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
     pack_all(world, member)
     pair_phase(world, member, dt, 0.0)
-    slots = world.bottles.x.size
-    for block in range(first_block(member, slots), end_block(member, slots)):
-        bottle_forces(world, member, dt, 0.0, block, block * BLOCK, min(block * BLOCK + BLOCK, slots))
+    begin, stop = share(member, world.bottles.x.size)
+    for first in range(begin, stop, BLOCK):
+        bottle_forces(world, member, dt, 0.0, first, min(first + BLOCK, stop))
     wait_for_all(member)
 
 
 @part
 def pack_all(world: World, member: Member) -> None:
     """Pack this member's bottles; all are packed on return."""
-    bottles = world.bottles
-    for block in range(first_block(member, bottles.x.size), end_block(member, bottles.x.size)):
-        pack(bottles, block * BLOCK, min(block * BLOCK + BLOCK, bottles.x.size))
+    begin, stop = share(member, world.bottles.x.size)
+    pack(world.bottles, begin, stop)
     wait_for_all(member)
 
 
@@ -49,8 +48,8 @@ def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> Non
 
 
 @part
-def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, block: int, first: int, end: int) -> None:
-    """Fill `world.load` (N) and `world.spin.moment` (N m) of the bottles of one block, first to end (eq. 22)."""
+def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, first: int, end: int) -> None:
+    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22)."""
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     add_rail_forces(
         world.settings,
@@ -66,10 +65,11 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, blo
         world.curves,
         world.implicit,
         member.found,
-        block,
+        first,
+        end,
         spring_dt,
     )
-    check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, block)
+    check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     add_base_friction(
         world.settings,
         world.bottles,
@@ -81,7 +81,6 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, blo
         world.ring,
         world.implicit,
         dt,
-        block,
         first,
         end,
     )
@@ -102,8 +101,9 @@ def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> Non
     bottles = world.bottles
     find_touching(world.settings, bottles, world.pairs, member)
     wait_for_all(member)
-    for block in range(first_block(member, bottles.x.size), end_block(member, bottles.x.size)):
-        first, end = block * BLOCK, min(block * BLOCK + BLOCK, bottles.x.size)
+    begin, stop = share(member, bottles.x.size)
+    for first in range(begin, stop, BLOCK):
+        end = min(first + BLOCK, stop)
         sum_slots(world.slots, _touch(world.pairs), first, end, implicit.closed)
         count_rail_contacts(
             bottles,
@@ -113,7 +113,8 @@ def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> Non
             world.near_arcs,
             world.railed,
             member.found,
-            block,
+            first,
+            end,
             implicit.closed,
         )
         for i in range(first, end):

@@ -1,6 +1,6 @@
 """The parts that integrators are made of: kick (velocities), drift (positions), and what follows every step.
 
-Each works on the bottles of one block, first to end.
+Each works on bottles first to end.
 """
 
 from typing import Any

@@ -10,7 +10,7 @@ from typing import Any
 from .arrays import Bottles, Listed, Near
 from .compile import kernel, part
 from .static_grid import static_cell
-from .team import BLOCK
+from .team import UNIT
 
 
 @part
@@ -74,13 +74,13 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
 
 @part
 def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, railed: Any) -> None:
-    """List the bottles that have any rail near, by block."""
+    """List the bottles that have any rail near, by unit."""
     if railed is None:
         return
     count = 0
     for i in range(bottles.x.size):
-        if i % BLOCK == 0:
-            railed.first[i // BLOCK] = count
+        if i % UNIT == 0:
+            railed.first[i // UNIT] = count
         if _has_near(near_segments, i) or _has_near(near_arcs, i):
             railed.bottle[count] = i
             count += 1
@@ -89,9 +89,9 @@ def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, railed: An
 
 @part
 def end_list(listed: Listed, bottles: int, count: int) -> None:
-    """Close a list by block that holds `count` of all bottles."""
-    for block in range((bottles + BLOCK - 1) // BLOCK, listed.first.size):
-        listed.first[block] = count
+    """Close a list by unit that holds `count` of all bottles."""
+    for unit in range((bottles + UNIT - 1) // UNIT, listed.first.size):
+        listed.first[unit] = count
 
 
 @part

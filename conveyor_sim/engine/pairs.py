@@ -1,6 +1,6 @@
 """Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|, for all listed pairs, block by block.
 
-The fast layout, once round. Pairs p = 0, 1, ... are listed by (i, j); a block is BLOCK of them:
+The fast layout, once round. Pairs p = 0, 1, ... are listed by (i, j); a block is some of them:
 
     packed   | x y vx vy | x y vx vy | x y vx vy | ...          one row a bottle, made anew before every evaluation
                   i            j                                 1. gather: row j less row i, one packed load each
@@ -23,7 +23,7 @@ from numba import uint64
 from .arrays import Bottles, Member, Pairs, Settings
 from .compile import part
 from .contact import contact_force, spring_after, stretched
-from .team import BLOCK, end_block, first_block
+from .team import BLOCK, share
 
 # Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
 _1, _2, _3, _4 = uint64(1), uint64(2), uint64(3), uint64(4)
@@ -63,10 +63,10 @@ def pair_forces(
     """
     if pairs is None:
         return
-    used = pairs.used[0]
-    for block in range(first_block(member, used), end_block(member, used)):
-        first: Any = uint64(block * BLOCK)
-        count: Any = uint64(min(BLOCK, used - block * BLOCK))
+    begin, stop = share(member, pairs.used[0])
+    for start in range(begin, stop, BLOCK):
+        first: Any = uint64(start)
+        count: Any = uint64(min(BLOCK, stop - start))
         _gather(bottles.packed, spin, pairs, pairs.reach, first, count, member.gathered)
         _gather_ease(implicit, pairs, first, count, member.gathered.ease)
         _law(
@@ -236,9 +236,8 @@ def find_touching(settings: Settings, bottles: Bottles, pairs: Any, member: Memb
     """Note in `pairs.touch` which of this member's share of the pairs are closed; for the implicit solver."""
     if pairs is None:
         return
-    used = pairs.used[0]
-    begin = first_block(member, used) * BLOCK
-    for p in range(uint64(begin), uint64(min(used, end_block(member, used) * BLOCK))):
+    begin, stop = share(member, pairs.used[0])
+    for p in range(uint64(begin), uint64(stop)):
         i, j = uint64(pairs.i[p]) * _4, uint64(pairs.j[p]) * _4
         dx = bottles.packed[j] - bottles.packed[i]
         dy = bottles.packed[j + _1] - bottles.packed[i + _1]

@@ -8,7 +8,7 @@ from .compile import kernel, part
 from .contact import contact_force, spring_after, stretched
 from .segment import segment_contact
 from .shares import share_overlaps
-from .team import MOST_CONTACTS
+from .team import MOST_CONTACTS, units
 
 
 @kernel
@@ -143,13 +143,15 @@ def count_rail_contacts(
     near_arcs: Any,
     railed: Any,
     found: RailContacts,
-    block: int,
+    first: int,
+    end: int,
     counts: Any,
 ) -> None:
-    """Add to counts[i] the closed rail contacts of each bottle of a block; for the implicit solver."""
+    """Add to counts[i] the closed rail contacts of bottles first to end; for the implicit solver."""
     if railed is None:
         return
-    for place in range(railed.first[block], railed.first[block + 1]):
+    begin, stop = units(first, end)
+    for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
         counts[i] += find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
 
@@ -169,16 +171,18 @@ def add_rail_forces(
     curves: Any,
     implicit: Any,
     found: RailContacts,
-    block: int,
+    first: int,
+    end: int,
     spring_dt: float,
 ) -> None:
-    """Add the forces and moments of all rails on the bottles of a block to `load` and `spin.moment`.
+    """Add the forces and moments of all rails on bottles first to end to `load` and `spin.moment`.
 
     spring_dt: s, how far the tangential springs are taken along.
     """
     if railed is None:
         return
-    for place in range(railed.first[block], railed.first[block + 1]):
+    begin, stop = units(first, end)
+    for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
         count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
         for c in range(count):

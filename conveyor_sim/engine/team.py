@@ -1,8 +1,8 @@
 """Threads that take steps together: who does which block of the work, and where they wait for each other.
 
-Every thread runs the same integrator on the same World with a Member of its own. Work is cut into blocks of fixed size
-and place, whatever the number of threads: pairs into blocks of pairs, bottles into blocks of bottles. No block reads
-what another writes in the same phase, and no sum runs over blocks, so the bits do not depend on who did which.
+Every thread runs the same integrator on the same World with a Member of its own. Pairs, and bottles, are shared out in
+whole units, and each share is worked on block by block. No block reads what another writes in the same phase, and no
+sum runs over blocks, so the bits do not depend on who did which.
 """
 
 from typing import Any
@@ -14,8 +14,11 @@ from numba.extending import intrinsic
 from .arrays import F8, U4, Gathered, Member, RailContacts
 from .compile import part
 
-BLOCK = 512
-"""Pairs, or bottles, in a block: what a thread holds of them stays in the first cache."""
+UNIT = 64
+"""Pairs, or bottles, that are never parted: few enough that shares are even, and no two threads write to one line."""
+
+BLOCK = 8 * UNIT
+"""Pairs, or bottles, at a time at the most: what a thread holds of them stays in the first cache."""
 
 MOST_CONTACTS = 32
 """Of one bottle with rails at a time, the deepest ones; as many touch only in a pocket drawn as a fine polyline."""
@@ -59,21 +62,19 @@ def _rail_contacts() -> RailContacts:
 
 
 @part
-def blocks(count: int) -> int:
-    """Blocks that `count` things make."""
-    return (count + BLOCK - 1) // BLOCK
+def share(member: Member, count: int) -> tuple[int, int]:
+    """This member's share of `count` things: the first, and where it ends."""
+    units = (count + UNIT - 1) // UNIT
+    # What can't be shared is for the calling thread, rank 0, which is awake already.
+    begin = (member.rank * units + member.size - 1) // member.size
+    stop = ((member.rank + 1) * units + member.size - 1) // member.size
+    return min(begin * UNIT, count), min(stop * UNIT, count)
 
 
 @part
-def first_block(member: Member, count: int) -> int:
-    """First block of this member's share of `count` things; the next member's first block ends it."""
-    return (member.rank * blocks(count) + member.size - 1) // member.size
-
-
-@part
-def end_block(member: Member, count: int) -> int:
-    """Block after the last of this member's share."""
-    return ((member.rank + 1) * blocks(count) + member.size - 1) // member.size
+def units(first: int, end: int) -> tuple[int, int]:
+    """The units of things first to end, which begin with a unit: the first, and where they end."""
+    return first // UNIT, (end + UNIT - 1) // UNIT
 
 
 @part

@@ -13,19 +13,20 @@ from ..compile import kernel, part
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle
 from ..pairs import pack_row
-from ..team import BLOCK, end_block, first_block
+from ..team import BLOCK, share
 
 
 @kernel
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
-    bottles, slots = world.bottles, world.bottles.x.size
+    bottles = world.bottles
+    begin, stop = share(member, bottles.x.size)
     pack_all(world, member)
     for step in range(steps):
         pair_phase(world, member, dt, dt)
-        for block in range(first_block(member, slots), end_block(member, slots)):
-            first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
-            bottle_forces(world, member, dt, dt, block, first, end)
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
+            bottle_forces(world, member, dt, dt, first, end)
             _move(bottles, world.load, dt, first, end)
             _turn(world.spin, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)

@@ -17,36 +17,36 @@ from ..motion import (
     recall_velocities,
     store_velocities,
 )
-from ..team import BLOCK, end_block, first_block
+from ..team import BLOCK, share
 from .phase import RESUME, START
 
 
 @kernel
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
-    bottles, slots, half = world.bottles, world.bottles.x.size, 0.5 * dt
-    begin, stop = first_block(member, slots), end_block(member, slots)
+    bottles, half = world.bottles, 0.5 * dt
+    begin, stop = share(member, bottles.x.size)
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
         evaluate_forces(world, member, dt)
     for step in range(steps):
         if phase != RESUME or step > 0:
-            for block in range(begin, stop):
-                first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
+            for first in range(begin, stop, BLOCK):
+                end = min(first + BLOCK, stop)
                 kick(bottles, world.spin, world.load, half, first, end)
                 drift(bottles, world.spin, dt, first, end)
                 note_moved(world, member, first, end)
             if not lists_hold(world, member):
                 return step
-        for block in range(begin, stop):
-            first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
             store_velocities(world.stage, bottles, world.spin, first, end)
             kick(bottles, world.spin, world.load, half, first, end)
         pack_all(world, member)
         pair_phase(world, member, dt, dt)
-        for block in range(begin, stop):
-            first, end = block * BLOCK, min(block * BLOCK + BLOCK, slots)
-            bottle_forces(world, member, dt, dt, block, first, end)
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
+            bottle_forces(world, member, dt, dt, first, end)
             recall_velocities(world.stage, bottles, world.spin, first, end)
             kick(bottles, world.spin, world.load, half, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
