@@ -44,7 +44,7 @@ def files(belts: int, rails: int, touching: float) -> Scene:
         "name": "files",
         "duration": 1e4,
         "tick": TICK,
-        "step": {"per_tick": round(TICK / DT)},
+        "accuracy": {"per_tick": round(TICK / DT)},
         "bottle_types": {"soft": {"radius": RADIUS, "mass": MASS, "material": "bottle"}},
         "contacts": [
             {"between": ["bottle", other], "stiffness": k, "friction": 0.1,

@@ -67,7 +67,7 @@ def table(count: int, effects: str, dt: float = DT, **changes: Any) -> Scene:
         "name": f"table_{effects}",
         "duration": DURATION,
         "tick": TICK,
-        "step": {"per_tick": round(TICK / dt)},
+        "accuracy": {"per_tick": round(TICK / dt)},
         "gravity": GRAVITY,
         "slip_limit": SLIP_LIMIT,
         "bottle_types": {"soft": {"radius": RADIUS, "mass": MASS, "material": "bottle"}},

@@ -63,7 +63,7 @@ def glass_step(stiffness: float, steps: int) -> float:
 def glass(stiffness: float, steps: int, duration: float) -> Scene:
     """The plant of glass."""
     per_tick = math.ceil(_plant(duration).tick / glass_step(stiffness, steps))
-    return _plant(duration, outputs=NO_OUTPUTS, contacts=glass_contacts(stiffness), step={"per_tick": per_tick})
+    return _plant(duration, outputs=NO_OUTPUTS, contacts=glass_contacts(stiffness), accuracy={"per_tick": per_tick})
 
 
 def measure(effort: Effort) -> list[Row]:

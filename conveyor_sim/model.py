@@ -1,5 +1,6 @@
 """Scene -> Model: the constant arrays, the chosen effects and why, the time step and its reason."""
 
+import math
 import platform
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -18,6 +19,9 @@ from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, steps_per_tick
 from conveyor_sim.version import __version__, sources_hash
+
+STEP_ERROR = 1e-6
+"""m/s, default of the largest error of a step."""
 
 SKIN = 0.2
 """Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""
@@ -88,7 +92,7 @@ def build_model(scene: Scene) -> Model:
     skin = SKIN * float(radius.min())
     segments, arcs = rail_arrays(rails, rail_materials)
     bounds = bounds_of(Terms(scene, laws, on))
-    steps, reason = steps_per_tick(scene.tick, list(bounds), scene.step.per_tick)
+    steps, reason = steps_per_tick(scene.tick, list(bounds), _given_steps(scene))
     return Model(
         name=scene.name,
         dt=scene.tick_ns * 1e-9 / steps,
@@ -96,7 +100,7 @@ def build_model(scene: Scene) -> Model:
         tick_ns=scene.tick_ns,
         dt_reason=reason,
         bounds=bounds,
-        integrator=scene.step.integrator,
+        integrator=scene.accuracy.integrator,
         effects=effects,
         belts=tuple(scene.belts),
         rails=tuple(rail.name for rail in rails),
@@ -118,6 +122,7 @@ def build_model(scene: Scene) -> Model:
             rail_materials=len(rail_materials),
             reach=2.0 * float(radius[0]),
             atan=1 if "atan_friction" in on else None,
+            error=STEP_ERROR if scene.accuracy.error is None else scene.accuracy.error,
         ),
         pair_law=laws.pair,
         rail_law=laws.rail,
@@ -136,6 +141,13 @@ def build_model(scene: Scene) -> Model:
         ),
         machine=_machine(),
     )
+
+
+def _given_steps(scene: Scene) -> int | None:
+    """Steps a tick that the scene itself gives."""
+    if scene.accuracy.dt is not None:
+        return max(1, math.ceil(scene.tick / scene.accuracy.dt * (1.0 - 1e-12)))
+    return scene.accuracy.per_tick
 
 
 def _largest(radii: F8 | None) -> float:

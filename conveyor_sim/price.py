@@ -12,6 +12,7 @@ from conveyor_sim.effects import EFFECTS
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model import Model
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene.accuracy import explicit
 from conveyor_sim.simulation import Simulation
 
 CHUNK = 0.05
@@ -152,7 +153,7 @@ def _variant(scene: Scene, model: Model, off: Sequence[str]) -> Scene:
     """The scene with some effects off, and the steps a tick that it has with them."""
     overrides = parse_overrides(scene.overrides_text)
     overrides["effects"] = {**scene.effects, **dict.fromkeys(off, "off")}
-    overrides["step"] = {**overrides.get("step", {}), "per_tick": model.steps_per_tick}
+    overrides["accuracy"] = explicit(model.integrator, model.steps_per_tick, scene.accuracy.error)
     return parse_scene(scene.source_text, scene.source_name, overrides)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import list_contacts
 from conveyor_sim.engine.crew import Crew
 from conveyor_sim.engine.footing import find_carriers, refresh_footing
@@ -153,6 +154,20 @@ class Simulation:
         self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
         self._state.take(other._state)
         self._set_surfaces()
+
+    def displace(self, dx: F8, dy: F8, dvx: F8 | None = None, dvy: F8 | None = None) -> None:
+        """Move every bottle by (dx, dy) m and change its velocity by (dvx, dvy) m/s; (bottles,), in order of the ids.
+
+        For studies of how a disturbance grows. ValueError if the shapes do not match.
+        """
+        slots, bottles = self._slots(), self._state.world.bottles
+        for column, change in ((bottles.x, dx), (bottles.y, dy), (bottles.vx, dvx), (bottles.vy, dvy)):
+            if change is not None:
+                if np.shape(change) != slots.shape:
+                    raise ValueError(f"a displacement of shape {np.shape(change)}, expected {slots.shape}")
+                column[slots] += change
+        self._state.world.neighbourhood.stale[0] = 1
+        self._state.make_lists()
 
     def due(self, output: str) -> bool:
         """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""

@@ -125,7 +125,7 @@ def line(**fields: Any) -> dict[str, Any]:
     parts: dict[str, Any] = {
         "seed": 7,
         "tick": 0.01,
-        "step": {"per_tick": 50},
+        "accuracy": {"per_tick": 50},
         "bottle_types": types,
         "contacts": [
             pair("glass", "glass", 5000.0, "paper", 0.5, 0.1),

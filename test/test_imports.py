@@ -17,7 +17,7 @@ FLOORS = [
     ["state"],
     ["line"],
     ["simulation"],
-    ["bag", "price"],
+    ["bag", "price", "accuracy"],
     ["progress", "summary", "plot", "explain"],
     ["runner", "report"],
     ["ros"],

@@ -69,7 +69,7 @@ def test_what_is_absent_does_not_bound() -> None:
 
 
 def test_chosen_steps_keep_every_bound() -> None:
-    model = build_model(scene(**{**line(), "step": {}}))
+    model = build_model(scene(**{**line(), "accuracy": {}}))
     assert model.dt * model.steps_per_tick == pytest.approx(0.01)
     tightest = min(bound.dt for bound in model.bounds)
     assert model.dt <= tightest < 0.01 / (model.steps_per_tick - 1)
@@ -78,7 +78,7 @@ def test_chosen_steps_keep_every_bound() -> None:
 
 
 def test_given_steps_are_told() -> None:
-    model = build_model(scene(step={"per_tick": 3}, **{k: v for k, v in line().items() if k != "step"}))
+    model = build_model(scene(accuracy={"per_tick": 3}, **{k: v for k, v in line().items() if k != "accuracy"}))
     assert model.steps_per_tick == 3
     assert model.dt == pytest.approx(0.01 / 3)
     assert "given in the scene" in model.dt_reason
@@ -166,6 +166,6 @@ def test_a_large_plant_gets_a_grid_of_bounded_size() -> None:
 def test_a_strong_dashpot_shortens_the_step_until_it_holds(law: str, c: float) -> None:
     """Two bottles at 1 m/s against each other: however strong the dashpot, they never leave faster than they came."""
     pair = [bottle(0.0, 0.0, velocity=[0.5, 0.0]), bottle(0.14, 0.0, velocity=[-0.5, 0.0])]
-    sim = Simulation(scene(step={}, floor="none", contacts=[contact(5e3, damping=(law, c))], bottles=pair))
+    sim = Simulation(scene(accuracy={}, floor="none", contacts=[contact(5e3, damping=(law, c))], bottles=pair))
     sim.advance(20)
     assert abs(np.diff(sim.bottles().vx)[0]) <= 1.0

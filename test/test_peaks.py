@@ -15,7 +15,7 @@ def three_bottles(tick: float, steps: int, rate: float, integrator: str, damped:
     return simulation(
         **PEAKS,
         tick=tick,
-        step={"per_tick": steps, "integrator": integrator},
+        accuracy={"per_tick": steps, "integrator": integrator},
         contacts=[contact(4000.0, damping=damping), contact(6000.0, "steel", damping=damping)],
         rails={"rail": segment((RADIUS + 0.002, -1.0), (RADIUS + 0.002, 1.0))},
         floor="none",
@@ -86,7 +86,7 @@ def test_the_impulse_is_the_change_of_momentum() -> None:
     sim = simulation(
         **PEAKS,
         tick=0.05,
-        step={"per_tick": 400},
+        accuracy={"per_tick": 400},
         contacts=[contact(4000.0, damping=("normal", 1.0)), contact(6000.0, "steel", damping=("normal", 1.0))],
         rails={"rail": segment((9.0, -1.0), (9.0, 1.0))},
         floor="none",

@@ -17,7 +17,7 @@ TICKS = 300
 
 
 def little_line(integrator: str = "semi_implicit_euler", **fields: Any) -> Simulation:
-    return simulation(**line(step={"per_tick": 50, "integrator": integrator}, **fields))
+    return simulation(**line(accuracy={"per_tick": 50, "integrator": integrator}, **fields))
 
 
 COMMANDS = {
@@ -144,7 +144,7 @@ def test_lists_that_grow_within_a_tick_leave_no_trace(integrator: str) -> None:
         return simulation(
             **line(
                 tick=0.5,
-                step={"per_tick": 2000, "integrator": integrator},
+                accuracy={"per_tick": 2000, "integrator": integrator},
                 rails={"left": segment((-1.0, 0.1), (-0.9, 0.1)), "comb": {"kind": "polyline", "points": corners,
                                                                           "material": "steel"}},
                 bottles=[bottle(-0.5, 0.0645, 1.0, -0.05), bottle(-0.3, 0.08, 0.6, 0.0)],
@@ -245,7 +245,7 @@ def test_a_time_step_that_blows_up_is_told() -> None:
     """A force beyond what a double holds, from a contact that the step is far too long for: no silent NaN."""
     sim = simulation(
         tick=0.1,
-        step={"per_tick": 1},
+        accuracy={"per_tick": 1},
         bottle_types={"bottle": kind(mass=1e-9)},
         contacts=[contact(1e308, "steel")],
         rails={"rail": segment((2.0 * RADIUS, -1.0), (2.0 * RADIUS, 1.0))},

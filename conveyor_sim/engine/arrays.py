@@ -382,6 +382,8 @@ class Settings(NamedTuple):
     """m, R_i + R_j where all radii are equal."""
     atan: Any
     """None: the polynomial friction curve; 1: the arctangent."""
+    error: float
+    """m/s, largest error of a step; for the integrators that choose their own."""
 
 
 class World(NamedTuple):

@@ -26,18 +26,18 @@ def contact_problems(scene: Scene) -> Iterator[Problem]:
             yield from _table((*path, "table"), contact.table)
         if contact.tangential is not None and contact.friction == 0.0:
             yield Problem((*path, "tangential"), "given without friction, expected friction greater than 0 beside it")
-        if contact.tangential is not None and scene.step.integrator != "semi_implicit_euler":
+        if contact.tangential is not None and scene.accuracy.integrator != "semi_implicit_euler":
             # Its slip at the middle of the step is not at hand: with that at the end the spring would lose energy.
-            yield Problem((*path, "tangential"), f"given, expected none with integrator {scene.step.integrator}")
+            yield Problem((*path, "tangential"), f"given, expected none with integrator {scene.accuracy.integrator}")
     for name, kind in scene.bottle_types.items():
         if kind.base_radius is not None and kind.base_radius > kind.radius:
             yield Problem(
                 ("bottle_types", name, "base_radius"),
                 f"{shown(kind.base_radius)} given, expected at most the radius, {kind.radius:g} (m)",
             )
-    if scene.friction_solver == "implicit" and scene.step.integrator != "semi_implicit_euler":
+    if scene.friction_solver == "implicit" and scene.accuracy.integrator != "semi_implicit_euler":
         yield Problem(
-            ("friction_solver",), f'"implicit" given, expected "explicit" with integrator {scene.step.integrator}'
+            ("friction_solver",), f'"implicit" given, expected "explicit" with integrator {scene.accuracy.integrator}'
         )
 
 

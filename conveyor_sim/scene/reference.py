@@ -5,7 +5,7 @@ from inspect import getdoc
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import belts, contacts, rails, schema
+from conveyor_sim.scene import accuracy, belts, contacts, rails, schema
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -31,7 +31,7 @@ problem is one line that names the file, the line, the field, the value and what
 
 SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
     ("The whole file", schema.Scene),
-    ("`step`", schema.Step),
+    ("`accuracy`", accuracy.Accuracy),
     ("An entry of `contacts`", contacts.Contact),
     ("`damping` of a contact", contacts.Damping),
     ("`tangential` of a contact", contacts.Tangential),

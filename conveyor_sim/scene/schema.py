@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
-from annotated_types import Le, Len
+from annotated_types import Len
 from pydantic import Discriminator, PrivateAttr, Tag
 
+from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.effect_names import Forced
@@ -31,17 +32,6 @@ from conveyor_sim.scene.types import (
     nanoseconds,
     quantity,
 )
-
-
-class Step(Part):
-    """How a tick is integrated."""
-
-    integrator: Literal["semi_implicit_euler", "velocity_verlet"] = quantity(
-        "Integration method: the paper's (5)-(6), or velocity Verlet.", default="semi_implicit_euler"
-    )
-    per_tick: Annotated[Count, Le(10_000_000)] | None = quantity(
-        "Steps in a tick. Left out: chosen from the contact time and the friction bounds.", "1", default=None
-    )
 
 
 class BottleType(Part):
@@ -185,7 +175,11 @@ class Scene(Part):
     tick: Positive = quantity(
         "Scan cycle, in whole nanoseconds: commands act and outputs appear at ticks.", "s", default=0.01
     )
-    step: Step = quantity("Integration within a tick.", default=Step.model_construct())
+    accuracy: Annotated[
+        Accuracy, Holds('"draft", "standard", "fine", or a mapping with the fields ' + ", ".join(Accuracy.model_fields))
+    ] = quantity(
+        "How exactly a tick is integrated: a preset such as `fine`, or a mapping.", default=Accuracy.model_construct()
+    )
     slip_limit: Positive = quantity("Speed v_lim below which friction is regularised (7)-(10).", "m/s", default=0.01)
     friction_curve: Literal["polynomial", "atan"] = quantity(
         "How friction grows below and about v_lim. polynomial: (7)-(10), full at v_lim; "

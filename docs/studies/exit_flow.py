@@ -58,7 +58,7 @@ def main() -> None:
             changes = {
                 "rails": {"funnel_left": {"points": LEFT[guide]}},
                 "belts": {"table": {"speed": speed}},
-                "step": {"per_tick": steps, "integrator": method},
+                "accuracy": {"per_tick": steps, "integrator": method},
             }
             table.writerow([guide, speed, steps, method, *entries(changes)])
 

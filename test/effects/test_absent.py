@@ -87,7 +87,7 @@ def crowd(**more: Any) -> Simulation:
     """A dozen bottles that meet on a belt, between rails; frictionless and undamped contacts."""
     merged: dict[str, Any] = {
         "tick": 0.01,
-        "step": {"per_tick": 60},
+        "accuracy": {"per_tick": 60},
         "base": base(0.4),
         "bottle_types": {"bottle": kind()},
         "contacts": [contact(5000.0), contact(8000.0, "steel")],

@@ -19,7 +19,7 @@ def squeezed(integrator: str, speed: float = 0.0) -> State:
     """Two bottles pressed into each other, with the paper's damping; they spin alike, so their rims slip."""
     fields = {"contacts": [contact(K, damping=("paper", C))], "floor": "none", "lever_arm": "radius"}
     given = scene(
-        step={"integrator": integrator},
+        accuracy={"integrator": integrator},
         effects={"peaks": "on"},
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
         **fields,

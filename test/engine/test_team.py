@@ -35,7 +35,7 @@ def crowd(**fields: Any) -> Scene:
                       "pitch": PITCH}}
             for name, first in (("bottle", 0), ("slim", ROWS // 2))
         ],
-        "step": {"per_tick": 100},
+        "accuracy": {"per_tick": 100},
         "effects": {"peaks": "on"},
     }  # fmt: skip
     return scene(**{**given, **fields})
@@ -43,7 +43,7 @@ def crowd(**fields: Any) -> Scene:
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "as it is": {},
-    "velocity Verlet": {"step": {"per_tick": 100, "integrator": "velocity_verlet"}},
+    "velocity Verlet": {"accuracy": {"per_tick": 100, "integrator": "velocity_verlet"}},
     "implicit friction": {"friction_solver": "implicit"},
     "springs and rings": {
         "bottle_types": {"bottle": kind(base_radius=0.04), "slim": kind(0.06, 0.15, base_radius=0.03)},

@@ -19,7 +19,7 @@ UNKNOWN = "no such command, expected one of belts/one/cmd_speed, belts/two/cmd_s
 def two_belts() -> Simulation:
     return simulation(
         tick=0.01,
-        step={"per_tick": 10},
+        accuracy={"per_tick": 10},
         base=base(0.4),
         belts={
             "one": belt(0.2, (0.0, 0.0), 1.0, 1.0, speed_limits=[-1.0, 1.0]),

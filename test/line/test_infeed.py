@@ -19,7 +19,7 @@ def infeed(**fields: Any) -> Simulation:
     scene_fields = {key: fields.pop(key) for key in ("seed", "outfeeds") if key in fields}
     return simulation(
         tick=TICK,
-        step={"per_tick": 20},
+        accuracy={"per_tick": 20},
         base=base(0.4),
         contacts=[contact(5000.0, damping=("normal", 2.0)), contact(5000.0, "steel", damping=("normal", 2.0))],
         belts=belts,
@@ -213,7 +213,7 @@ def test_each_infeed_has_a_stream_of_its_own() -> None:
         sim = simulation(
             seed=5,
             tick=TICK,
-            step={"per_tick": 20},
+            accuracy={"per_tick": 20},
             base=base(0.4),
             contacts=[contact(5000.0, damping=("normal", 2.0)), contact(5000.0, "steel", damping=("normal", 2.0))],
             belts={"belt": belt(SPEED)},

@@ -43,7 +43,7 @@ def test_bottles_leave_in_the_region_and_ids_are_not_used_again() -> None:
     """An endless stream through a short line: few slots, growing ids, mass in equals mass out."""
     sim = simulation(
         tick=0.01,
-        step={"per_tick": 20},
+        accuracy={"per_tick": 20},
         base=base(0.4),
         contacts=[contact(5000.0, damping=("normal", 2.0)), contact(5000.0, "steel", damping=("normal", 2.0))],
         belts={"belt": belt(1.0)},

@@ -11,7 +11,7 @@ NAME = "belts/watched/cmd_speed"
 def watched(timeout: float = 0.05) -> Simulation:
     return simulation(
         tick=0.01,
-        step={"per_tick": 10},
+        accuracy={"per_tick": 10},
         base=base(0.4),
         belts={
             "watched": belt(0.2, (0.0, 0.0), 1.0, 1.0, watchdog=timeout),

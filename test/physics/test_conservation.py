@@ -20,7 +20,7 @@ def cloud(integrator: str, lever_arm: str = "overlap") -> Simulation:
     inward = 1.0 + phases(30)
     return simulation(
         tick=0.005,
-        step={"per_tick": 250, "integrator": integrator},
+        accuracy={"per_tick": 250, "integrator": integrator},
         lever_arm=lever_arm,
         bottle_types={
             name: kind(radius, mass, "glass" if name == "bottle" else "steel", inertia=share * mass * radius**2)
@@ -91,7 +91,7 @@ def test_angular_momentum_gained_in_one_impact(lever_arm: str) -> None:
     slide = 0.6
     sim = simulation(
         tick=0.03,
-        step={"per_tick": 6000},
+        accuracy={"per_tick": 6000},
         slip_limit=0.001,
         lever_arm=lever_arm,
         contacts=[contact(stiffness_for(contact_time, MASS / 2.0), friction=mu)],

@@ -34,7 +34,7 @@ def hertz_stiffness(contact_time: float, speed: float, reduced_mass: float) -> f
 def impacts(law: dict[str, Any], speeds: Any, tick: float, steps: int, entries: Any = 0.1, **fields: Any) -> Simulation:
     """Pairs far from each other; the left one moves at its speed and touches after `entries` (in ticks)."""
     speeds, entries = np.broadcast_arrays(speeds, entries)
-    fields = {"step": {"per_tick": steps}, **NO_FLOOR, **fields}
+    fields = {"accuracy": {"per_tick": steps}, **NO_FLOOR, **fields}
     return simulation(
         tick=tick,
         contacts=[{"between": ["glass", "glass"], **law}],
@@ -68,7 +68,7 @@ def test_a_hertz_contact(against: str) -> None:
     else:
         sim = simulation(
             tick=tick,
-            step={"per_tick": 1},
+            accuracy={"per_tick": 1},
             contacts=[contact(None, "steel", hertz_stiffness=k)],
             rails={"rail": segment((1.0, -1.0), (1.0, 1.0))},
             bottles=[bottle(1.0 - RADIUS - 3.3 * SPEED * tick, 0.0, SPEED)],
@@ -99,7 +99,7 @@ def test_order_of_a_hertz_contact(integrator: str) -> None:
         tick = round(CONTACT_TIME * n / (n + 0.5), 9)
         speeds = np.full(64, SPEED)
         entries = (1.0 + phases(64)) / numbers[0]
-        sim = impacts({"hertz_stiffness": k}, speeds, tick, n, entries, step={"per_tick": n, "integrator": integrator})
+        sim = impacts({"hertz_stiffness": k}, speeds, tick, n, entries, accuracy={"per_tick": n, "integrator": integrator})
         sim.advance(2)
         errors.append(rms(rebound(sim) - SPEED))
     assert order(numbers, errors) == pytest.approx(2.5, abs=0.2)

@@ -26,7 +26,7 @@ def set_down(curve: str, solver: str, tick: float, steps: int, integrator: str =
     """A bottle at rest on a belt at SPEED."""
     return simulation(
         tick=tick,
-        step={"per_tick": steps, "integrator": integrator},
+        accuracy={"per_tick": steps, "integrator": integrator},
         gravity=G,
         slip_limit=SLIP_LIMIT,
         friction_curve=curve,
@@ -88,7 +88,7 @@ def test_implicit_friction_sticks_at_a_rail_in_twenty_steps(curve: str) -> None:
     v_t = 0.8 * 2.0 * mu * 2.0 * v_n
     sim = simulation(
         tick=contact_time,
-        step={"per_tick": 20},
+        accuracy={"per_tick": 20},
         slip_limit=limit,
         friction_curve=curve,
         friction_solver="implicit",
@@ -124,7 +124,7 @@ def test_implicit_friction_is_stable_with_many_contacts(solver: str, curve: str)
         )
     sim = simulation(
         tick=dt,
-        step={"per_tick": 1},
+        accuracy={"per_tick": 1},
         slip_limit=limit,
         friction_curve=curve,
         friction_solver=solver,

@@ -53,7 +53,7 @@ def collisions(
     sim = simulation(
         **PEAKS,
         tick=tick,
-        step={"per_tick": steps, "integrator": integrator},
+        accuracy={"per_tick": steps, "integrator": integrator},
         bottle_types={"a": kind(a.radius, a.mass), "b": kind(b.radius, b.mass)},
         contacts=[contact(k, damping=damping)],
         bottles=[

@@ -33,7 +33,7 @@ def against_rail(
     vx, vy = place(v_t, -V_N)
     sim = simulation(
         tick=CONTACT_TIME,
-        step={"per_tick": steps},
+        accuracy={"per_tick": steps},
         slip_limit=slip_limit,
         lever_arm=lever_arm,
         contacts=[contact(k, "steel", ("normal", 2.0 * ZETA * math.sqrt(k * MASS)), MU)],
@@ -103,7 +103,7 @@ def test_in_an_equal_pair_each_takes_half(sliding: bool) -> None:
     gap = 0.1 * V_N * CONTACT_TIME
     sim = simulation(
         tick=CONTACT_TIME,
-        step={"per_tick": steps},
+        accuracy={"per_tick": steps},
         slip_limit=slip_limit,
         lever_arm="radius",
         contacts=[contact(stiffness_for(CONTACT_TIME, MASS / 2.0), friction=MU)],

@@ -17,7 +17,7 @@ def queue(damping: float, step: int = 200) -> Simulation:
     return simulation(
         **PEAKS,
         tick=0.01,
-        step={"per_tick": step},
+        accuracy={"per_tick": step},
         gravity=G,
         base=base(MU),
         contacts=[contact(STIFFNESS, damping=("normal", damping)),

@@ -21,7 +21,7 @@ def frictionless(rails: dict[str, Any], start: dict[str, Any], steps: int = 100,
     return simulation(
         **PEAKS,
         tick=tick,
-        step={"per_tick": math.ceil(tick / CONTACT_TIME * steps)},
+        accuracy={"per_tick": math.ceil(tick / CONTACT_TIME * steps)},
         contacts=[contact(STIFFNESS, "steel", laws.get("normal"))],
         rails=rails,
         bottles=[start],
@@ -43,7 +43,7 @@ def test_a_straight_rail_of_many_pieces_is_felt_as_one() -> None:
         return simulation(
             **PEAKS,
             tick=0.01,
-            step={"per_tick": 100},
+            accuracy={"per_tick": 100},
             base=base(0.4),
             contacts=[contact(5000.0, "steel", ("normal", 1.0), 0.15)],
             belts={"belt": belt(0.5, (-1.0, -1.0), 5.0, 5.0, angle=-0.3)},

@@ -27,7 +27,7 @@ def standing(belts: dict[str, Any], bottles: list[Any], ring: float | None = RIN
     """Bottles on ring bases; 200 steps to a tick of 10 ms."""
     more = {} if ring is None else {"base_radius": ring}
     return simulation(
-        **{"step": {"per_tick": 200}, "gravity": G, "slip_limit": SLIP_LIMIT, **fields},
+        **{"accuracy": {"per_tick": 200}, "gravity": G, "slip_limit": SLIP_LIMIT, **fields},
         bottle_types={"bottle": kind(**more)},
         base=base(MU),
         belts=belts,
@@ -43,7 +43,7 @@ def f(u: float) -> float:
 @pytest.mark.parametrize("spin", [6.0, -6.0])
 def test_spin_at_rest_dies_out_by_the_closed_form(spin: float, integrator: str) -> None:
     """At a constant rate mu m g R_b / J, then the last v_lim of it; without any motion of the axis."""
-    sim = standing({"belt": belt(0.0)}, [bottle(0.3, 0.2, spin=spin)], step={"per_tick": 200, "integrator": integrator})
+    sim = standing({"belt": belt(0.0)}, [bottle(0.3, 0.2, spin=spin)], accuracy={"per_tick": 200, "integrator": integrator})
     start = abs(spin) * RING
     dt = sim.model.dt
     for _ in range(20):
@@ -191,7 +191,7 @@ def test_a_point_stays_a_point_beside_rings(fields: dict[str, Any]) -> None:
     alone = standing(belts, points, ring=None, **fields)
     types = {"bottle": kind(), "ring": kind(base_radius=RING)}
     beside = simulation(
-        **{"step": {"per_tick": 200}, "gravity": G, "slip_limit": SLIP_LIMIT, **fields},
+        **{"accuracy": {"per_tick": 200}, "gravity": G, "slip_limit": SLIP_LIMIT, **fields},
         bottle_types=types,
         base=base(MU),
         belts=belts,

@@ -26,7 +26,7 @@ def set_down(
     v = speed - slip
     return simulation(
         tick=tick,
-        step={"per_tick": steps, "integrator": integrator},
+        accuracy={"per_tick": steps, "integrator": integrator},
         gravity=G,
         slip_limit=slip_limit,
         base=base(MU),

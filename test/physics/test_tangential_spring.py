@@ -44,7 +44,7 @@ def leaning(against: str, share: float, **tangential: Any) -> Simulation:
         }
     return simulation(
         tick=0.01,
-        step={"per_tick": 200},
+        accuracy={"per_tick": 200},
         gravity=G,
         slip_limit=SLIP_LIMIT,
         effects={"rotation": "off"},
@@ -113,7 +113,7 @@ def test_an_oblique_impact_comes_back_along_the_surface() -> None:
     """
     sim = simulation(
         tick=0.01,
-        step={"per_tick": 4000},
+        accuracy={"per_tick": 4000},
         slip_limit=SLIP_LIMIT,
         effects={"rotation": "off"},
         contacts=[contact(STIFFNESS, "steel", friction=2.0, tangential={"stiffness": STIFFNESS})],

@@ -26,7 +26,7 @@ def turntable(
     width = TABLE - inner
     return simulation(
         tick=0.01,
-        step={"per_tick": steps, "integrator": integrator},
+        accuracy={"per_tick": steps, "integrator": integrator},
         gravity=G,
         slip_limit=SLIP_LIMIT,
         base=base(MU),

@@ -48,8 +48,8 @@ def test_paper_plant_has_the_papers_parameters() -> None:
     assert {(contact.damping.law, contact.damping.coefficient) for contact in scene.contacts} == {("paper", 0.1)}
     assert [base.friction for base in scene.base] == [0.4]
     assert (scene.slip_limit, scene.duration) == (0.01, 20.0)
-    assert scene.step.per_tick is not None
-    assert scene.step.per_tick * scene.duration_ticks == 500_000
+    assert scene.accuracy.per_tick is not None
+    assert scene.accuracy.per_tick * scene.duration_ticks == 500_000
     (feed,) = scene.infeeds.values()
     assert (feed.count, feed.gap) == (100, 0.001)
 
@@ -73,7 +73,7 @@ def test_defaults() -> None:
     scene = parse_scene("{name: a, duration: 1, bottle_types: {b: {radius: 0.1, mass: 2, material: c}}}")
     assert (scene.gravity, scene.slip_limit, scene.seed, scene.lever_arm) == (9.81, 0.01, 0, "overlap")
     assert (scene.tick_ns, scene.duration_ticks) == (10_000_000, 100)
-    assert scene.step.per_tick is None
+    assert scene.accuracy.per_tick is None
     assert scene.floor != "none"
     assert scene.floor.friction is None
     assert scene.bottle_types["b"].moment_of_inertia == 2 * 0.1**2

@@ -1,0 +1,136 @@
+"""What an accuracy study finds out, as plain rows: what its tables, pictures, CSV and JSON are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from conveyor_sim.accuracy.setting import Setting
+
+
+@dataclass(frozen=True)
+class Order:
+    """Error of one integrator in a closed form, against the number of steps."""
+
+    case: str
+    """What happens, such as `head on, clamped dashpot`."""
+    quantity: str
+    """What is compared, such as `speed of rebound`."""
+    integrator: str
+    steps: tuple[int, ...]
+    """Steps in the time that the case lasts."""
+    errors: tuple[float, ...]
+    """Relative, RMS over `phases` phases of entry into a step."""
+    phases: int
+    observed: float
+    """Order in dt: slope of log error against log dt."""
+    expected: float | None
+    """None: the theory says nothing."""
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """How long trajectories from one state can be compared: until a nudge has grown tenfold."""
+
+    start: float
+    """s, simulated time of the state."""
+    bottles: int
+    """Present in it."""
+    contacts: int
+    """Closed in it."""
+    by_nudge: float
+    """s after the start at which a nudge of 1e-12 m had grown tenfold; inf: not in the time looked at."""
+    by_error: float
+    """s at which a coarse setting's own early error had; inf likewise."""
+    length: float
+    """s, a whole number of ticks, compared over."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of one setting against the reference, over all horizons."""
+
+    position_rms: float
+    """m, over bottles and ticks."""
+    position_max: float
+    """m"""
+    peak_force: float
+    """Relative: RMS over bottles of the error in the largest force, over the RMS of the largest forces."""
+    impulse: float
+    """Relative, likewise, of the impulse of all normal forces."""
+    energy: float
+    """Relative: RMS over ticks of the error in kinetic and elastic energy, over the RMS of that energy."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Wall time, s per simulated second: median, least and greatest of interleaved repeats."""
+
+    median: float
+    least: float
+    greatest: float
+
+
+@dataclass(frozen=True)
+class Point:
+    """A setting in the work-precision diagram."""
+
+    setting: Setting
+    dt: float
+    """s"""
+    predicted: float | None
+    """Relative error in contact force by the bounds that choose presets; None: they say nothing of this method."""
+    errors: Errors | None
+    """None where it failed."""
+    cost: Cost | None
+    """None where it failed."""
+    failure: str
+    """One sentence: unstable, chattering or tunnelling, where and when; empty if it did not fail."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What errors are measured against, and how exact it is itself."""
+
+    setting: Setting
+    doubt: Errors
+    """Its difference from one of half as many steps and ten times the error a step."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One long run."""
+
+    setting: Setting
+    seed: int
+    values: dict[str, float]
+    """By observable; those that the scene has."""
+    wall: float
+    """s"""
+    failure: str
+    """One sentence if the run ended early, its values are then empty; else empty."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One observable under one setting, compared with the reference setting over seeds."""
+
+    setting: Setting
+    observable: str
+    runs: int
+    mean: float
+    error: float
+    """Standard error of the mean."""
+    reference: float
+    """Mean under the reference setting."""
+    reference_error: float
+    low: float
+    """Confidence interval of the relative difference from the reference."""
+    high: float
+    tolerance: float
+    verdict: str
+    """`equivalent`: the interval lies inside +-tolerance; `different`: outside; `undecided`: neither."""
+
+    @property
+    def resolution(self) -> float:
+        """Smallest tolerance at which the runs made would accept: the interval's end farther from 0."""
+        return max(abs(self.low), abs(self.high))

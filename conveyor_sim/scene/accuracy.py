@@ -1,0 +1,60 @@
+"""How exactly a scene is simulated: a preset, a tolerance, or an integrator with its time step."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, get_args
+
+from annotated_types import Le
+from pydantic import model_validator
+
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.types import Count, Positive, Tolerance, quantity
+
+Preset = Literal["draft", "standard", "fine"]
+IntegratorName = Literal["semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "rosenbrock"]
+INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
+
+CHOICES = ("preset", "tolerance", "dt", "per_tick")
+"""The fields that each choose the time step; one of them at most."""
+
+
+class Accuracy(Part):
+    """How exactly a tick is integrated. A word alone is a preset: `accuracy: fine` is `accuracy: {preset: fine}`.
+
+    At most one of `preset`, `tolerance`, `dt` and `per_tick`; without one it is the preset `standard`.
+    """
+
+    preset: Preset | None = quantity("A row of the table of presets in docs/accuracy.md.", default=None)
+    tolerance: Tolerance | None = quantity(
+        "Relative error in contact force to stay below; the time step follows.", "1", default=None
+    )
+    integrator: IntegratorName = quantity(
+        "Integration method; the first is the paper's, (5)-(6). docs/accuracy.md tells how to choose.",
+        default="semi_implicit_euler",
+    )
+    dt: Positive | None = quantity(
+        "Longest time step: a tick is divided into the fewest equal steps that keep it.", "s", default=None
+    )
+    per_tick: Annotated[Count, Le(10_000_000)] | None = quantity("The same as a number of steps.", "1", default=None)
+    error: Positive | None = quantity(
+        "Largest error of a step, dormand_prince only, which then chooses its steps itself and begins with dt. "
+        "Left out: 1e-6.",
+        "m/s",
+        default=None,
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_word(cls, data: Any) -> Any:
+        return {"preset": data} if isinstance(data, str) else data
+
+
+def explicit(integrator: str, per_tick: int, error: float | None = None) -> Mapping[str, Any]:
+    """`accuracy` as an override that leaves nothing of what the scene says there."""
+    return {
+        "preset": None,
+        "tolerance": None,
+        "integrator": integrator,
+        "dt": None,
+        "per_tick": per_tick,
+        "error": error,
+    }
