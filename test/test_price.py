@@ -41,7 +41,9 @@ def test_every_effect_that_can_be_off_is_priced() -> None:
 
 def test_variants_take_the_steps_of_the_scene() -> None:
     """Damping that bounds the time step does not buy longer steps where it is off."""
-    pricing = Pricing(scene(**{**FIELDS, "accuracy": {}, "contacts": [contact(5e3, damping=("normal", 500.0))]}), at=0.001)
+    pricing = Pricing(
+        scene(**{**FIELDS, "accuracy": {}, "contacts": [contact(5e3, damping=("normal", 500.0))]}), at=0.001
+    )
     pricing.warm_up(lambda done, whole: None)
     pricing.prepare(lambda done, whole: None)
     steps = {variant.simulation.model.steps_per_tick for variant in pricing._variants}

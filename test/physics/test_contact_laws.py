@@ -99,7 +99,9 @@ def test_order_of_a_hertz_contact(integrator: str) -> None:
         tick = round(CONTACT_TIME * n / (n + 0.5), 9)
         speeds = np.full(64, SPEED)
         entries = (1.0 + phases(64)) / numbers[0]
-        sim = impacts({"hertz_stiffness": k}, speeds, tick, n, entries, accuracy={"per_tick": n, "integrator": integrator})
+        sim = impacts(
+            {"hertz_stiffness": k}, speeds, tick, n, entries, accuracy={"per_tick": n, "integrator": integrator}
+        )
         sim.advance(2)
         errors.append(rms(rebound(sim) - SPEED))
     assert order(numbers, errors) == pytest.approx(2.5, abs=0.2)

@@ -43,7 +43,9 @@ def f(u: float) -> float:
 @pytest.mark.parametrize("spin", [6.0, -6.0])
 def test_spin_at_rest_dies_out_by_the_closed_form(spin: float, integrator: str) -> None:
     """At a constant rate mu m g R_b / J, then the last v_lim of it; without any motion of the axis."""
-    sim = standing({"belt": belt(0.0)}, [bottle(0.3, 0.2, spin=spin)], accuracy={"per_tick": 200, "integrator": integrator})
+    sim = standing(
+        {"belt": belt(0.0)}, [bottle(0.3, 0.2, spin=spin)], accuracy={"per_tick": 200, "integrator": integrator}
+    )
     start = abs(spin) * RING
     dt = sim.model.dt
     for _ in range(20):
