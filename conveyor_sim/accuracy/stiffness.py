@@ -13,8 +13,9 @@ def scaled_contacts(scene: Scene, factor: float) -> list[dict[str, Any]]:
     """The scene's contacts, as in a scene file, with every stiffness times `factor`.
 
     A linear contact of stiffness f k rebounds as before with a dashpot of sqrt(f) c, of the same c / (2 sqrt(k m));
-    a Hertz contact, f^(2/5) times as long at any speed, with f^(2/5) c; one that sets in at zero keeps its lambda, which
-    depends on the speed alone; a restitution that is given stays. The paper's outlook: a lower equivalent stiffness.
+    a Hertz contact, f^(2/5) times as short at any speed, with f^(2/5) c; damping that sets in at zero keeps its lambda,
+    whose effect depends on the speed alone; a restitution that is given stays. The paper's outlook: a lower equivalent
+    stiffness.
     """
     return [_scaled(contact, factor) for contact in scene.contacts]
 
