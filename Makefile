@@ -1,6 +1,7 @@
 # make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., one with belts feeder and table; DISTRO=kilted)
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
 # make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
+# make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about half an hour (ARGS=funnel for one)
 # make lint    style and types
 # make clean   removes what set-up and builds made, never runs/
 
@@ -17,7 +18,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test bench lint clean set-up set-up-test set-up-bench
+.PHONY: help run test bench accuracy lint clean set-up set-up-test set-up-bench
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -30,6 +31,9 @@ test: set-up-test
 
 bench: set-up-bench
 	@$(PYTHON) -m bench $(ARGS)
+
+accuracy: set-up
+	@$(PYTHON) docs/studies/accuracy.py $(ARGS)
 
 lint: set-up-test
 	@$(PYTHON) -m ruff check .

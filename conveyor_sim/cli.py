@@ -1,4 +1,4 @@
-"""The command `conveyor-sim`: check, explain, run, plot, replay, recover. Errors are one sentence, no traceback."""
+"""The command `conveyor-sim`: check, explain, run, accuracy and more. Errors are one sentence, no traceback."""
 
 from __future__ import annotations
 
@@ -104,7 +104,10 @@ def explain(scene: str, price: bool, at: float | None) -> None:
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
 def run(scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
+    from conveyor_sim.achieved import achieved
     from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.explain import setting_line
+    from conveyor_sim.model import build_model
     from conveyor_sim.report import report
     from conveyor_sim.resources import scene_path
     from conveyor_sim.runner import run_scene
@@ -112,6 +115,8 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool, t
     from conveyor_sim.simulation import compile_kernels
 
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration})
+    model = build_model(loaded)
+    click.echo(setting_line(model))
     folder = None if no_record else out or new_run_folder()
     with told_if_long(COMPILING):
         compile_kernels(loaded)
@@ -122,8 +127,54 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool, t
     if done.bag is None:
         factor = done.simulated / done.wall
         click.echo(f"{done.simulated:.2f} s simulated in {done.wall:.2f} s, {factor:.3g} x real time")
+        reached = achieved(model, done.peak_force)
+        if reached is not None:
+            click.echo(reached.sentence)
     else:
         report(done.bag, done.wall)
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--tolerance", type=float, default=0.01, help="Relative error to stay below (default: 0.01).")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder (default: runs/accuracy_<scene>_<hash>).")
+@click.option("--thorough", is_flag=True, help="Many more long runs: up to an hour.")
+@click.option("--apply", "write", is_flag=True, help="Write the answer into a copy of the scene, in the folder.")
+def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, write: bool) -> None:
+    """Tell what accuracy costs in time on SCENE, and the cheapest setting that can be trusted.
+
+    A study that was interrupted goes on where it was when the command is given again.
+    """
+    from conveyor_sim.accuracy.apply import apply
+    from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
+    from conveyor_sim.accuracy.tables import terminal
+    from conveyor_sim.report import plot_function
+    from conveyor_sim.resources import scene_path
+    from conveyor_sim.scene import load_scene
+
+    if not 0.0 < tolerance <= 0.5:
+        raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
+    path = scene_path(scene)
+    loaded = load_scene(path)
+    folder = out or study_folder(loaded)
+    click.echo(f"study of {loaded.name} in {folder}; Ctrl-C interrupts it, the same command goes on with it", err=True)
+    study = run_study(
+        loaded,
+        folder,
+        tolerance,
+        THOROUGH if thorough else DEFAULT,
+        lambda what, counted: ProgressBar(what, 0.0, counted=counted),
+    )
+    _print(terminal(study))
+    plot_accuracy = plot_function("plot_accuracy")
+    if plot_accuracy is not None:
+        for picture in plot_accuracy(study, folder):
+            click.echo(f"picture: {picture}")
+    click.echo(f"numbers: {folder}/study.json, and CSV files beside it")
+    if write and study.answer is not None:
+        copy = folder / path.name
+        apply(loaded, study.answer.setting, copy)
+        click.echo(f"scene with the setting: {copy}")
 
 
 @main.command()
@@ -186,7 +237,8 @@ def _print(content: RenderableType) -> None:
 
 
 def _account(scene: Scene, model: Model) -> Table:
-    """What a scene comes to: contents, effects and why, time step and why."""
+    """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
+    from conveyor_sim.explain import accuracy_rows
     from conveyor_sim.scene import initial_bottles
 
     table = Table.grid(padding=(0, 2))
@@ -196,10 +248,10 @@ def _account(scene: Scene, model: Model) -> Table:
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    table.add_row("time step", f"{model.dt:.3g} s: {model.dt_reason}")
-    for bound in model.bounds:
-        table.add_row("", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")
-    table.add_row("integrator", model.integrator)
+    for name, text in accuracy_rows(model):
+        table.add_row(name, text)
+    for index, bound in enumerate(model.bounds):
+        table.add_row("" if index else "bounds", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")
     for effect in model.effects:
         table.add_row("effect", f"{effect.name} {'on' if effect.on else 'off'}: {effect.why}")
     return table

@@ -1,8 +1,7 @@
-"""Tells why a scene is simulated as it is: its effects, its time step, and what each effect costs."""
+"""Tells why a scene is simulated as it is: its effects, its time step, its expected errors, what each effect costs."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE
@@ -12,20 +11,44 @@ from rich.table import Table
 
 from conveyor_sim.effects import EFFECTS
 from conveyor_sim.model import Model
+from conveyor_sim.prediction import percent
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.places import Places
+from conveyor_sim.timestep import fewest_steps
 
 if TYPE_CHECKING:
     from conveyor_sim.price import Price, PriceList
 
 
 def explanation(scene: Scene, model: Model) -> Group:
-    """Effects on and off with the lines that decide, bounds on dt with the one that rules, steps and integrator."""
+    """Effects on and off with the lines that decide, bounds on dt with the one that rules, steps, expected errors."""
     steps = Table.grid(padding=(0, 2))
     steps.add_row("scene", f"{model.name} ({scene.source_name})")
-    steps.add_row("time step", f"{_time(model.dt)}: {model.dt_reason}")
-    steps.add_row("integrator", model.integrator)
+    for name, text in accuracy_rows(model):
+        steps.add_row(name, text)
     return Group(_effects(scene, model), _bounds(scene, model), steps)
+
+
+def accuracy_rows(model: Model) -> list[tuple[str, str]]:
+    """What is chosen, what comes of it, and the errors to expect, each with its name."""
+    prediction = model.prediction
+    force = prediction.reason
+    if prediction.value is not None:
+        force = f"{percent(prediction.value)} in contact force: {prediction.reason}"
+    return [
+        ("accuracy", model.accuracy),
+        ("time step", f"{_time(model.dt)}: {model.dt_reason}"),
+        ("integrator", model.integrator),
+        ("predicted error", force),
+        *(("", f"{percent(term.value)} in {term.quantity}: {term.reason}") for term in prediction.terms),
+    ]
+
+
+def setting_line(model: Model) -> str:
+    """Integrator, time step and why, and the errors to expect, in one line."""
+    return (
+        f"{model.integrator}, dt = {_time(model.dt)} ({model.dt_reason}); predicted error: {model.prediction.sentence}"
+    )
 
 
 def price_table(prices: PriceList) -> Group:
@@ -93,8 +116,8 @@ def _bounds(scene: Scene, model: Model) -> Table | str:
         table.add_row(
             bound.name,
             _time(bound.dt),
-            str(max(1, math.ceil(scene.tick / bound.dt * (1.0 - 1e-12)))),
-            f"{bound.reason}{' (rules)' if rules else ''}",
+            str(fewest_steps(scene.tick, bound.dt)),
+            f"{bound.reason}{', for stability' if bound.stability else ''}{' (rules)' if rules else ''}",
         )
     return table
 

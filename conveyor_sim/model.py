@@ -1,6 +1,5 @@
 """Scene -> Model: the constant arrays, the chosen effects and why, the time step and its reason."""
 
-import math
 import platform
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -8,20 +7,19 @@ from importlib.metadata import version
 import llvmlite.binding as llvm
 import numpy as np
 
-from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects
+from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of, prediction_of
 from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.laws import build_laws
 from conveyor_sim.line.process_image import ProcessImage, process_image
 from conveyor_sim.plant import plant_grid, rail_arrays
+from conveyor_sim.prediction import Impact, Prediction
+from conveyor_sim.presets import target
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound, steps_per_tick
+from conveyor_sim.timestep import Bound, fewest_steps, steps_per_tick
 from conveyor_sim.version import __version__, sources_hash
-
-STEP_ERROR = 1e-6
-"""m/s, default of the largest error of a step."""
 
 SKIN = 0.2
 """Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""
@@ -38,6 +36,12 @@ class Model:
     tick_ns: int
     dt_reason: str
     bounds: tuple[Bound, ...]
+    """For the preset or tolerance of the scene; `standard` where it gives the time step itself."""
+    accuracy: str
+    """What the scene chooses, in words."""
+    impacts: tuple[Impact, ...]
+    """The hardest that are expected, of each pair of types and materials."""
+    prediction: Prediction
     integrator: str
     effects: tuple[EffectChoice, ...]
     belts: tuple[str, ...]
@@ -91,15 +95,23 @@ def build_model(scene: Scene) -> Model:
     laws = build_laws(scene, rail_materials, on)
     skin = SKIN * float(radius.min())
     segments, arcs = rail_arrays(rails, rail_materials)
-    bounds = bounds_of(Terms(scene, laws, on))
-    steps, reason = steps_per_tick(scene.tick, list(bounds), _given_steps(scene))
+    aim = target(scene.accuracy)
+    terms = Terms(scene, laws, on, aim.tolerance)
+    impacts = impacts_of(terms)
+    bounds = bounds_of(terms, impacts)
+    given = _given_steps(scene)
+    steps, reason = steps_per_tick(scene.tick, bounds, given, aim.words)
+    dt = scene.tick_ns * 1e-9 / steps
     return Model(
         name=scene.name,
-        dt=scene.tick_ns * 1e-9 / steps,
+        dt=dt,
         steps_per_tick=steps,
         tick_ns=scene.tick_ns,
         dt_reason=reason,
         bounds=bounds,
+        accuracy=aim.words if given is None else f"given, {_given_words(scene)}",
+        impacts=impacts,
+        prediction=prediction_of(terms, impacts, dt),
         integrator=scene.accuracy.integrator,
         effects=effects,
         belts=tuple(scene.belts),
@@ -122,7 +134,7 @@ def build_model(scene: Scene) -> Model:
             rail_materials=len(rail_materials),
             reach=2.0 * float(radius[0]),
             atan=1 if "atan_friction" in on else None,
-            error=STEP_ERROR if scene.accuracy.error is None else scene.accuracy.error,
+            error=terms.step_error,
         ),
         pair_law=laws.pair,
         rail_law=laws.rail,
@@ -146,8 +158,13 @@ def build_model(scene: Scene) -> Model:
 def _given_steps(scene: Scene) -> int | None:
     """Steps a tick that the scene itself gives."""
     if scene.accuracy.dt is not None:
-        return max(1, math.ceil(scene.tick / scene.accuracy.dt * (1.0 - 1e-12)))
+        return fewest_steps(scene.tick, scene.accuracy.dt)
     return scene.accuracy.per_tick
+
+
+def _given_words(scene: Scene) -> str:
+    accuracy = scene.accuracy
+    return f"{accuracy.per_tick} steps a tick" if accuracy.dt is None else f"at most {accuracy.dt * 1e6:g} us"
 
 
 def _largest(radii: F8 | None) -> float:

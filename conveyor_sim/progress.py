@@ -43,6 +43,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self._counted = counted
         self._console = console or Console(file=sys.stderr, markup=False)
         self._start: tuple[float, float] | None = None
+        self._left: float | None = None
         self._next_line = PLAIN_SHARE * total
         self._bar: Progress | None = None
         if self._console.is_terminal:
@@ -57,8 +58,12 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self._task = self._bar.add_task(what, total=total, state="")
             self._bar.start()
 
-    def update(self, done: float, total: float | None = None) -> None:
-        """`done`: simulated time so far, s; `total`: the whole, where it was not known at first."""
+    def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
+        """`done`: simulated time so far, s; `total`: the whole, where it was not known at first.
+
+        `left`: s of wall time to go, where the caller knows better than what is done so far tells.
+        """
+        self._left = left
         if self._start is None:  # building and compiling come before the first tick and would look like slowness
             self._start = (time.monotonic(), done)
         if total is not None and total != self._total:
@@ -71,7 +76,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def _state(self, done: float) -> str:
         if self._counted:
-            return f"{done:.0f} of {self._total:.0f} {self._counted}"
+            left = "" if self._left is None else f", about {self._left:.0f} s left"
+            return f"{done:.0f} of {self._total:.0f} {self._counted}{left}"
         start, already = self._start or (time.monotonic(), done)
         wall = max(time.monotonic() - start, 1e-9)
         return f"{done:.1f} of {self._total:.1f} s, {(done - already) / wall:.3g} x real time"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
+from conveyor_sim.achieved import PeakWatch
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import Scene
@@ -29,6 +30,8 @@ class Run:
     """s, from the first tick to the end of the recording; kernels not compiled yet (`compile_kernels`) are in it."""
     interrupted: bool
     """Ended early by Ctrl-C or a request to terminate."""
+    peak_force: float | None
+    """N, the largest normal contact force; None where the scene has no effect `peaks`."""
 
 
 def run_scene(
@@ -45,16 +48,18 @@ def run_scene(
     with recorder or nullcontext(), _stop_request() as stop:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()
+        peaks = PeakWatch(simulation)
         start = time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             simulation.advance(1)
             outputs.after_tick()
+            peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)
         if recorder is not None:
             recorder.close()
         wall = time.monotonic() - start
-        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set())
+        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force)
 
 
 @contextmanager

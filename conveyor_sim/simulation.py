@@ -194,6 +194,12 @@ class Simulation:
             impulse=world.peaks.impulse[slots] if world.peaks is not None else unknown,
         )
 
+    @property
+    def peak_force(self) -> float | None:
+        """Largest normal contact force since bottles were last output, N; None without the effect `peaks`."""
+        peaks = self._state.world.peaks
+        return None if peaks is None else float(peaks.force.max(initial=0.0))
+
     def contacts(self) -> ContactColumns:
         """Every closed contact at this tick, with the forces that act now."""
         room = 64
@@ -308,7 +314,7 @@ class Simulation:
             raise SimulationError(
                 f"bottle {bottles.id[bad].min()} has no finite position or velocity "
                 f"after the tick that began at {self.time:g} s: "
-                f"dt = {self.model.dt:g} s is too long for this scene ({self.model.dt_reason}); raise step.per_tick"
+                f"dt = {self.model.dt:g} s is too long for this scene ({self.model.dt_reason}); choose a finer accuracy"
             )
 
 

@@ -1,6 +1,7 @@
 """State: the only thing that changes. Slots for bottles, the lists between them, the belts' speeds."""
 
 import heapq
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,29 +9,35 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays import (
     F8,
+    Blocks,
     Bottles,
     ContactLaw,
     Footing,
     Implicit,
+    Linear,
     Load,
     Near,
     NearSprings,
     Neighbourhood,
     Pairs,
     PairSprings,
+    PairTangent,
     Peaks,
     Ring,
+    Slopes,
     Slots,
     Spin,
     Stage,
     Surface,
+    Triple,
     World,
 )
-from conveyor_sim.engine.integrators import STAGED
+from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
 from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
 from conveyor_sim.engine.slots import WIDTH
+from conveyor_sim.engine.team import UNIT
 from conveyor_sim.model import Model
 from conveyor_sim.plant import belt_arrays, listed
 
@@ -200,6 +207,7 @@ class State:
             normal=forces(model.has("peaks")),
             touch=forces(model.has("implicit_friction")),
             spring=_pair_springs(entries) if law.tangential_stiffness is not None else None,
+            tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
         )
 
     def _near(self, slots: int, entries: int, before: Near | None = None) -> Near:
@@ -235,6 +243,8 @@ class State:
             load=Load(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
             peaks=Peaks(reals(), reals()) if peaks else None,
             stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
+            slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
+            linear=_linear(slots) if model.integrator in LINEAR else None,
             implicit=Implicit(reals(), reals(), reals()) if model.has("implicit_friction") else None,
             neighbourhood=Neighbourhood(
                 x=reals(),
@@ -282,6 +292,51 @@ class State:
             turn=np.zeros(slots) if self.model.has("curved_belts") else None,
             pull=np.zeros(slots),
         )
+
+
+def _slopes(stages: int, slots: int, peaks: bool) -> Slopes:
+    def of_stages() -> F8:
+        return np.zeros((stages, slots))
+
+    return Slopes(
+        x=np.zeros(slots),
+        y=np.zeros(slots),
+        vx=np.zeros(slots),
+        vy=np.zeros(slots),
+        omega=np.zeros(slots),
+        ax=of_stages(),
+        ay=of_stages(),
+        alpha=of_stages(),
+        normal=of_stages() if peaks else None,
+        error=np.zeros(slots),
+        progress=np.zeros(3),
+    )
+
+
+def _linear(slots: int) -> Linear:
+    units = slots // UNIT + 1
+
+    def columns(count: int) -> Iterator[F8]:
+        return (np.zeros(slots) for _ in range(count))
+
+    return Linear(
+        x=np.zeros(slots),
+        y=np.zeros(slots),
+        own=Blocks(*columns(6)),
+        inverse=Blocks(*columns(6)),
+        change=Triple(*columns(3)),
+        left=Triple(*columns(3)),
+        way=Triple(*columns(3)),
+        product=Triple(*columns(3)),
+        left_sum=np.zeros(units),
+        way_sum=np.zeros(units),
+        most=np.zeros(units),
+    )
+
+
+def _pair_tangent(entries: int) -> PairTangent:
+    nx, ny, normal, tangential, arm_i, arm_j = (np.zeros(entries) for _ in range(6))
+    return PairTangent(nx, ny, normal, tangential, arm_i, arm_j, np.zeros(entries // UNIT + 1))
 
 
 def _slots(slots: int, entries: int) -> Slots:

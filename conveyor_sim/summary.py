@@ -14,9 +14,14 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
+from conveyor_sim.achieved import Achieved, achieved
 from conveyor_sim.bag.messages import BOTTLES, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
+from conveyor_sim.errors import SceneError
+from conveyor_sim.model import Model, build_model
 from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.observe.itinerary import Itinerary
+from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
 
@@ -78,6 +83,12 @@ class Summary:
     """N, the largest normal contact force of the run (accumulated every step); None if the scene has no peaks."""
     peak_force_99: float | None
     """N, 99th percentile over bottles and output intervals with a contact of the peak force in the interval."""
+    setting: str
+    """Integrator and time step, and why."""
+    predicted: str | None
+    """The errors to expect; None if the scene was recorded by a version that chose another time step."""
+    achieved: Achieved | None
+    """What the peak force says; None if it or the prediction is not known."""
     commands: int
     refused: int
     """Of the commands."""
@@ -110,7 +121,7 @@ class _Tally:
         self._bag = bag
         self._topics: dict[str, list[int]] = {topic: [0, 0] for topic in bag.counts}
         self._last_tick = 0
-        self._itinerary = _Itinerary(len(bag.line.belts))
+        self._itinerary = Itinerary(len(bag.line.belts))
         self._forces: list[NDArray[np.float64]] = []
         self._unknown = False
         self._bottles: BottleColumns | None = None
@@ -137,8 +148,10 @@ class _Tally:
     def summary(self, wall: float | None) -> Summary:
         forces = np.concatenate(self._forces) if self._forces else np.zeros(0)
         belt = np.zeros(0, dtype=np.int32) if self._bottles is None else self._bottles.belt
+        peak = None if self._unknown else float(forces.max(initial=0.0))
+        line, model = self._bag.line, _model(self._bag.line)
         return Summary(
-            scene=self._bag.line.scene_name,
+            scene=line.scene_name,
             bag=str(self._bag.path),
             simulated=self._bag.time(self._last_tick),
             wall=wall,
@@ -148,8 +161,11 @@ class _Tally:
             on_floor=int(np.count_nonzero(belt < 0)),
             belts=self._belts(belt),
             loop=self._loop(),
-            peak_force=None if self._unknown else float(forces.max(initial=0.0)),
+            peak_force=peak,
             peak_force_99=None if self._unknown else float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
+            setting=f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}",
+            predicted=None if model is None else model.prediction.sentence,
+            achieved=None if model is None else achieved(model, peak),
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
@@ -178,50 +194,14 @@ class _Tally:
         return Loop(self._bag.line.belts[index], len(returns[index]), *rates)
 
 
-class _Itinerary:
-    """When bottles came onto belts, and back onto them."""
-
-    def __init__(self, belts: int) -> None:
-        self.entries: list[list[float]] = [[] for _ in range(belts)]
-        """Times by belt, s, at which a bottle came onto it from elsewhere on the line or from an infeed."""
-        self.returns: list[list[float]] = [[] for _ in range(belts)]
-        """Those of them at which it had been on the belt before, and on at least two other belts since."""
-        self._since: dict[int, dict[int, set[int]]] = {}
-        """By bottle, then by belt it has been on: the other belts it has been on since."""
-        self._ids = np.zeros(0, dtype=np.uint64)
-        self._belt = np.zeros(0, dtype=np.int32)
-        self._first: float | None = None
-        self._last = 0.0
-
-    def take(self, time: float, bottles: BottleColumns) -> None:
-        """The next recorded Bottles."""
-        stayed = np.zeros(len(bottles.id), dtype=bool)
-        if len(self._ids):
-            at = np.searchsorted(self._ids, bottles.id).clip(max=len(self._ids) - 1)
-            stayed = (self._ids[at] == bottles.id) & (self._belt[at] == bottles.belt)
-        for index in np.flatnonzero(~stayed & (bottles.belt >= 0)):
-            self._enter(int(bottles.id[index]), int(bottles.belt[index]), time)
-        self._ids, self._belt = bottles.id, bottles.belt
-        self._first = time if self._first is None else self._first
-        self._last = time
-
-    def _enter(self, bottle: int, belt: int, time: float) -> None:
-        since = self._since.setdefault(bottle, {})
-        if self._first is not None:  # what stands on a belt at the start has not come onto it
-            self.entries[belt].append(time)
-            if len(since.get(belt, ())) >= 2:
-                self.returns[belt].append(time)
-        for others in since.values():
-            others.add(belt)
-        since[belt] = set()
-
-    def per_minute(self, times: list[float]) -> tuple[float, float]:
-        """Rates over the whole recording and over its second half, 1/min."""
-        if self._first is None or self._last <= self._first:
-            return 0.0, 0.0
-        span = self._last - self._first
-        late = sum(time > self._first + 0.5 * span for time in times)
-        return 60.0 * len(times) / span, 120.0 * late / span
+def _model(line: Any) -> Model | None:
+    """The model of a recorded scene; None if this version would simulate it in another way."""
+    try:
+        model = build_model(parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides)))
+    except SceneError:
+        return None
+    same = (model.integrator, model.steps_per_tick) == (line.integrator, line.steps_per_tick)
+    return model if same else None
 
 
 def render(summary: Summary) -> Group:
@@ -260,6 +240,9 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("bottles", f"{fed} fed, {removed} removed, {summary.present} present ({summary.on_floor} on no belt)"),
         ("loop", loop),
         ("contact force", force),
+        ("setting", summary.setting),
+        ("predicted error", "not known" if summary.predicted is None else summary.predicted),
+        ("achieved", "not known" if summary.achieved is None else summary.achieved.sentence),
         ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
     ]
 

@@ -1,15 +1,8 @@
 """What bounds the time step, and the choice of steps a tick. All bounds in s; references are to docs/paper.md."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-STEPS_PER_CONTACT = 20
-"""Steps that a contact should last: at most 0.1 % error in the rebound."""
-
-STEPS_PER_SLIP = 20
-"""Steps in v_lim / (mu g). Chatter starts at 1, but semi-implicit Euler loses one part in as many of a bottle's creep
-on a turn-table (test/physics/test_turntable.py): here 5 %."""
-
 
 HERTZ_TIME = 2.0 * math.sqrt(math.pi) * math.gamma(1.4) / math.gamma(0.9)
 """2.943, duration of a Hertz contact in units of the deepest overlap over the speed of impact."""
@@ -23,6 +16,16 @@ class Bound:
     dt: float
     """s"""
     reason: str
+    stability: bool = False
+    """Whether steps beyond it blow up or chatter; else they are only less exact."""
+
+
+def least_steps(tolerance: float) -> float:
+    """Steps that a contact, and v_lim / (mu g), last at least: 20 at 1 %, as errors of second order fall.
+
+    tolerance: relative error in contact force. A peak between two of so many steps is missed by a third of it.
+    """
+    return 2.0 / math.sqrt(tolerance)
 
 
 def contact_time(stiffness: float, reduced_mass: float) -> float:
@@ -39,14 +42,14 @@ def hertz_contact_time(stiffness: float, reduced_mass: float, speed: float) -> f
     return HERTZ_TIME * deepest / speed
 
 
-def contact_bound(stiffness: float, reduced_mass: float) -> float:
-    """Step that gives a contact STEPS_PER_CONTACT steps, s."""
-    return contact_time(stiffness, reduced_mass) / STEPS_PER_CONTACT
-
-
 def lattice_bound(stiffness: float, mass: float) -> float:
-    """Stability limit of a hexagonal packing, 2 / sqrt(6 k / m), in s."""
-    return 2.0 / math.sqrt(6.0 * stiffness / mass)
+    """Half of the stability limit of a hexagonal packing, 2 / sqrt(6 k / m), in s."""
+    return 1.0 / math.sqrt(6.0 * stiffness / mass)
+
+
+def wedge_bound(stiffness: float, mass: float) -> float:
+    """Half of the stability limit of a bottle between two rails, 2 / sqrt(2 k / m), in s."""
+    return 1.0 / math.sqrt(2.0 * stiffness / mass)
 
 
 def damping_bound(coefficient: float, reduced_mass: float) -> float:
@@ -54,9 +57,14 @@ def damping_bound(coefficient: float, reduced_mass: float) -> float:
     return 0.5 * reduced_mass / coefficient
 
 
+def slip_time(friction: float, gravity: float, slip_limit: float) -> float:
+    """v_lim / (mu g), s: explicit friction under a bottle chatters in steps longer than that."""
+    return slip_limit / (friction * gravity)
+
+
 def base_friction_bound(friction: float, gravity: float, slip_limit: float) -> float:
-    """Step that takes STEPS_PER_SLIP to v_lim / (mu g), s; beyond that time explicit friction chatters."""
-    return slip_limit / (friction * gravity) / STEPS_PER_SLIP
+    """Half of v_lim / (mu g), s."""
+    return 0.5 * slip_time(friction, gravity, slip_limit)
 
 
 def contact_friction_bound(
@@ -66,17 +74,39 @@ def contact_friction_bound(
     return slip_limit / (2.0 * friction * (1.0 / mass + radius**2 / inertia) * normal_force)
 
 
-def steps_per_tick(tick: float, bounds: list[Bound], given: int | None) -> tuple[int, str]:
-    """Steps in a tick of `tick` s, and why: as given, or the fewest that keep every bound."""
+def steps_per_tick(tick: float, bounds: Sequence[Bound], given: int | None, choice: str) -> tuple[int, str]:
+    """Steps in a tick of `tick` s, and why: as given, or the fewest that keep every bound.
+
+    choice: what the bounds are for, in words.
+    """
     if not bounds:
         if given is not None:
-            return given, f"{given} steps a tick, given in the scene; nothing in it bounds the time step"
+            return given, f"{_counted(given)}, given in the scene; nothing in it bounds the time step"
         return 1, "1 step a tick: nothing in the scene bounds the time step"
     tightest = min(bounds, key=lambda bound: bound.dt)
-    ruling = f"{tightest.name}: {tightest.dt * 1e6:.4g} us, {tightest.reason}"
+    fewest = fewest_steps(tick, tightest.dt)
     if given is None:
-        steps = max(1, math.ceil(tick / tightest.dt * (1.0 - 1e-12)))
-        return steps, f"{steps} steps a tick, the fewest within the tightest bound ({ruling})"
-    dt = tick / given
-    verdict = "within" if dt <= tightest.dt else f"{dt / tightest.dt:.2g} x beyond"
-    return given, f"{given} steps a tick, given in the scene; {verdict} the tightest bound ({ruling})"
+        return fewest, f"{_counted(fewest)}: {choice}, ruled by {_told(tightest)}"
+    return given, f"{_counted(given)}, given in the scene; {_verdict(tick / given, bounds)}; {choice} takes {fewest}"
+
+
+def fewest_steps(tick: float, dt: float) -> int:
+    """Steps that divide a tick (s) so that none is longer than dt (s)."""
+    return max(1, math.ceil(tick / dt * (1.0 - 1e-12)))
+
+
+def _verdict(dt: float, bounds: Sequence[Bound]) -> str:
+    stable = min((bound for bound in bounds if bound.stability), key=lambda bound: bound.dt, default=None)
+    if stable is None:
+        return "nothing bounds it for stability"
+    if dt <= stable.dt:
+        return "within every bound of stability"
+    return f"{dt / stable.dt:.2g} x beyond the bound of stability by {_told(stable)}"
+
+
+def _told(bound: Bound) -> str:
+    return f"{bound.name} ({bound.dt * 1e6:.4g} us, {bound.reason})"
+
+
+def _counted(steps: int) -> str:
+    return "1 step a tick" if steps == 1 else f"{steps} steps a tick"

@@ -1,12 +1,15 @@
 """What `explain` tells: each effect with the line that decides, the bounds and the one that rules, prices."""
 
+import math
+
 import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
 from conveyor_sim.cli import main
-from conveyor_sim.explain import explanation, price_table
+from conveyor_sim.explain import explanation, price_table, setting_line
 from conveyor_sim.model import build_model
+from conveyor_sim.prediction import WHOLE_SCENE, percent
 from conveyor_sim.price import ALL, Price, PriceList
 from conveyor_sim.scene import parse_scene
 
@@ -67,13 +70,35 @@ def test_what_is_not_in_the_file_has_no_line() -> None:
 
 def test_bounds_are_told_with_the_one_that_rules() -> None:
     lines = explained(TEXT.replace("friction: 0.1", "friction: 0.0"))
-    names = ("base friction", "contact time", "lattice stability")
+    names = ("base slip", "impact of two bottles", "base friction 1.274 ms", "lattice stability")
     rows = [line for line in lines if line.startswith(names)]
-    assert [row.startswith(name) for row, name in zip(rows, names, strict=True)] == [True] * 3
+    assert [row.startswith(name) for row, name in zip(rows, names, strict=True)] == [True] * 4
     assert rows[0].endswith("79 20 steps in v_lim / (mu g) at mu = 0.4 (rules)")
+    assert rows[3].endswith("a hexagonal packing at k = 5000 N/m, for stability")
     assert not any(row.endswith("(rules)") for row in rows[1:])
     assert "integrator semi_implicit_euler" in lines
-    assert any(line.startswith("time step 126.6 us: 79 steps a tick, the fewest") for line in lines)
+    assert "accuracy standard (1 % in contact force)" in lines
+    assert any(line.startswith("time step 126.6 us: 79 steps a tick: standard (1 % in") for line in lines)
+
+
+MISSED = percent(WHOLE_SCENE * 0.6 * (math.pi / 14.05) ** 2 / 8)
+"""14 ms of contact without damping in steps of 1 ms."""
+
+
+def test_the_errors_to_expect_are_told_with_their_reasons() -> None:
+    lines = explained(TEXT.replace("duration: 1.0", "duration: 1.0\naccuracy: {per_tick: 10}"))
+    (force,) = [line for line in lines if line.startswith("predicted error")]
+    impact = "impact of two bottles, 14 steps a contact, peak between steps"
+    assert force.startswith(f"predicted error {MISSED} in contact force: {impact}")
+    assert any(line.startswith("0.32 % in tangential speed after an impact: 14 steps an impact") for line in lines)
+
+
+def test_a_setting_in_one_line() -> None:
+    scene = parse_scene(TEXT, "plant.yaml", {"accuracy": {"per_tick": 10}})
+    line = setting_line(build_model(scene))
+    assert "\n" not in line
+    assert line.startswith("semi_implicit_euler, dt = 1 ms (10 steps a tick, given in the scene; ")
+    assert line.endswith("; predicted error: 0.37 % in contact force, 0.32 % in tangential speed after an impact")
 
 
 def test_a_scene_without_bounds() -> None:

@@ -9,15 +9,15 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
-    ["errors", "version"],
-    ["engine", "scene", "timestep", "resources", "restitution"],
-    ["surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
-    ["plant", "effects"],
+    ["errors", "version", "machine"],
+    ["engine", "scene", "timestep", "methods", "resources", "restitution"],
+    ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
+    ["plant", "presets", "effects"],
     ["model"],
     ["state"],
     ["line"],
     ["simulation"],
-    ["bag", "price", "accuracy"],
+    ["bag", "price", "accuracy", "achieved"],
     ["progress", "summary", "plot", "explain"],
     ["runner", "report"],
     ["ros"],

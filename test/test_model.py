@@ -30,10 +30,13 @@ def test_bounds_of_the_papers_test_case() -> None:
     )
     # The rail's contact is as long as the pair's: twice the stiffness, twice the reduced mass.
     assert found == {
-        "contact time": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
-        "lattice stability": pytest.approx(2.0 / math.sqrt(6.0 * 5e3 / MASS)),
+        "impact of two bottles": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
+        "impact of a bottle and a rail": pytest.approx(math.pi * math.sqrt(0.1 / 5e3) / 20),
+        "lattice stability": pytest.approx(1.0 / math.sqrt(6.0 * 5e3 / MASS)),
+        "rail stability": pytest.approx(1.0 / math.sqrt(2.0 * 10e3 / MASS)),
         "paper damping": pytest.approx(0.5 * (MASS / 2) / 0.1),
-        "base friction": pytest.approx(0.01 / (0.4 * 9.81) / 20),
+        "base friction": pytest.approx(0.5 * 0.01 / (0.4 * 9.81)),
+        "base slip": pytest.approx(0.01 / (0.4 * 9.81) / 20),
         "contact friction": pytest.approx(MASS * 0.01 / (4 * 0.1 * (100 * 0.4 * MASS * 9.81))),
     }
 
@@ -50,11 +53,11 @@ def test_bounds_take_the_tightest_of_types_and_materials() -> None:
         "bottles": [bottle(0.0, 0.0, type="heavy"), bottle(1.0, 0.0, type="light")],
     }
     without = bounds(**fields)
-    assert without["contact time"] == pytest.approx(math.pi * math.sqrt(0.01 / 4e3) / 20)
-    assert without["lattice stability"] == pytest.approx(2.0 / math.sqrt(6.0 * 4e3 / 0.02))
-    assert without["base friction"] == pytest.approx(0.01 / (0.7 * 9.81) / 20)
+    assert without["impact of two bottles"] == pytest.approx(math.pi * math.sqrt(0.01 / 4e3) / 20)
+    assert without["lattice stability"] == pytest.approx(1.0 / math.sqrt(6.0 * 4e3 / 0.02))
+    assert without["base slip"] == pytest.approx(0.01 / (0.7 * 9.81) / 20)
     railed = bounds(**fields, rails={"edge": segment((0.0, 6.0), (1.0, 6.0))})
-    assert railed["contact time"] == pytest.approx(math.pi * math.sqrt(0.02 / 90e3) / 20)
+    assert railed["impact of a bottle and a rail"] == pytest.approx(math.pi * math.sqrt(0.02 / 90e3) / 20)
     # Two bottles press with at most 2 mu m g of the heavy one; the light one turns more easily, 1/m + R^2/J = 50 + 90.
     force = 2 * 0.7 * MASS * 9.81
     assert railed["contact friction"] == pytest.approx(0.01 / (2 * 0.3 * (50 + 90) * force))
@@ -62,10 +65,11 @@ def test_bounds_take_the_tightest_of_types_and_materials() -> None:
 
 def test_what_is_absent_does_not_bound() -> None:
     assert bounds(bottles=TWO[:1], floor="none") == {}
-    assert set(bounds(bottles=TWO, contacts=[contact(1e3)], floor="none")) == {"contact time", "lattice stability"}
+    elastic = {"impact of two bottles", "lattice stability"}
+    assert set(bounds(bottles=TWO, contacts=[contact(1e3)], floor="none")) == elastic
     frictionless = bounds(bottles=TWO, contacts=[contact(1e3, friction=0.2)], floor="none")
-    assert set(frictionless) == {"contact time", "lattice stability"}
-    assert set(bounds(bottles=TWO[:1], floor={"friction": 0.3})) == {"base friction"}
+    assert set(frictionless) == elastic
+    assert set(bounds(bottles=TWO[:1], floor={"friction": 0.3})) == {"base friction", "base slip"}
 
 
 def test_chosen_steps_keep_every_bound() -> None:
@@ -73,7 +77,8 @@ def test_chosen_steps_keep_every_bound() -> None:
     assert model.dt * model.steps_per_tick == pytest.approx(0.01)
     tightest = min(bound.dt for bound in model.bounds)
     assert model.dt <= tightest < 0.01 / (model.steps_per_tick - 1)
-    assert model.dt_reason.startswith(f"{model.steps_per_tick} steps a tick, the fewest within the tightest bound")
+    ruled = f"{model.steps_per_tick} steps a tick: standard (1 % in contact force), ruled by "
+    assert model.dt_reason.startswith(ruled)
     assert min(model.bounds, key=lambda bound: bound.dt).reason in model.dt_reason
 
 
@@ -82,7 +87,14 @@ def test_given_steps_are_told() -> None:
     assert model.steps_per_tick == 3
     assert model.dt == pytest.approx(0.01 / 3)
     assert "given in the scene" in model.dt_reason
-    assert "beyond the tightest bound" in model.dt_reason
+    assert "beyond the bound of stability by contact friction" in model.dt_reason
+    assert model.accuracy == "given, 3 steps a tick"
+
+
+def test_a_longest_step_is_kept_with_the_fewest_steps() -> None:
+    model = build_model(scene(**line(accuracy={"dt": 0.0003})))
+    assert model.steps_per_tick == 34
+    assert model.accuracy == "given, at most 300 us"
 
 
 def test_types_and_names_are_in_the_scenes_order() -> None:

@@ -28,6 +28,14 @@ def test_run_records_the_whole_duration(tmp_path: Path) -> None:
     assert report.last_tick == 100
 
 
+def test_the_largest_force_is_that_of_the_recording(tmp_path: Path) -> None:
+    run = run_scene(load_scene(SMALL_LINE), tmp_path / "run")
+    alone = run_scene(load_scene(SMALL_LINE), None)
+    with open_bag(tmp_path / "run") as bag:
+        assert run.peak_force == max(frame.data.peak_force.max() for frame in bag.bottles())
+    assert alone.peak_force == run.peak_force
+
+
 def test_recorded_state_is_that_of_the_bare_simulation(tmp_path: Path) -> None:
     scene = load_scene(SMALL_LINE)
     run_scene(scene, tmp_path / "run")

@@ -11,6 +11,7 @@ from bag.small_line import SMALL_LINE, record
 from rich.console import Console
 
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.summary import render, summarize, write_summary
 
@@ -61,6 +62,27 @@ def test_forces_are_of_all_recorded_peaks(bag: Path) -> None:
     summary = summarize(bag)
     assert summary.peak_force == peaks.max() > 0.0
     assert summary.peak_force_99 == np.percentile(peaks[peaks > 0.0], 99.0)
+
+
+def test_the_prediction_is_told_with_what_was_reached(bag: Path) -> None:
+    summary = summarize(bag)
+    model = build_model(load_scene(SMALL_LINE))
+    assert summary.setting == f"semi_implicit_euler, dt = 100 us: {model.dt_reason}"
+    assert summary.predicted == model.prediction.sentence
+    assert summary.achieved is not None
+    assert summary.achieved.peak_force == summary.peak_force
+    assert summary.achieved.expected_force == model.prediction.force
+
+
+def test_a_recording_in_other_steps_than_this_version_chooses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
+    def shorten(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.steps_per_tick += 1
+
+    summary = summarize(edited(bag, tmp_path / "older", shorten))
+    assert summary.predicted is None
+    assert summary.achieved is None
+    assert summary.peak_force is not None
 
 
 def test_messages_and_bytes_are_counted_by_topic(bag: Path) -> None:
@@ -121,5 +143,15 @@ def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
         console.print(render(summary))
     text = captured.get()
     bottles = f"{summary.fed} fed, {summary.removed} removed, {summary.present} present"
-    for words in ("small_line", "real-time factor", "0.50", bottles, "straight", "signals", "2 refused"):
+    for words in (
+        "small_line",
+        "in contact force",
+        "peak force",
+        "real-time factor",
+        "0.50",
+        bottles,
+        "straight",
+        "signals",
+        "2 refused",
+    ):
         assert words in text

@@ -7,13 +7,16 @@ import pytest
 from conveyor_sim.timestep import (
     Bound,
     base_friction_bound,
-    contact_bound,
     contact_friction_bound,
     contact_time,
     damping_bound,
+    fewest_steps,
     hertz_contact_time,
     lattice_bound,
+    least_steps,
+    slip_time,
     steps_per_tick,
+    wedge_bound,
 )
 
 
@@ -21,10 +24,12 @@ def test_the_bounds_are_their_formulae() -> None:
     """With the paper's bottles: 5 kN/m, 0.2 kg, J = m R^2, mu 0.4 on belts, 0.1 in contacts, v_lim = 10 mm/s."""
     k, m, r = 5000.0, 0.2, 0.065
     assert contact_time(k, m / 2) == pytest.approx(math.pi * math.sqrt(0.1 / k))
-    assert contact_bound(k, m / 2) == pytest.approx(contact_time(k, m / 2) / 20)
-    assert lattice_bound(k, m) == pytest.approx(2.0 / math.sqrt(6.0 * k / m))
+    # Half of the limits of stability, 2 / w.
+    assert lattice_bound(k, m) == pytest.approx(0.5 * 2.0 / math.sqrt(6.0 * k / m))
+    assert wedge_bound(k, m) == pytest.approx(0.5 * 2.0 / math.sqrt(2.0 * k / m))
     assert damping_bound(0.1, m / 2) == pytest.approx(0.5 * (m / 2) / 0.1)
-    assert base_friction_bound(0.4, 9.81, 0.01) == pytest.approx(0.01 / (0.4 * 9.81) / 20)
+    assert slip_time(0.4, 9.81, 0.01) == pytest.approx(0.01 / (0.4 * 9.81))
+    assert base_friction_bound(0.4, 9.81, 0.01) == pytest.approx(0.5 * 0.01 / (0.4 * 9.81))
     # With J = m R^2 it is m v_lim / (4 mu N).
     force = 100 * 0.4 * m * 9.81
     assert contact_friction_bound(0.1, force, m, m * r**2, r, 0.01) == pytest.approx(m * 0.01 / (4 * 0.1 * force))
@@ -38,34 +43,51 @@ def test_a_hertz_contact_is_shorter_the_faster() -> None:
     assert hertz_contact_time(k, m, 64.0) == pytest.approx(hertz_contact_time(k, m, 2.0) / 2.0)
 
 
-BOUNDS = [Bound("slow", 3e-4, "because it is slow"), Bound("tight", 1.1e-4, "because it is tight")]
+def test_steps_that_a_tolerance_asks_for() -> None:
+    """20 at 1 %; errors of second order fall as the tolerance does."""
+    assert least_steps(0.01) == pytest.approx(20.0)
+    for tolerance in (0.05, 0.01, 0.001):
+        assert (math.pi / least_steps(tolerance)) ** 2 / 8 == pytest.approx(math.pi**2 / 32 * tolerance)
+
+
+BOUNDS = [
+    Bound("slow", 3e-4, "because it is slow", stability=True),
+    Bound("tight", 1.1e-4, "because it is tight"),
+]
+CHOICE = "standard (1 % in contact force)"
 
 
 def test_the_fewest_steps_within_every_bound_are_chosen() -> None:
-    steps, reason = steps_per_tick(0.01, BOUNDS, None)
+    steps, reason = steps_per_tick(0.01, BOUNDS, None, CHOICE)
     assert steps == 91
     assert 0.01 / steps <= 1.1e-4 < 0.01 / (steps - 1)
-    assert reason == "91 steps a tick, the fewest within the tightest bound (tight: 110 us, because it is tight)"
+    assert reason == "91 steps a tick: standard (1 % in contact force), ruled by tight (110 us, because it is tight)"
 
 
 def test_a_tick_that_is_a_whole_number_of_bounds_takes_no_step_more() -> None:
     for n in range(1, 2000):
-        assert steps_per_tick(0.01, [Bound("b", 0.01 / n, "")], None)[0] == n
-    assert steps_per_tick(0.01, [Bound("b", 1.0, "")], None)[0] == 1
+        assert fewest_steps(0.01, 0.01 / n) == n
+    assert fewest_steps(0.01, 1.0) == 1
 
 
-def test_a_given_number_is_taken_and_judged() -> None:
-    steps, reason = steps_per_tick(0.01, BOUNDS, 200)
-    assert (steps, reason) == (
-        200, "200 steps a tick, given in the scene; within the tightest bound (tight: 110 us, because it is tight)",
-    )  # fmt: skip
-    steps, reason = steps_per_tick(0.01, BOUNDS, 20)
-    assert steps == 20
-    assert reason.startswith("20 steps a tick, given in the scene; 4.5 x beyond the tightest bound (tight: 110 us")
+def test_a_given_number_is_taken_and_judged_by_stability() -> None:
+    """How exact it is, the prediction tells."""
+    assert steps_per_tick(0.01, BOUNDS, 40, CHOICE) == (
+        40,
+        "40 steps a tick, given in the scene; within every bound of stability; "
+        "standard (1 % in contact force) takes 91",
+    )
+    assert steps_per_tick(0.01, BOUNDS, 20, CHOICE) == (
+        20,
+        "20 steps a tick, given in the scene; "
+        "1.7 x beyond the bound of stability by slow (300 us, because it is slow); "
+        "standard (1 % in contact force) takes 91",
+    )
+    assert "nothing bounds it for stability" in steps_per_tick(0.01, BOUNDS[1:], 1, CHOICE)[1]
 
 
 def test_without_bounds() -> None:
-    assert steps_per_tick(0.01, [], None) == (1, "1 step a tick: nothing in the scene bounds the time step")
-    steps, reason = steps_per_tick(0.01, [], 7)
-    assert steps == 7
-    assert "given in the scene" in reason
+    assert steps_per_tick(0.01, [], None, CHOICE) == (1, "1 step a tick: nothing in the scene bounds the time step")
+    assert steps_per_tick(0.01, [], 7, CHOICE) == (
+        7, "7 steps a tick, given in the scene; nothing in it bounds the time step",
+    )  # fmt: skip

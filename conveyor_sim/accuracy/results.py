@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from conveyor_sim.accuracy.setting import Setting
 
+DEEP = 0.01
+"""Overlap over diameter above which a stiffness is marked."""
+
 
 @dataclass(frozen=True)
 class Order:
@@ -134,3 +137,81 @@ class Comparison:
     def resolution(self) -> float:
         """Smallest tolerance at which the runs made would accept: the interval's end farther from 0."""
         return max(abs(self.low), abs(self.high))
+
+
+@dataclass(frozen=True)
+class StiffnessRow:
+    """The scene with every stiffness times `factor`, at constant restitution."""
+
+    factor: float
+    dt: float
+    """s, of the runs."""
+    point: Point | None
+    """Its place in the work-precision diagram; None if it was not put there."""
+    overlap: float | None
+    """Largest overlap of the runs over the diameter; None where it is not known."""
+    observables: dict[str, tuple[float, float]]
+    """By name: mean and standard error over seeds."""
+    cost_ratio: float | None
+    """Wall time over that of factor 1; None where it is not known."""
+
+    @property
+    def deep(self) -> bool:
+        """Whether overlaps are so large that spacing, counts and sensor edges are wrong by about as much."""
+        return self.overlap is not None and self.overlap > DEEP
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The cheapest setting that can be trusted, and what exacter would cost."""
+
+    setting: Setting
+    dt: float
+    """s"""
+    error: float
+    """Relative, in peak contact force."""
+    speed: float
+    """Simulated over wall time."""
+    exacter: Setting | None
+    """The cheapest of a tenth of its error; None if no setting is so exact, the next two are then None, too."""
+    exacter_error: float | None
+    """Relative, in peak contact force."""
+    exacter_cost: float | None
+    """Wall time over that of `setting`."""
+    sentence: str
+    """All of this in words."""
+    accepted: bool
+    """Whether the ensembles found it equivalent to the reference in every observable."""
+    doubts: tuple[str, ...]
+    """Sentences: what is not certain."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that was found out about a scene: what tables, pictures and files are made of."""
+
+    scene: str
+    """Its name."""
+    source: str
+    """Its file, as given."""
+    machine: str
+    """What the costs were measured on."""
+    tick: float
+    """s"""
+    tolerance: float
+    """Relative: in peak contact force on the short horizon, in every observable on the long one."""
+    own: Setting
+    """The scene's own, as it would run without a study."""
+    orders: tuple[Order, ...]
+    horizons: tuple[Horizon, ...]
+    reference: Reference
+    points: tuple[Point, ...]
+    samples: tuple[Sample, ...]
+    comparisons: tuple[Comparison, ...]
+    ensemble_reference: Setting | None
+    """What `comparisons` compare with; None if there were no ensembles."""
+    stiffness: tuple[StiffnessRow, ...]
+    skipped: tuple[str, ...]
+    """Sentences: what was left out, and why."""
+    answer: Answer | None
+    """None: no setting that was tried keeps the tolerance."""

@@ -29,7 +29,10 @@ def _scaled(contact: Contact, factor: float) -> dict[str, Any]:
     if contact.table is not None:
         data["table"] = [[overlap, force * factor] for overlap, force in contact.table]
     damping = contact.damping
-    if damping.law in ("paper", "normal") and damping.restitution is None:
+    if damping.restitution is not None:
+        # A scene gives one of the two.
+        del data["damping"]["coefficient"]
+    elif damping.law in ("paper", "normal"):
         data["damping"]["coefficient"] *= factor ** (0.4 if contact.hertz_stiffness is not None else 0.5)
     if contact.tangential is not None:
         data["tangential"]["stiffness"] *= factor

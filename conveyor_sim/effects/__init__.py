@@ -12,17 +12,30 @@ from conveyor_sim.effects.damping import NORMAL_DAMPING, ONSET_DAMPING, PAPER_DA
 from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.effects.geometry import ARC_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
+from conveyor_sim.effects.impacts import impact_bounds, impacts
 from conveyor_sim.effects.observers import CONTACT_ARRAYS, PEAKS
 from conveyor_sim.effects.rotation import ROTATION
 from conveyor_sim.effects.supply import INFEED, OUTFEED
-from conveyor_sim.effects.terms import Terms, most_bottles
+from conveyor_sim.effects.terms import Terms, most_bottles, queue_force, queue_length
 from conveyor_sim.errors import SceneError
+from conveyor_sim.prediction import Impact, Prediction, predict
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound
 
-__all__ = ["EFFECTS", "Cause", "Effect", "EffectChoice", "Terms", "bounds_of", "choose_effects", "most_bottles"]
+__all__ = [
+    "EFFECTS",
+    "Cause",
+    "Effect",
+    "EffectChoice",
+    "Terms",
+    "bounds_of",
+    "choose_effects",
+    "impacts_of",
+    "most_bottles",
+    "prediction_of",
+]
 
 EFFECTS: tuple[Effect, ...] = (
     BOTTLE_CONTACT,
@@ -71,10 +84,22 @@ def choose_effects(scene: Scene) -> tuple[EffectChoice, ...]:
     return tuple(choices)
 
 
-def bounds_of(terms: Terms) -> tuple[Bound, ...]:
-    """The bounds on dt of all effects that are on, each the tightest over types and materials."""
+def impacts_of(terms: Terms) -> tuple[Impact, ...]:
+    """The impacts that are expected, with what the effects that are on add to their error."""
+    return impacts(terms, EFFECTS)
+
+
+def bounds_of(terms: Terms, expected: Sequence[Impact]) -> tuple[Bound, ...]:
+    """The bounds on dt of all effects that are on and of the impacts, each the tightest over types and materials."""
     found = [effect.bounds(terms) for effect in EFFECTS if effect.bounds is not None and effect.name in terms.on]
-    return tuple(bound for bounds in found for bound in bounds)
+    return (*impact_bounds(expected, terms.tolerance), *(bound for bounds in found for bound in bounds))
+
+
+def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:
+    """The errors to expect at a time step in s."""
+    sides = [effect.side(terms, dt) for effect in EFFECTS if effect.side is not None and effect.name in terms.on]
+    pressing = (queue_force(terms), f"a single-file queue of {queue_length(terms.scene)}")
+    return predict(expected, [term for side in sides for term in side], pressing, dt)
 
 
 def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:

@@ -4,19 +4,24 @@ from collections.abc import Callable, Collection, Iterator
 
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import (
+    Meeting,
     Terms,
     deepest,
+    frequency,
     impact_speed,
     meetings,
     most_bottles,
+    overlap_at,
     queue_force,
+    steepest,
     table_of,
     tightest,
 )
+from conveyor_sim.methods import Share
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import STEPS_PER_CONTACT, Bound, contact_bound, hertz_contact_time, lattice_bound
+from conveyor_sim.timestep import Bound, lattice_bound, wedge_bound
 
 
 def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Contact]]:
@@ -51,50 +56,58 @@ def _elastic(field: str, unit: str) -> Callable[[Scene, Collection[str]], Cause 
     return called_for
 
 
-def _linear_bounds(terms: Terms) -> list[Bound]:
-    contacts, lattices = [], []
-    for meeting in meetings(terms):
-        k, reduced = meeting.value(meeting.law.stiffness), meeting.reduced_mass
-        if k > 0.0:
-            reason = f"{STEPS_PER_CONTACT} steps a contact of {meeting.what} at k = {k:g} N/m"
-            contacts.append((contact_bound(k, reduced), reason))
-            if meeting.second is not None:
-                lattices.append((lattice_bound(k, 2.0 * reduced), f"a hexagonal packing at k = {k:g} N/m"))
-    return [*tightest("contact time", contacts), *tightest("lattice stability", lattices)]
+def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Terms], list[Bound]]:
+    """Bounds from a function that gives a meeting's largest stiffness, in N/m (0: none), and how it is said."""
+
+    def bounds(terms: Terms) -> list[Bound]:
+        if not terms.method.explicit:
+            return []
+        lattices, wedges = [], []
+        for meeting in meetings(terms):
+            k, said = stiffness(meeting, terms)
+            if k > 0.0 and meeting.second is not None:
+                lattices.append((lattice_bound(k, 2.0 * meeting.reduced_mass), f"a hexagonal packing at {said}"))
+            elif k > 0.0:
+                wedges.append((wedge_bound(k, meeting.reduced_mass), f"a bottle between two rails at {said}"))
+        return [
+            *tightest(f"{name}lattice stability", lattices, stability=True),
+            *tightest(f"{name}rail stability", wedges, stability=True),
+        ]
+
+    return bounds
 
 
-def _hertz_bounds(terms: Terms) -> list[Bound]:
-    """A contact is the shorter the faster the impact; a packing is the stiffer the harder it is pressed."""
-    speed, force = impact_speed(terms.scene), queue_force(terms)
-    contacts, lattices = [], []
-    for meeting in meetings(terms):
-        k, reduced = meeting.value(meeting.law.hertz), meeting.reduced_mass
-        if k > 0.0:
-            time = hertz_contact_time(k, reduced, speed) / STEPS_PER_CONTACT
-            at = f"at k = {k:g} N/m^1.5 and {speed:g} m/s"
-            contacts.append((time, f"{STEPS_PER_CONTACT} steps a Hertz contact of {meeting.what} {at}"))
-            if meeting.second is not None:
-                overlap = max(deepest(meeting, terms, speed)[0], (force / k) ** (2.0 / 3.0))
-                tangent = 1.5 * k * overlap**0.5
-                lattices.append(
-                    (lattice_bound(tangent, 2.0 * reduced), f"a hexagonal packing at dN/d delta = {tangent:.3g} N/m")
-                )
-    return [*tightest("Hertz contact time", contacts), *tightest("Hertz lattice stability", lattices)]
+def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    k = meeting.value(meeting.law.stiffness)
+    return k, f"k = {k:g} N/m"
 
 
-def _table_bounds(terms: Terms) -> list[Bound]:
-    contacts, lattices = [], []
-    for meeting in meetings(terms):
-        points = table_of(meeting, terms)
-        if points is not None:
-            overlap, force = points
-            k = float(((force[1:] - force[:-1]) / (overlap[1:] - overlap[:-1])).max())
-            reason = f"{STEPS_PER_CONTACT} steps a contact of {meeting.what} at the table's steepest, {k:.3g} N/m"
-            contacts.append((contact_bound(k, meeting.reduced_mass), reason))
-            if meeting.second is not None:
-                bound = lattice_bound(k, 2.0 * meeting.reduced_mass)
-                lattices.append((bound, f"a hexagonal packing at the table's steepest, {k:.3g} N/m"))
-    return [*tightest("table contact time", contacts), *tightest("table lattice stability", lattices)]
+def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    """The stiffer the harder it is pressed, by an impact or by a queue."""
+    k = meeting.value(meeting.law.hertz)
+    if k == 0.0:
+        return 0.0, ""
+    pressed = overlap_at(meeting, terms, queue_force(terms))
+    tangent = 1.5 * k * max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed) ** 0.5
+    return tangent, f"dN/d delta = {tangent:.3g} N/m"
+
+
+def _table(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    points = table_of(meeting, terms)
+    if points is None:
+        return 0.0, ""
+    return steepest(points), f"the table's steepest, {steepest(points):.3g} N/m"
+
+
+def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Meeting, Terms], list[Share]]:
+    """The share of an elastic law, where a meeting has it: its peak falls between two steps."""
+
+    def shares(meeting: Meeting, terms: Terms) -> list[Share]:
+        if stiffness(meeting, terms)[0] == 0.0:
+            return []
+        return [terms.method.between_steps(frequency(meeting, terms, impact_speed(terms.scene)))]
+
+    return shares
 
 
 BOTTLE_CONTACT = Effect(
@@ -113,8 +126,11 @@ LINEAR = Effect(
     called_for=_elastic("stiffness", "N/m"),
     absent="no contact with stiffness",
     needs="k by pair of materials",
-    bounds=_linear_bounds,
-    bound="20 steps a contact, pi sqrt(m_r / k) long; 2 / sqrt(6 k / m), at which a hexagonal packing is unstable",
+    bounds=_stable("", _linear),
+    bound="1 / sqrt(6 k / m), half of that at which a hexagonal packing is unstable; 1 / sqrt(2 k / m), half of that "
+    "at which a bottle between two rails is",
+    shares=_peak(_linear),
+    share="(w dt)^2 / 8, with w = sqrt(k / m_r): a peak between two steps",
     can_force_off=False,
 )
 HERTZ = Effect(
@@ -124,10 +140,12 @@ HERTZ = Effect(
     called_for=_elastic("hertz_stiffness", "N/m^1.5"),
     absent="no contact with hertz_stiffness",
     needs="k by pair of materials",
-    bounds=_hertz_bounds,
-    bound="20 steps a contact, 3.218 (m_r^2 / (k^2 v))^(1/5) long, v the fastest of belts, infeeds and bottles "
-    "at the start, 1 m/s if all rest; that of a hexagonal packing at the tangent stiffness, pressed by an "
-    "impact at v or by a queue",
+    bounds=_stable("Hertz ", _hertz),
+    bound="those of linear at the tangent stiffness, pressed by an impact at v or by a queue; v is the speed of the "
+    "fastest belt or infeed, or that by which bottles differ at the start, 1 m/s if all rest",
+    shares=_peak(_hertz),
+    share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the deepest of an impact at v: a peak between two "
+    "steps",
     can_force_off=False,
 )
 TABLE = Effect(
@@ -137,7 +155,9 @@ TABLE = Effect(
     called_for=_elastic("table", ""),
     absent="no contact with table",
     needs="points by pair of materials",
-    bounds=_table_bounds,
+    bounds=_stable("table ", _table),
     bound="those of linear, at the steepest slope of the table",
+    shares=_peak(_table),
+    share="that of linear, at the steepest slope of the table",
     can_force_off=False,
 )

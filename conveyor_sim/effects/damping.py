@@ -4,8 +4,9 @@ from collections.abc import Callable, Collection
 
 from conveyor_sim.effects.contacts import contacts_in_use
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, deepest, impact_speed, meetings, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, deepest, frequency, impact_speed, meetings, tightest
 from conveyor_sim.laws import damping_effect
+from conveyor_sim.methods import Share
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, damping_bound
 
@@ -27,10 +28,41 @@ def _bounds(name: str, dashpot: Callable[[Meeting, Terms], tuple[float, str]]) -
     """Bounds from a function that gives a meeting's dashpot, in kg/s, and how it is said."""
 
     def bounds(terms: Terms) -> list[Bound]:
+        if not terms.method.explicit:
+            return []
         found = [(*dashpot(meeting, terms), meeting.reduced_mass) for meeting in meetings(terms)]
-        return tightest(name, [(damping_bound(c, reduced), said) for c, said, reduced in found if c > 0.0])
+        return tightest(name, [(damping_bound(c, reduced), said) for c, said, reduced in found if c > 0.0], True)
 
     return bounds
+
+
+def _jumping(dashpot: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Meeting, Terms], list[Share]]:
+    """The share of a dashpot that sets in with a jump."""
+
+    def shares(meeting: Meeting, terms: Terms) -> list[Share]:
+        c = dashpot(meeting, terms)[0]
+        if c == 0.0:
+            return []
+        # How fast the force falls behind its jump is known where the spring is linear from there on.
+        return terms.method.first_touch(c / meeting.reduced_mass, meeting.value(meeting.law.stiffness) / c)
+
+    return shares
+
+
+def _growing(
+    name: str, dashpot: Callable[[Meeting, Terms], tuple[float, str]], exponent: float
+) -> Callable[[Meeting, Terms], list[Share]]:
+    """The share of a dashpot that grows from 0 as the overlap to an exponent."""
+
+    def shares(meeting: Meeting, terms: Terms) -> list[Share]:
+        c, method = dashpot(meeting, terms)[0], terms.method
+        if c == 0.0:
+            return []
+        coefficient = method.onset if exponent == 1.0 else method.tsuji
+        w = frequency(meeting, terms, impact_speed(terms.scene))
+        return [method.growing(name, coefficient, exponent, c / meeting.reduced_mass, w)]
+
+    return shares
 
 
 def _paper(meeting: Meeting, terms: Terms) -> tuple[float, str]:
@@ -64,6 +96,8 @@ PAPER_DAMPING = Effect(
     needs="c by pair of materials",
     bounds=_bounds("paper damping", _paper),
     bound="m_r / (2 c)",
+    shares=_jumping(_paper),
+    share="c dt / m_r, or k dt / c if that is less: a jump at first touch that is met late",
 )
 NORMAL_DAMPING = Effect(
     name="normal_damping",
@@ -74,6 +108,8 @@ NORMAL_DAMPING = Effect(
     needs="c by pair of materials",
     bounds=_bounds("normal damping", _normal),
     bound="m_r / (2 c)",
+    shares=_jumping(_normal),
+    share="c dt / m_r, or k dt / c if that is less: a jump at first touch that is met late",
 )
 TSUJI_DAMPING = Effect(
     name="tsuji_damping",
@@ -84,6 +120,8 @@ TSUJI_DAMPING = Effect(
     needs="c by pair of materials, from the restitution",
     bounds=_bounds("Tsuji damping", _tsuji),
     bound="m_r / (2 c delta^0.25), delta the deepest of an impact at v (as for hertz)",
+    shares=_growing("dashpot", _tsuji, 0.25),
+    share="c delta^0.25 dt / m_r, times (w dt)^0.25 with a method of second order",
 )
 ONSET_DAMPING = Effect(
     name="onset_damping",
@@ -94,4 +132,6 @@ ONSET_DAMPING = Effect(
     needs="lambda by pair of materials",
     bounds=_bounds("onset damping", _onset),
     bound="m_r / (2 lambda N), N the largest of an impact at v (as for hertz)",
+    shares=_growing("dashpot", _onset, 1.0),
+    share="lambda N dt / m_r, times w dt with a method of second order",
 )

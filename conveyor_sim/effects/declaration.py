@@ -3,7 +3,9 @@
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from conveyor_sim.effects.terms import Terms
+from conveyor_sim.effects.terms import Meeting, Terms
+from conveyor_sim.methods import Share
+from conveyor_sim.prediction import Term
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.problems import Path, dotted
 from conveyor_sim.scene.schema import Scene
@@ -38,6 +40,14 @@ class Effect:
     bounds: Callable[[Terms], list[Bound]] | None = None
     """The bounds on dt that it brings when it is on; None: it brings none."""
     bound: str = ""
+    """The same in words."""
+    shares: Callable[[Meeting, Terms], list[Share]] | None = None
+    """What it adds to the error in the peak force of an impact; None: nothing."""
+    share: str = ""
+    """The same in words, without the integrator's coefficient."""
+    side: Callable[[Terms, float], list[Term]] | None = None
+    """Errors that it makes in something else than contact force, at a time step in s; None: none."""
+    beside: str = ""
     """The same in words."""
     can_force_on: bool = False
     """Whether it needs no parameters but those that every scene has."""

@@ -1,12 +1,23 @@
 """Effects of friction: in contacts, its curve, how it is solved, and the spring with history."""
 
+import math
 from collections.abc import Collection
 
 from conveyor_sim.effects.contacts import contacts_in_use
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Terms, meetings, queue_force, queue_length, tightest
+from conveyor_sim.effects.terms import (
+    Meeting,
+    Terms,
+    frequency,
+    impact_speed,
+    meetings,
+    queue_force,
+    queue_length,
+    tightest,
+)
+from conveyor_sim.prediction import Term
 from conveyor_sim.scene.schema import BottleType, Scene
-from conveyor_sim.timestep import STEPS_PER_CONTACT, Bound, contact_bound, contact_friction_bound, damping_bound
+from conveyor_sim.timestep import Bound, contact_friction_bound, contact_time, damping_bound
 
 
 def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
@@ -19,18 +30,48 @@ def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
 def _contact_friction_bounds(terms: Terms) -> list[Bound]:
     """At the force with which a single-file queue of all bottles presses."""
     force, queue = queue_force(terms), queue_length(terms.scene)
-    if force == 0.0 or "implicit_friction" in terms.on:
+    if force == 0.0 or "implicit_friction" in terms.on or not terms.method.explicit:
         return []
     candidates = []
     for meeting in meetings(terms):
-        mu, kind = meeting.value(meeting.law.friction), meeting.first
-        if mu > 0.0 and meeting.value(meeting.law.tangential_stiffness) == 0.0:
+        mu, kind = _curve_friction(meeting), meeting.first
+        if mu > 0.0:
             dt = contact_friction_bound(
                 mu, force, kind.mass, kind.moment_of_inertia, kind.radius, terms.scene.slip_limit
             )
             at = f"at mu = {mu:g} and N = {force:.3g} N, a single-file queue of {queue}"
             candidates.append((dt, f"v_lim / [2 mu (1/m + R^2/J) N] {at}"))
-    return tightest("contact friction", candidates)
+    return tightest("contact friction", candidates, stability=True)
+
+
+def _kick(terms: Terms, dt: float) -> list[Term]:
+    """The slip that the last step of an impact leaves where it is too long for friction, over the speed of impact.
+
+    It is used up before the end where mu (w dt)^2 is small beside v_lim / v.
+    """
+    if "implicit_friction" in terms.on or terms.method.slip == 0.0:
+        return []
+    speed = impact_speed(terms.scene)
+    kicks = []
+    for meeting in meetings(terms):
+        mu = _curve_friction(meeting)
+        w = frequency(meeting, terms, speed)
+        # Explicit friction is stable at the peak of the impact in so many steps a contact: 2 pi mu v / v_lim for hoops.
+        mobility = _rim_mobility(meeting.first) + _rim_mobility(meeting.second)
+        resolved = math.pi * mu * meeting.reduced_mass * mobility * speed / terms.scene.slip_limit
+        steps = math.pi / (w * dt)
+        if mu > 0.0 and steps < resolved:
+            kick = 0.5 * terms.method.slip * mu * (w * dt) ** 2
+            reason = (
+                f"{steps:.3g} steps an impact of {meeting.what} at {speed:g} m/s, of {resolved:.3g}, 2 pi mu v / v_lim"
+            )
+            kicks.append((kick, reason))
+    return [Term("tangential speed after an impact", *max(kicks))] if kicks else []
+
+
+def _curve_friction(meeting: Meeting) -> float:
+    """mu of a contact that has friction by its curve, 0 by a tangential spring."""
+    return meeting.value(meeting.law.friction) if meeting.value(meeting.law.tangential_stiffness) == 0.0 else 0.0
 
 
 def _chosen(field: str, value: str, scene: Scene, on: Collection[str]) -> Cause | None:
@@ -67,11 +108,11 @@ def _spring_bounds(terms: Terms) -> list[Bound]:
         k, c = (meeting.value(column) for column in (meeting.law.tangential_stiffness, meeting.law.tangential_damping))
         mass = 1.0 / (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
         if k > 0.0:
-            reason = f"{STEPS_PER_CONTACT} steps in pi sqrt(m_t / k_t) of {meeting.what} at k_t = {k:g} N/m"
-            springs.append((contact_bound(k, mass), reason))
+            reason = f"{terms.steps:.3g} steps in pi sqrt(m_t / k_t) of {meeting.what} at k_t = {k:g} N/m"
+            springs.append((contact_time(k, mass) / terms.steps, reason))
         if c > 0.0:
             dashpots.append((damping_bound(c, mass), f"m_t / (2 c_t) at c_t = {c:g} kg/s"))
-    return [*tightest("tangential spring", springs), *tightest("tangential damping", dashpots)]
+    return [*tightest("tangential spring", springs), *tightest("tangential damping", dashpots, stability=True)]
 
 
 CONTACT_FRICTION = Effect(
@@ -83,6 +124,9 @@ CONTACT_FRICTION = Effect(
     needs="mu by pair of materials",
     bounds=_contact_friction_bounds,
     bound="v_lim / [2 mu (1/m + R^2/J) N], N the force of all bottles in a single-file queue",
+    side=_kick,
+    beside="of the tangential speed after an impact, mu (w dt)^2 / 2 of the speed of impact, in fewer steps a contact "
+    "than 2 pi mu v / v_lim",
 )
 ATAN_FRICTION = Effect(
     name="atan_friction",
@@ -110,5 +154,6 @@ TANGENTIAL_SPRING = Effect(
     absent="no contact with tangential, or no friction in contacts",
     needs="elongation of each contact, kept through rebuilds; k_t, c_t and mu by pair of materials",
     bounds=_spring_bounds,
-    bound="20 steps in pi sqrt(m_t / k_t), m_t / (2 c_t), with 1/m_t the sum of 1/m + R^2/J of those that touch",
+    bound="2 / sqrt(tolerance) steps in pi sqrt(m_t / k_t), 20 at 1 %; m_t / (2 c_t), with 1/m_t the sum of "
+    "1/m + R^2/J of those that touch",
 )

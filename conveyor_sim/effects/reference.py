@@ -70,9 +70,11 @@ def _section(effect: Effect) -> str:
         ("off when", effect.absent),
         ("needs", effect.needs),
         ("bound on dt", effect.bound or "none"),
+        ("error in the peak force of an impact", effect.share),
+        ("error beside", effect.beside),
         ("can be forced", _forcible(effect)),
     ]
-    return "\n".join([f"## {effect.name}", "", *(f"- {name}: {text}" for name, text in rows), ""])
+    return "\n".join([f"## {effect.name}", "", *(f"- {name}: {text}" for name, text in rows if text), ""])
 
 
 def _forcible(effect: Effect) -> str:

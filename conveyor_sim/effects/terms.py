@@ -1,4 +1,4 @@
-"""What the bounds on the time step are computed from, and what bounds of several effects share."""
+"""What bounds on the time step and predicted errors are computed from, and what those of several effects share."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -8,9 +8,10 @@ import numpy as np
 
 from conveyor_sim.engine.arrays import F8, ContactLaw
 from conveyor_sim.laws import Laws
+from conveyor_sim.methods import METHODS, STEP_ERROR, Method
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.schema import BottleType, Scene, Single
-from conveyor_sim.timestep import Bound
+from conveyor_sim.timestep import Bound, contact_time, hertz_contact_time, least_steps
 
 ENDLESS_QUEUE = 100
 """Bottles assumed to press on each other where an infeed has no end."""
@@ -21,16 +22,34 @@ SPEED_AT_REST = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """A scene, its coefficients, and which effects are on."""
+    """A scene, its coefficients, which effects are on, and how exact it shall be."""
 
     scene: Scene
     laws: Laws
     on: Collection[str]
+    tolerance: float
+    """Relative error in contact force to stay below."""
 
     @property
     def types(self) -> list[BottleType]:
         """The bottle types, T of them, in the scene's order."""
         return list(self.scene.bottle_types.values())
+
+    @property
+    def method(self) -> Method:
+        """What the integrator misses."""
+        return METHODS[self.scene.accuracy.integrator]
+
+    @property
+    def step_error(self) -> float:
+        """m/s, largest error of a step, of an integrator that divides its steps itself."""
+        given = self.scene.accuracy.error
+        return STEP_ERROR if given is None else given
+
+    @property
+    def steps(self) -> float:
+        """Steps that what is sampled should last at least."""
+        return least_steps(self.tolerance)
 
 
 @dataclass(frozen=True)
@@ -69,12 +88,12 @@ def meetings(terms: Terms) -> Iterator[Meeting]:
                 yield Meeting("a bottle and a rail", terms.laws.rail, entry, one.mass, one, None)
 
 
-def tightest(name: str, candidates: Sequence[tuple[float, str]]) -> list[Bound]:
+def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool = False) -> list[Bound]:
     """The least of some bounds (s, reason) as a list; empty if there are none."""
     if not candidates:
         return []
     dt, reason = min(candidates)
-    return [Bound(name, dt, reason)]
+    return [Bound(name, dt, reason, stability)]
 
 
 def most_bottles(scene: Scene) -> int | None:
@@ -103,11 +122,15 @@ def queue_force(terms: Terms) -> float:
 
 
 def impact_speed(scene: Scene) -> float:
-    """The fastest of belts, infeeds and bottles as they start, m/s; SPEED_AT_REST if all rest."""
+    """The speed of the hardest impact expected, m/s; SPEED_AT_REST if all rest.
+
+    The fastest belt or infeed against something at rest, or the most by which bottles differ at the start.
+    """
     speeds = [abs(belt.speed) for belt in scene.belts.values()]
     speeds += [infeed.speed for infeed in scene.infeeds.values()]
-    speeds += [math.hypot(*entry.velocity) for entry in scene.bottles if isinstance(entry, Single)]
-    return max(speeds, default=0.0) or SPEED_AT_REST
+    given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
+    speeds.append(math.hypot(*np.ptp(given, axis=0)))
+    return max(speeds) or SPEED_AT_REST
 
 
 def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:
@@ -122,6 +145,46 @@ def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]
         return overlap, k * overlap**1.5
     points = table_of(meeting, terms)
     return _deepest_in_table(points[0], points[1], energy) if points is not None else (0.0, 0.0)
+
+
+def overlap_at(meeting: Meeting, terms: Terms, force: float) -> float:
+    """Overlap (m) at which the elastic law gives a force (N)."""
+    law = meeting.law
+    if (k := meeting.value(law.stiffness)) > 0.0:
+        return force / k
+    if (k := meeting.value(law.hertz)) > 0.0:
+        return math.pow(force / k, 2.0 / 3.0)
+    points = table_of(meeting, terms)
+    if points is None:
+        return 0.0
+    overlap, known = points
+    if force > known[-1]:
+        slope = float((known[-1] - known[-2]) / (overlap[-1] - overlap[-2]))
+        return float(overlap[-1]) + (force - float(known[-1])) / slope if slope > 0.0 else math.inf
+    return float(np.interp(force, known, overlap))
+
+
+def steepest(points: tuple[F8, F8]) -> float:
+    """The largest slope of a table, N/m."""
+    overlap, force = points
+    return float(((force[1:] - force[:-1]) / (overlap[1:] - overlap[:-1])).max())
+
+
+def duration(meeting: Meeting, terms: Terms, speed: float) -> float:
+    """How long an undamped head-on impact at a speed in m/s lasts, s; on a table: at least."""
+    law = meeting.law
+    if (k := meeting.value(law.hertz)) > 0.0:
+        return hertz_contact_time(k, meeting.reduced_mass, speed)
+    points = table_of(meeting, terms)
+    k = meeting.value(law.stiffness) if points is None else steepest(points)
+    return contact_time(k, meeting.reduced_mass)
+
+
+def frequency(meeting: Meeting, terms: Terms, speed: float) -> float:
+    """sqrt(-N'' / N) at the peak of the force N of an undamped head-on impact at a speed in m/s, rad/s."""
+    if (k := meeting.value(meeting.law.hertz)) > 0.0:
+        return math.sqrt(1.5 * k * math.sqrt(deepest(meeting, terms, speed)[0]) / meeting.reduced_mass)
+    return math.pi / duration(meeting, terms, speed)
 
 
 def table_of(meeting: Meeting, terms: Terms) -> tuple[F8, F8] | None:

@@ -61,6 +61,72 @@ class Stage(NamedTuple):
     omega: F8
 
 
+class Slopes(NamedTuple):
+    """Scratch of the Runge-Kutta methods (`runge_kutta.py`): where a step begins, (S,), and its slopes, (stages, S)."""
+
+    x: F8
+    y: F8
+    vx: F8
+    vy: F8
+    omega: F8
+    ax: F8
+    """m/s^2"""
+    ay: F8
+    alpha: F8
+    """rad/s^2"""
+    normal: F8 | None
+    """N, normal forces of all contacts; for peaks."""
+    error: F8
+    """(S,), m/s, of a substep."""
+    progress: F8
+    """(3,), what a call that is interrupted leaves for the next one."""
+
+
+class Triple(NamedTuple):
+    """Two components and one of turning for every bottle, (S,)."""
+
+    x: F8
+    y: F8
+    turn: F8
+
+
+class Blocks(NamedTuple):
+    """A symmetric 3 x 3 matrix for every bottle, over x, y and turning, (S,)."""
+
+    xx: F8
+    xy: F8
+    yy: F8
+    xt: F8
+    yt: F8
+    tt: F8
+
+
+class Linear(NamedTuple):
+    """Scratch of the linearly implicit method (`tangent.py`, `conjugate_gradients.py`)."""
+
+    x: F8
+    """(S,), where a step begins; `Bottles` has the point ahead of it at which forces are taken."""
+    y: F8
+    own: Blocks
+    """kg, kg m, kg m^2: inertia, and what a bottle's rails and base add to it."""
+    inverse: Blocks
+    """Inverse of each bottle's block of the whole matrix, its pairs included."""
+    change: Triple
+    """m/s, rad/s: the unknown, the change of velocity in a step."""
+    left: Triple
+    """kg m/s, kg m^2/s: the right-hand side, and what is left of it as the unknown is found."""
+    way: Triple
+    """m/s, rad/s: direction in which the solver goes."""
+    product: Triple
+    """The matrix times `way`; then the inverse blocks times `left`."""
+    left_sum: F8
+    """(units,), part of a sum for each unit of bottles (`team.py`)."""
+    way_sum: F8
+    """(units,), likewise."""
+    most: F8
+    """(units,), part of a maximum."""
+
+
 class Peaks(NamedTuple):
     """Accumulated every step since the last output, (S,)."""
 
@@ -117,6 +183,23 @@ class PairSprings(NamedTuple):
     """(1,)"""
 
 
+class PairTangent(NamedTuple):
+    """Contacts of the pairs as the linearly implicit method has them, (P,) by capacity."""
+
+    nx: F8
+    """Unit normal from i to j."""
+    ny: F8
+    normal: F8
+    """kg, impulse along the normal per velocity."""
+    tangential: F8
+    """kg, likewise across it."""
+    arm_i: F8
+    """m, from the axis to the contact point."""
+    arm_j: F8
+    most: F8
+    """(pairs / UNIT + 1,), part of a maximum."""
+
+
 class Pairs(NamedTuple):
     """Verlet list of bottle pairs, sorted by (i, j), i < j, (P,) by capacity. Explained in `pairs.py`."""
 
@@ -139,6 +222,7 @@ class Pairs(NamedTuple):
     touch: F8 | None
     """1 for a closed contact, likewise; for the implicit solver."""
     spring: PairSprings | None
+    tangent: PairTangent | None
 
 
 class Gathered(NamedTuple):
@@ -395,6 +479,8 @@ class World(NamedTuple):
     load: Load
     peaks: Peaks | None
     stage: Stage | None
+    slopes: Slopes | None
+    linear: Linear | None
     implicit: Implicit | None
     neighbourhood: Neighbourhood
     pairs: Pairs | None

@@ -44,7 +44,7 @@ def add_base_friction(
 
 
 @part
-def _relative(bottles: Bottles, footing: Any, turn: Any, i: int) -> tuple[float, float]:
+def relative_velocity(bottles: Bottles, footing: Any, turn: Any, i: int) -> tuple[float, float]:
     """Velocity of the axis relative to the belt, m/s."""
     vx = bottles.vx[i] - footing.ux[i]
     vy = bottles.vy[i] - footing.uy[i]
@@ -68,7 +68,7 @@ def _point_friction(
     end: int,
 ) -> None:
     for i in range(uint64(first), uint64(end)):
-        vx, vy = _relative(bottles, footing, turn, i)
+        vx, vy = relative_velocity(bottles, footing, turn, i)
         pull = footing.pull[i] * _quotient(
             settings, atan, bottles, footing, implicit, dt, i, math.sqrt(vx * vx + vy * vy)
         )
@@ -103,7 +103,7 @@ def _ring_friction(
 ) -> None:
     """A bottle with a base radius of 0 stands on a point beside others on rings."""
     for i in range(uint64(begin), uint64(end)):
-        vx, vy = _relative(bottles, footing, turn, i)
+        vx, vy = relative_velocity(bottles, footing, turn, i)
         turning = spin.omega[i] - _turn(turn, i)
         rim = abs(turning) * ring.radius[i]
         slide = math.sqrt(vx * vx + vy * vy)

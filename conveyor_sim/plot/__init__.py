@@ -1,4 +1,4 @@
-"""Pictures of scenes and recordings, each as PNG and SVG; the only part of conveyor_sim that imports matplotlib."""
+"""Pictures of scenes, recordings and accuracy studies, each as PNG and SVG; only here matplotlib is imported."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.plot import style
+from conveyor_sim.plot.accuracy import accuracy_figures
 from conveyor_sim.plot.data import Frame, Plant
 from conveyor_sim.plot.flow import flow_figure, force_figure
 from conveyor_sim.plot.recording import Recording
@@ -15,9 +16,23 @@ from conveyor_sim.plot.series import velocity_figure
 from conveyor_sim.plot.views import plant_figure, scene_figure, table_figure
 
 if TYPE_CHECKING:
+    from conveyor_sim.accuracy.results import Study
     from conveyor_sim.scene import Scene
 
-__all__ = ["plot_bag", "plot_scene"]
+__all__ = ["plot_accuracy", "plot_bag", "plot_scene"]
+
+
+def plot_accuracy(study: Study, out_dir: str | Path) -> list[Path]:
+    """Draw what an accuracy study found; returns the files written.
+
+    `pareto` shows error against cost of every setting, `orders` the errors in closed forms, `ensembles` the long runs,
+    `stiffness` what softer contacts change; a picture without rows is left out.
+    Raises ConveyorError if the files can't be written.
+    """
+    out = Path(out_dir)
+    with style.look():
+        figures = accuracy_figures(study)
+        return [path for stem, figure in figures.items() for path in style.save(figure, out / stem)]
 
 
 def plot_bag(

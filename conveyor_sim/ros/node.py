@@ -10,6 +10,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.explain import setting_line
 from conveyor_sim.resources import scene_path
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.clock import ClockPublisher
@@ -47,8 +48,8 @@ class SimNode:
             self._node.destroy_node()
             raise
         self._spinner.start(self._node)
-        self.stepper.start()
         self._node.get_logger().info(_greeting(self.stepper))
+        self.stepper.start()
 
     def close(self) -> None:
         """End orderly: the tick under way is finished, the recording completed."""
@@ -110,7 +111,4 @@ def _greeting(stepper: Stepper) -> str:
     session = stepper.session
     model = session.simulation.model
     bag = f", recorded to {session.bag}" if session.bag else ""
-    return (
-        f"scene {model.name}, run {session.run_id}, {stepper.state.name}, "
-        f"dt = {model.dt * 1e6:.4g} us ({model.dt_reason}){bag}"
-    )
+    return f"scene {model.name}, run {session.run_id}, {stepper.state.name}, {setting_line(model)}{bag}"

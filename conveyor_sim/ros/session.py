@@ -6,6 +6,7 @@ import time
 import uuid
 from pathlib import Path
 
+from conveyor_sim.achieved import PeakWatch, achieved
 from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.line.commands import CommandOutcome
@@ -32,6 +33,7 @@ class Session:
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()
+        self._peaks = PeakWatch(self.simulation)
 
     @property
     def last_tick(self) -> int:
@@ -44,8 +46,19 @@ class Session:
             self._first_tick_at = time.monotonic()
         self.simulation.advance(1)
         outcomes = self.outputs.after_tick()
+        self._peaks.after_tick()
         self.wall = time.monotonic() - self._first_tick_at
         return outcomes
+
+    @property
+    def account(self) -> str:
+        """How fast the run was, and what its forces say of its accuracy, in one line."""
+        simulation = self.simulation
+        told = f"{simulation.time:g} s simulated in {self.wall:.2f} s"
+        if self.wall > 0.0:
+            told += f", {simulation.time / self.wall:.3g} x real time"
+        reached = achieved(simulation.model, self._peaks.force)
+        return told if reached is None else f"{told}; {reached.sentence}"
 
     def refuse(self, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str) -> None:
         """Tell those who listen that a command came too late to be applied; the recording is closed by then."""

@@ -252,6 +252,8 @@ class Stepper:
             self._died(error)
         finally:
             self._abandon("the simulation is shutting down")
+            if not self._ended and self.session.simulation.tick > 0:
+                self._log.info(f"stopped, {self.session.account}" + _to_bag(self.session))
             self._close_recording()
 
     def _loop(self) -> None:
@@ -317,7 +319,7 @@ class Stepper:
     def _end(self) -> None:
         self.state, self._ended = State.PAUSED, True
         self._close_recording()
-        self._log.info(f"end of the run at {self.session.simulation.time:g} s" + _to_bag(self.session))
+        self._log.info(f"end of the run, {self.session.account}" + _to_bag(self.session))
 
     def _fail(self, error: Exception) -> None:
         """What is known stays published; only a reset leads on."""

@@ -10,7 +10,7 @@ from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Count, Positive, Tolerance, quantity
 
 Preset = Literal["draft", "standard", "fine"]
-IntegratorName = Literal["semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "rosenbrock"]
+IntegratorName = Literal["semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit"]
 INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
 
 CHOICES = ("preset", "tolerance", "dt", "per_tick")
@@ -36,8 +36,7 @@ class Accuracy(Part):
     )
     per_tick: Annotated[Count, Le(10_000_000)] | None = quantity("The same as a number of steps.", "1", default=None)
     error: Positive | None = quantity(
-        "Largest error of a step, dormand_prince only, which then chooses its steps itself and begins with dt. "
-        "Left out: 1e-6.",
+        "Largest error of a step, dormand_prince only, which divides the steps of dt itself. Left out: 1e-6.",
         "m/s",
         default=None,
     )

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations_with_replacement
 
 from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.problems import Path, Problem
@@ -17,6 +18,7 @@ def problems_of(scene: Scene) -> list[Problem]:
     """Everything that is wrong with a scene whose fields are each valid by themselves."""
     return [
         *_times(scene),
+        *accuracy_problems(scene),
         *contact_problems(scene),
         *_repeated("contacts", [tuple(sorted(contact.between)) for contact in scene.contacts]),
         *_repeated("base", [base.between for base in scene.base]),

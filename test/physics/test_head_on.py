@@ -18,7 +18,8 @@ CONTACT_TIME = 0.002
 SPEED = 0.7
 """m/s, of approach."""
 PAIRS = 64
-INTEGRATORS = ["semi_implicit_euler", "velocity_verlet"]
+INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "rk4"]
+"""Of fixed steps; what `dormand_prince` does in such impacts is in test/engine/test_dormand_prince.py."""
 
 
 @dataclass(frozen=True)
@@ -110,11 +111,15 @@ def test_undamped_contact_lasts_pi_sqrt_m_over_k(partners: tuple[Partner, Partne
     assert strongest == pytest.approx(SPEED * math.sqrt(k * m_r), rel=bound)
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_peak_force_is_off_by_pi_over_n_squared_over_8(integrator: str) -> None:
+@pytest.mark.parametrize(
+    ("integrator", "least", "most"),
+    [("semi_implicit_euler", -1.0, 1.0), ("velocity_verlet", -1.0, 1.0), ("rk4", -2.0 / 3.0, 0.0)],
+)
+def test_peak_force_is_off_by_pi_over_n_squared_over_8(integrator: str, least: float, most: float) -> None:
     """A peak between two samples is missed by 1 - cos(pi / 2n) = (pi/n)^2/8; one met head on is as much too high.
 
-    (Leapfrog through (0, v) has the amplitude v / w / sqrt(1 - (w dt)^2 / 4).)
+    (Leapfrog through (0, v) has the amplitude v / w / sqrt(1 - (w dt)^2 / 4).) RK4 has the right amplitude but for what
+    it gains at first touch in the middle of a step, (pi/n)^2/24: such peaks fall between two samples.
     """
     n = 20
     sim, _ = collisions(UNEQUAL, steps=n, integrator=integrator)
@@ -123,9 +128,8 @@ def test_peak_force_is_off_by_pi_over_n_squared_over_8(integrator: str) -> None:
     peak = SPEED * math.sqrt(stiffness_for(CONTACT_TIME, m_r) * m_r)
     error = sim.bottles().peak_force / peak - 1.0
     bound = (math.pi / n) ** 2 / 8
-    assert np.abs(error).max() <= 1.05 * bound
-    assert error.min() < -0.8 * bound
-    assert error.max() > 0.8 * bound
+    assert error.min() / bound == pytest.approx(least, abs=0.05)
+    assert error.max() / bound == pytest.approx(most, abs=0.05)
 
 
 @pytest.mark.parametrize("partners", [EQUAL, UNEQUAL])
@@ -144,7 +148,7 @@ def test_restitution_with_a_dashpot(partners: tuple[Partner, Partner], law: str,
     assert e == pytest.approx({"paper": 0.37, "normal": 0.45}[law], abs=0.005)
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("integrator", [*INTEGRATORS, "linearly_implicit"])
 @pytest.mark.parametrize(
     ("law", "zeta", "expected"),
     [("none", 0.0, 2.0), ("paper", 0.3, 1.0), ("normal", 0.3, 1.0)],

@@ -9,24 +9,29 @@ import math
 
 import numpy as np
 import pytest
-from scenes import base, belt, bottle, order, simulation
+from scenes import base, belt, bottle, order, phases, rms, simulation
 
 from conveyor_sim.simulation import Simulation
 
 MU, G = 0.4, 9.81
 ANGLE = 0.5
 """rad, direction of travel."""
-INTEGRATORS = ["semi_implicit_euler", "velocity_verlet"]
 
 
 def set_down(
-    speed: float, slip: float, slip_limit: float, tick: float, steps: int, integrator: str = "semi_implicit_euler"
+    speed: float,
+    slip: float,
+    slip_limit: float,
+    tick: float,
+    steps: int,
+    integrator: str = "semi_implicit_euler",
+    **accuracy: float,
 ) -> Simulation:
     """A bottle on a belt at `speed`, moving along it, slower by `slip` (m/s)."""
     v = speed - slip
     return simulation(
         tick=tick,
-        accuracy={"per_tick": steps, "integrator": integrator},
+        accuracy={"per_tick": steps, "integrator": integrator, **accuracy},
         gravity=G,
         slip_limit=slip_limit,
         base=base(MU),
@@ -103,9 +108,11 @@ def test_the_unregularised_way_is_the_limit_of_small_v_lim(slip_limit: float) ->
     assert slide == pytest.approx(speed**2 / (2.0 * MU * G) + excess, abs=MU * G * dt**2 + 1e-12)
 
 
-@pytest.mark.parametrize(("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0)])
+@pytest.mark.parametrize(
+    ("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0), ("rk4", 4.0)]
+)
 def test_order_through_smooth_friction(integrator: str, expected: float) -> None:
-    """Below v_lim the law is smooth: velocity Verlet is of order 2 in it, semi-implicit Euler of order 1."""
+    """Below v_lim the law is smooth: every method reaches its own order in it."""
     slip_limit, speed = 0.05, 0.5
     slip, end = 0.8 * slip_limit, 0.02
     numbers = [32, 64, 128, 256]
@@ -119,6 +126,33 @@ def test_order_through_smooth_friction(integrator: str, expected: float) -> None
         slides.append(abs(got_slide - expected_slide))
     assert order(numbers, slips) == pytest.approx(expected, abs=0.1)
     assert order(numbers, slides) == pytest.approx(expected, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0), ("rk4", 3.0)]
+)
+def test_order_across_v_lim(integrator: str, expected: float) -> None:
+    """At v_lim the curve bends, p'' jumps: a step across it is off by the order of dt^3 (RMS over 64 phases)."""
+    numbers = [16, 32, 64]
+    errors = [rms(errors_across_v_lim(n, integrator, numbers[0])) for n in numbers]
+    assert order(numbers, errors) == pytest.approx(expected, abs=0.15)
+
+
+@pytest.mark.parametrize("allowed", [1e-8, 1e-10, 1e-12])
+def test_error_across_v_lim_is_near_that_allowed(allowed: float) -> None:
+    """Dormand and Prince, RMS over 64 phases: the bend is found, and passed in shorter steps."""
+    assert rms(errors_across_v_lim(16, "dormand_prince", 16, error=allowed)) < 3.0 * allowed
+
+
+def errors_across_v_lim(steps: int, integrator: str, coarsest: int, **accuracy: float) -> list[float]:
+    """Errors in slip, m/s; it reaches v_lim at 64 phases of one of `coarsest` steps, amid the `steps` taken."""
+    slip_limit, speed, end = 0.05, 0.5, 0.02
+    errors = []
+    for slip in slip_limit + MU * G * end * (0.4 + phases(64) / coarsest):
+        sim = set_down(speed, slip, slip_limit, end, steps, integrator, **accuracy)
+        sim.advance()
+        errors.append(slip_and_slide(sim, speed)[0] - closed_form(slip, slip_limit, end)[0])
+    return errors
 
 
 @pytest.mark.parametrize(("margin", "chatters"), [(0.9, False), (1.1, True)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -53,3 +54,26 @@ def test_a_start_that_cannot_be_ends_with_one_sentence(
     assert done.stderr.startswith("sim_node: ")
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_setting_and_what_was_reached_are_logged(start_node: Callable[..., Child], client: LineClient) -> None:
+    """The errors to expect before the run, its speed and its largest force behind it."""
+    node = start_node(duration=0.2, start_paused=False)
+    until(lambda: "end of the run" in node.log.read_text(), "the end of the run")
+    greeting, end = (
+        next(line for line in node.log.read_text().splitlines() if words in line)
+        for words in ("scene small_line", "end of the run")
+    )
+    assert "semi_implicit_euler, dt = " in greeting
+    assert " in contact force" in greeting
+    assert "end of the run, 0.2 s simulated in " in end
+    assert " x real time; peak force " in end
+    node.stop()
+    assert "stopped, " not in node.log.read_text()
+
+
+def test_a_run_that_is_stopped_tells_how_far_it_came(start_node: Callable[..., Child], client: LineClient) -> None:
+    node = start_node(duration=1000.0, start_paused=False)
+    until(lambda: int(client.diagnostics()[1]["tick"]) > 0, "the first ticks")
+    node.stop()
+    assert re.search(r"stopped, [\d.]+ s simulated in [\d.]+ s, ", node.log.read_text())

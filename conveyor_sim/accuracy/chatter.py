@@ -1,0 +1,68 @@
+"""Chatter: explicit friction in too long a step turns the slip round at every step, within +-v_lim.
+
+No check of finiteness sees it, nor does an average: velocities are watched from step to step. Their second differences
+change sign at every step then, and only then: an impact bends a velocity for some steps to one side.
+"""
+
+import numpy as np
+
+from conveyor_sim.accuracy.failures import place
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.trajectory import variant
+from conveyor_sim.engine.arrays import F8
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+STEPS = 48
+"""Steps that are watched: chatter must fill half of them, no contact at its five steps or more rings so long."""
+
+LEAST = 0.05
+"""Amplitude of chatter, of v_lim, from which it is told. It settles at 2 (1 - b) of it, b the least stable step over
+the one taken, and is 1 and more from twice that on."""
+
+
+class ChatterProbe:
+    """A scene with a setting, in ticks of one step."""
+
+    def __init__(self, scene: Scene, setting: Setting) -> None:
+        self.slip_limit = scene.slip_limit
+        # A tick is a whole number of nanoseconds.
+        step = max(1, round(scene.tick_ns / setting.per_tick)) * 1e-9
+        supply = {name: "off" for name, there in (("infeed", scene.infeeds), ("outfeed", scene.outfeeds)) if there}
+        single = Setting(setting.integrator, 1, setting.stiffness, setting.error)
+        self._simulation = variant(scene, single, tick=round(step, 9), duration=round(step, 9), effects=supply)
+
+    def look(self, state: Simulation) -> str:
+        """One sentence if the setting chatters from a state of the scene on, which stays as it is; else empty."""
+        simulation = self._simulation
+        simulation.take_state_of(state)
+        bottles = simulation.bottles()
+        radius = simulation.model.type_radius[bottles.type]
+        velocities = []
+        for _ in range(STEPS):
+            try:
+                simulation.advance()
+            except SimulationError:
+                return ""
+            now = simulation.bottles()
+            velocities.append(np.stack([now.vx, now.vy, radius * now.omega]))
+        amplitude = chatter_of(np.array(velocities))
+        if not amplitude.size or amplitude.max() <= LEAST * self.slip_limit:
+            return ""
+        worst = int(np.argmax(amplitude))
+        share = amplitude[worst] / self.slip_limit
+        return (
+            f"chattering: {place(bottles, worst)} shakes by {share:.2g} of slip_limit at every step at {state.time:g} s"
+        )
+
+
+def chatter_of(velocities: F8) -> F8:
+    """Amplitude (bottles,) by which velocities (steps, components, bottles) jump to and fro, m/s.
+
+    v_n = (-1)^n A has second differences of 4 A, each against the one before: the median over the steps of the root of
+    minus their product.
+    """
+    bends = np.diff(velocities, n=2, axis=0)
+    against = -(bends[1:] * bends[:-1]).sum(axis=1)
+    return np.asarray(np.sqrt(np.maximum(np.median(against, axis=0), 0.0)) / 4.0)

@@ -1,0 +1,206 @@
+"""Acceptance by equivalence: a cheaper setting is trusted when its difference from the reference is surely small.
+
+A candidate's observable is accepted when the confidence interval of its relative difference from the reference lies
+inside +-tolerance (two one-sided tests, Schuirmann 1987), rejected when it lies outside. To find no significant
+difference would not do: few runs never find one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.accuracy.ensemble import Ensemble, Progress, Run
+from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy.results import Comparison, Sample
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.student import t_quantile
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.scene import Scene
+
+LOOKS = (8, 16, 32, 64, 128, 256)
+"""Runs of a setting after which the intervals are looked at."""
+
+ERROR_RATE = 0.05
+"""Chance to accept an observable whose true difference is the tolerance, over all looks together; and to reject it."""
+
+CONFIDENCE = 1.0 - 2.0 * ERROR_RATE / len(LOOKS)
+"""Of the interval at one look: by Bonferroni, as each look may err at either end by its share of ERROR_RATE."""
+
+_EVERYTHING = (-math.inf, math.inf)
+
+
+def compare(
+    setting: Setting,
+    observable: str,
+    candidate: Sequence[float | None],
+    reference: Sequence[float | None],
+    tolerance: float,
+) -> Comparison:
+    """One look at an observable: its values (n,) by run under a setting, and (m,) under the reference setting.
+
+    The interval has no ends, and nothing is decided, with fewer than two runs of either, where a run lacks the
+    observable (None), or where the reference's mean may as well be 0.
+    """
+    values, known = _floats(candidate), _floats(reference)
+    low, high = _interval(values, known)
+    verdict = "undecided"
+    if -tolerance < low and high < tolerance:
+        verdict = "equivalent"
+    elif low > tolerance or high < -tolerance:
+        verdict = "different"
+    (mean, variance), (reference_mean, reference_variance) = _mean(values), _mean(known)
+    return Comparison(
+        setting=setting,
+        observable=observable,
+        runs=len(values),
+        mean=mean,
+        error=math.sqrt(variance),
+        reference=reference_mean,
+        reference_error=math.sqrt(reference_variance),
+        low=low,
+        high=high,
+        tolerance=tolerance,
+        verdict=verdict,
+    )
+
+
+def decide(
+    samples: Sequence[Sample], settings: Sequence[Setting], reference: Setting, tolerance: float
+) -> list[Comparison]:
+    """Compare settings with the reference in every observable that is judged, look by look, by seeds in order.
+
+    An observable is looked at after each of LOOKS, and at last with all runs there are; the first look that decides it
+    stands. Settings that have no runs, or a run that failed, are left out. ConveyorError if the reference failed.
+    """
+    runs: dict[Setting, list[Sample]] = {}
+    for sample in sorted(samples, key=lambda sample: sample.seed):
+        runs.setdefault(sample.setting, []).append(sample)
+    known = runs.get(reference, [])
+    for sample in known:
+        if sample.failure:
+            raise ConveyorError(f"the reference, {reference.key}, failed with seed {sample.seed}: {sample.failure}")
+    comparisons = []
+    for setting in dict.fromkeys(settings):
+        own = runs.get(setting, [])
+        if not own or not known or any(sample.failure for sample in own):
+            continue
+        for name in _judged([*own, *known]):
+            comparisons.append(_sequence(setting, name, own, known, tolerance))
+    return comparisons
+
+
+def run_until_decided(
+    scene: Scene,
+    settings: Sequence[Setting],
+    reference: Setting,
+    tolerance: float,
+    budget: float,
+    folder: Path,
+    progress: Progress,
+    processes: int | None = None,
+) -> tuple[list[Sample], list[Comparison]]:
+    """Make long runs until every observable of every setting is decided, or the budget (s, of wall time) is spent.
+
+    The first run of each setting is made in any case and tells what it costs. Then the runs of one look after another
+    are made, of the reference and of the settings that are still open; the last look is cut to the runs that the budget
+    allows. Time spent is that of the runs, as recorded, over the number of processes: a study that was interrupted is
+    taken up from its folder, and comes to what it would have come to. Settings with a run that fails get no more.
+
+    Raises ConveyorError if the reference fails, or the folder has runs of another scene or version.
+    """
+    candidates = [setting for setting in dict.fromkeys(settings) if setting != reference]
+    samples: list[Sample] = []
+    comparisons: list[Comparison] = []
+    with Ensemble(scene, folder, processes) as ensemble:
+        seeds, active = 0, [reference, *candidates] if candidates else []
+        for look in (1, *LOOKS):
+            more = look - seeds
+            if seeds and active:
+                walls = [_mean_wall(samples, setting) for setting in active]
+                left = budget - sum(sample.wall for sample in samples) / ensemble.processes
+                more = min(more, math.floor(left / (sum(walls) / ensemble.processes)))
+            if not active or more < 1:
+                break
+            seeds += more
+            made = {(sample.setting, sample.seed) for sample in samples}
+            new: list[Run] = [(setting, seed) for seed in range(seeds) for setting in active]
+            samples += _added(ensemble.run(new, progress), made)
+            comparisons = decide(samples, candidates, reference, tolerance)
+            undecided = {row.setting for row in comparisons if row.verdict == "undecided"}
+            active = [reference, *(setting for setting in candidates if setting in undecided)] if undecided else []
+            if seeds < look:
+                break
+    return samples, comparisons
+
+
+def _added(samples: Sequence[Sample], made: set[Run]) -> list[Sample]:
+    return [sample for sample in samples if (sample.setting, sample.seed) not in made]
+
+
+def _mean_wall(samples: Sequence[Sample], setting: Setting) -> float:
+    return float(np.mean([sample.wall for sample in samples if sample.setting == setting]))
+
+
+def _judged(samples: Sequence[Sample]) -> list[str]:
+    """Observables that any of the runs has, in the order of their declaration, then others."""
+    order = [observable.name for observable in OBSERVABLES]
+    passed_over = {observable.name for observable in OBSERVABLES if not observable.judged}
+    names = dict.fromkeys(name for sample in samples for name in sample.values if name not in passed_over)
+    return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
+
+
+def _sequence(
+    setting: Setting, name: str, own: Sequence[Sample], known: Sequence[Sample], tolerance: float
+) -> Comparison:
+    """The first look that decides, or else the last."""
+    candidate = [sample.values.get(name) for sample in own]
+    reference = [sample.values.get(name) for sample in known]
+    most = min(len(own), len(known))
+    for runs in (*(look for look in LOOKS if look < most), most):
+        comparison = compare(setting, name, candidate[:runs], reference[:runs], tolerance)
+        if comparison.verdict != "undecided":
+            break
+    return comparison
+
+
+def _floats(values: Sequence[float | None]) -> NDArray[np.float64]:
+    return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def _mean(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean of those that are known, and the variance of the mean."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return math.nan, math.nan
+    return float(values.mean()), float(values.var(ddof=1) / len(values)) if len(values) > 1 else math.inf
+
+
+def _interval(candidate: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float, float]:
+    """Confidence interval of the ratio of two means, less 1.
+
+    All ratios r for which candidate - r reference is not told from 0 (Fieller 1954), with the degrees of freedom of
+    Welch (1947) at the ratio that was found. The mean of the reference is not taken for exact.
+    """
+    if min(len(candidate), len(reference)) < 2 or not np.isfinite([*candidate, *reference]).all():
+        return _EVERYTHING
+    (mean, variance), (base, base_variance) = _mean(candidate), _mean(reference)
+    if not mean and not base and not variance and not base_variance:
+        return 0.0, 0.0  # nothing happened in any run of either
+    if base == 0.0:
+        return _EVERYTHING
+    ratio = mean / base
+    parts = variance, ratio**2 * base_variance
+    if sum(parts) == 0.0:
+        return ratio - 1.0, ratio - 1.0
+    freedom = sum(parts) ** 2 / (parts[0] ** 2 / (len(candidate) - 1) + parts[1] ** 2 / (len(reference) - 1))
+    t = t_quantile(0.5 * (1.0 + CONFIDENCE), freedom)
+    below = base**2 - t**2 * base_variance
+    if below <= 0.0:
+        return _EVERYTHING
+    spread = t * math.sqrt(mean**2 * base_variance + base**2 * variance - t**2 * variance * base_variance)
+    return (mean * base - spread) / below - 1.0, (mean * base + spread) / below - 1.0

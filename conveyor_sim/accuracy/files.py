@@ -1,0 +1,163 @@
+"""A study on disk: one JSON that holds all of it exactly, and CSV files of its rows for other programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from pathlib import Path
+
+from conveyor_sim.accuracy.pareto import front
+from conveyor_sim.accuracy.plain import Unlike, plain, typed
+from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.errors import ConveyorError
+
+STUDY = "study.json"
+
+Table = list[dict[str, object]]
+
+
+def write_study(study: Study, out_dir: str | Path) -> list[Path]:
+    """Write study.json and a CSV file for each kind of row that the study has, each whole or not at all.
+
+    Headings of the CSV files end in the unit, relative numbers have none. The finished runs are not among them: a
+    SampleFile holds them. Returns the files; ConveyorError if one can't be written.
+    """
+    out = Path(out_dir)
+    texts = {STUDY: json.dumps(plain(study), indent=1, allow_nan=False, ensure_ascii=False) + "\n"}
+    texts |= {f"{name}.csv": _csv(table) for name, table in _tables(study).items() if table}
+    for name, text in texts.items():
+        _write(out / name, text)
+    return [out / name for name in texts]
+
+
+def read_study(path: str | Path) -> Study:
+    """The study in a study.json, equal to the one that was written.
+
+    Raises ConveyorError if the file can't be read or holds no study.
+    """
+    try:
+        study = typed(Study, json.loads(Path(path).read_text(encoding="utf-8")))
+    except OSError as error:
+        raise ConveyorError(f"{path}: can't be read ({error.strerror}), expected the {STUDY} of a study") from None
+    except json.JSONDecodeError as error:
+        what = f"line {error.lineno}: {error.msg}"
+        raise ConveyorError(f"{path}: {what}, expected the whole {STUDY} of a study") from None
+    except Unlike as unlike:
+        raise ConveyorError(f"{path}: {unlike}") from None
+    except UnicodeDecodeError:
+        raise ConveyorError(f"{path}: is no text, expected the {STUDY} of a study") from None
+    assert isinstance(study, Study)
+    return study
+
+
+def _write(file: Path, text: str) -> None:
+    part = file.with_name(file.name + ".part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, file)
+    except OSError as error:
+        raise ConveyorError(f"{file}: can't be written ({error.strerror}), expected a folder to write to") from None
+
+
+def _tables(study: Study) -> dict[str, Table]:
+    """Rows of each CSV file, by its name: a dict a row, all of a table with the same headings."""
+    best = {point.setting for point in front(study.points)}
+    recommended = None if study.answer is None else study.answer.setting
+    return {
+        "points": [
+            {
+                **_setting(point.setting),
+                "dt_s": point.dt,
+                "predicted_error": point.predicted,
+                "position_rms_error_m": point.errors and point.errors.position_rms,
+                "position_max_error_m": point.errors and point.errors.position_max,
+                "peak_force_error": point.errors and point.errors.peak_force,
+                "impulse_error": point.errors and point.errors.impulse,
+                "energy_error": point.errors and point.errors.energy,
+                "cost_s_per_s": point.cost and point.cost.median,
+                "least_cost_s_per_s": point.cost and point.cost.least,
+                "greatest_cost_s_per_s": point.cost and point.cost.greatest,
+                "front": point.setting in best,
+                "recommended": point.setting == recommended,
+                "own": point.setting == study.own,
+                "failure": point.failure,
+            }
+            for point in study.points
+        ],
+        "orders": [
+            {
+                "case": order.case,
+                "quantity": order.quantity,
+                "integrator": order.integrator,
+                "steps": steps,
+                "error": error,
+                "phases": order.phases,
+                "observed_order": order.observed,
+                "expected_order": order.expected,
+            }
+            for order in study.orders
+            for steps, error in zip(order.steps, order.errors, strict=True)
+        ],
+        "horizons": [
+            {
+                "start_s": horizon.start,
+                "bottles": horizon.bottles,
+                "contacts": horizon.contacts,
+                "by_nudge_s": horizon.by_nudge,
+                "by_error_s": horizon.by_error,
+                "length_s": horizon.length,
+            }
+            for horizon in study.horizons
+        ],
+        "comparisons": [
+            {
+                **_setting(row.setting),
+                "observable": row.observable,
+                "runs": row.runs,
+                "mean": row.mean,
+                "standard_error": row.error,
+                "reference": row.reference,
+                "reference_standard_error": row.reference_error,
+                "low": row.low,
+                "high": row.high,
+                "tolerance": row.tolerance,
+                "verdict": row.verdict,
+            }
+            for row in study.comparisons
+        ],
+        "stiffness": [
+            {
+                "factor": row.factor,
+                "dt_s": row.dt,
+                "overlap": row.overlap,
+                "cost_ratio": row.cost_ratio,
+                "observable": name,
+                "mean": mean,
+                "standard_error": error,
+            }
+            for row in study.stiffness
+            for name, (mean, error) in (row.observables or {"": (math.nan, math.nan)}).items()
+        ],
+    }
+
+
+def _setting(setting: Setting) -> dict[str, object]:
+    return {
+        "integrator": setting.integrator,
+        "per_tick": setting.per_tick,
+        "stiffness": setting.stiffness,
+        "error_of_a_step_m_per_s": setting.error,
+    }
+
+
+def _csv(table: Table) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(table)
+    return text.getvalue()

@@ -1,0 +1,30 @@
+"""The Pareto front of a work-precision diagram: settings that no other beats in both cost and error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from conveyor_sim.accuracy.results import Point
+
+
+def front(points: Iterable[Point], softened: bool = True) -> list[Point]:
+    """The points that none is as cheap and as exact as and better in one of the two, the cheapest first.
+
+    Cost is the median wall time, error that in peak contact force; failures are left out, and so are settings of
+    another stiffness than the scene's if `softened` is false.
+    """
+    placed = [(place, p) for p in points if (softened or p.setting.stiffness == 1.0) and (place := place_of(p))]
+    chosen: list[tuple[tuple[float, float], Point]] = []
+    for place, point in sorted(placed, key=lambda pair: pair[0]):
+        if not chosen or place[1] < chosen[-1][0][1] or place == chosen[-1][0]:
+            chosen.append((place, point))
+    return [point for _, point in chosen]
+
+
+def place_of(point: Point) -> tuple[float, float] | None:
+    """Cost (s per simulated second) and relative error in peak force; None of a setting that has no place there."""
+    if point.failure or point.cost is None or point.errors is None:
+        return None
+    place = point.cost.median, point.errors.peak_force
+    return place if all(math.isfinite(value) for value in place) else None

@@ -1,0 +1,137 @@
+"""Work-precision on a scene: errors and cost of settings over a horizon in which trajectories can be compared."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from conveyor_sim.accuracy.chatter import ChatterProbe
+from conveyor_sim.accuracy.deviation import errors_of
+from conveyor_sim.accuracy.failures import failure_of
+from conveyor_sim.accuracy.horizon import HorizonFinder
+from conveyor_sim.accuracy.reference import reference_setting, reference_simulation
+from conveyor_sim.accuracy.results import Cost, Errors, Horizon, Point, Reference
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.starts import Start, find_starts
+from conveyor_sim.accuracy.timing import costs_of
+from conveyor_sim.accuracy.trajectory import Trajectory, follow, variant
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+LONGEST = 0.5
+"""s, simulated: no horizon is longer."""
+
+MOST_WORK = 5e6
+"""Bottle steps of all horizons at the preset `standard`; candidates and reference take some two hundred times that."""
+
+COST_BUDGET = 20.0
+"""s that measuring costs may take."""
+
+Progress = Callable[[float, float], None]
+"""Called with what is done so far and the whole."""
+
+
+class WorkPrecision:
+    """Compares settings on a scene, which must run at the preset `standard`.
+
+    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, then `measure`, as often as there are
+    settings; each tells its progress. SceneError or SimulationError if the scene does not run.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.starts: list[Start] = []
+        self.horizons: list[Horizon] = []
+        self.reference: Reference | None = None
+        self._true: list[Trajectory] = []
+
+    def find_starts(self, progress: Progress) -> None:
+        """Run the scene and keep states of it."""
+        self.starts = find_starts(self.scene, progress)
+
+    def find_horizons(self, progress: Progress) -> None:
+        """How far trajectories from each start can be compared; progress in starts."""
+        finder = HorizonFinder.of(self.scene)
+        bottles = sum(max(1, start.simulation.counts.present) for start in self.starts)
+        work = bottles * finder.coarse.model.steps_per_tick
+        most = max(1, round(min(LONGEST / self.scene.tick, MOST_WORK / work)))
+        self.horizons = []
+        for start in self.starts:
+            progress(len(self.horizons), len(self.starts))
+            self.horizons.append(finder.find(start, most))
+        progress(len(self.starts), len(self.starts))
+
+    def make_reference(self, progress: Progress) -> Reference:
+        """The trajectories that errors are measured against, and their doubt; progress in runs."""
+        setting = reference_setting(self.scene)
+        doubtful = replace(
+            setting,
+            per_tick=max(1, setting.per_tick // 2),
+            error=None if setting.error is None else 10.0 * setting.error,
+        )
+        runs: list[Trajectory] = []
+        for one in (doubtful, setting):
+            simulation = reference_simulation(self.scene, one)
+            for index, start in enumerate(self.starts):
+                progress(len(runs), 2 * len(self.starts))
+                runs.append(self._follow(simulation, index, start))
+                if runs[-1].broken:
+                    raise SimulationError(f"the reference: {runs[-1].broken}")
+        progress(len(runs), len(runs))
+        doubted, self._true = runs[: len(self.starts)], runs[len(self.starts) :]
+        self.reference = Reference(setting, errors_of(list(zip(doubted, self._true, strict=True))))
+        return self.reference
+
+    def measure(self, settings: Sequence[Setting], progress: Progress) -> list[Point]:
+        """Errors and cost of settings, or why they fail; progress in settings, each run and then timed.
+
+        A setting of another stiffness is compared from the start before the first contact alone: the others are no
+        states of its.
+        """
+        errors: dict[Setting, Errors] = {}
+        failures: dict[Setting, str] = {}
+        running: dict[Setting, Simulation] = {}
+        for done, setting in enumerate(settings):
+            progress(done, 2 * len(settings))
+            simulation = variant(self.scene, setting)
+            runs, failure = self._runs(simulation, setting)
+            if failure:
+                failures[setting] = failure
+            else:
+                errors[setting], running[setting] = errors_of(runs), simulation
+        costs = costs_of(
+            running,
+            self.starts[-1].simulation,
+            COST_BUDGET,
+            lambda done, whole: progress(len(settings) * (1.0 + done / whole), 2 * len(settings)),
+        )
+        progress(2 * len(settings), 2 * len(settings))
+        return [self._point(setting, errors, costs, failures) for setting in settings]
+
+    def _follow(self, simulation: Simulation, index: int, start: Start) -> Trajectory:
+        return follow(simulation, start.simulation, round(self.horizons[index].length / self.scene.tick))
+
+    def _runs(self, simulation: Simulation, setting: Setting) -> tuple[list[tuple[Trajectory, Trajectory]], str]:
+        """Runs of a setting beside the reference's, and why it fails, if it does."""
+        probe = ChatterProbe(self.scene, setting)
+        runs = []
+        for index, (start, true) in enumerate(zip(self.starts, self._true, strict=True)):
+            if setting.stiffness != 1.0 and not start.untouched:
+                continue
+            run = self._follow(simulation, index, start)
+            failure = failure_of(run, true, simulation.model) or probe.look(simulation)
+            if failure:
+                return [], failure
+            runs.append((run, true))
+        return runs, ""
+
+    def _point(
+        self, setting: Setting, errors: dict[Setting, Errors], costs: dict[Setting, Cost], failures: dict[Setting, str]
+    ) -> Point:
+        return Point(
+            setting=setting,
+            dt=setting.dt(self.scene),
+            predicted=None,
+            errors=errors.get(setting),
+            cost=costs.get(setting),
+            failure=failures.get(setting, ""),
+        )

@@ -1,0 +1,40 @@
+"""The setting that errors are measured against."""
+
+import math
+
+from conveyor_sim.accuracy.candidates import forbidden, standard_steps
+from conveyor_sim.accuracy.collision import collision_of, duration, terms_of
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.trajectory import variant
+from conveyor_sim.effects.terms import impact_speed, meetings
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+
+STEPS = 200
+"""In the shortest contact: its peak, which is sampled at steps, to (pi / n)^2 / 8 = 3e-5."""
+
+ERROR = 1e-9
+"""m/s, of a step."""
+
+FINEST = 32
+"""Steps in one of the preset `standard`, where the reference must be semi-implicit Euler."""
+
+
+def reference_setting(scene: Scene) -> Setting:
+    """dormand_prince, or semi_implicit_euler in very short steps where tangential springs forbid it."""
+    speed, terms = impact_speed(scene), terms_of(scene)
+    shortest = min((duration(collision_of(meeting, terms), speed) for meeting in meetings(terms)), default=math.inf)
+    standard = standard_steps(scene)
+    steps = max(standard, math.ceil(STEPS * scene.tick / shortest))
+    if "dormand_prince" in forbidden(scene, **_explicit(scene)):
+        return Setting("semi_implicit_euler", max(FINEST * standard, steps))
+    return Setting("dormand_prince", steps, error=ERROR)
+
+
+def reference_simulation(scene: Scene, setting: Setting) -> Simulation:
+    """The scene with a reference setting, with friction solved explicitly: in short steps both are the same law."""
+    return variant(scene, setting, **_explicit(scene))
+
+
+def _explicit(scene: Scene) -> dict[str, str]:
+    return {"friction_solver": "explicit"} if scene.friction_solver == "implicit" else {}

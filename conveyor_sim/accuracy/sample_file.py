@@ -1,0 +1,156 @@
+"""Finished runs on disk, a line each: a study that was interrupted goes on where it was."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import os
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from conveyor_sim.accuracy import jitter, observables, setting, stiffness
+from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy.results import Sample
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.observe import itinerary
+from conveyor_sim.scene import Scene
+from conveyor_sim.version import sources_hash
+
+SAMPLES = "samples.csv"
+ORIGIN = "origin.json"
+"""What a folder's results are of: hashes that a study must share to go on with them."""
+
+_OF_SETTING = ("integrator", "per_tick", "stiffness", "error")
+_COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "wall", "failure")
+
+
+class SampleFile:
+    """The finished runs of one scene in a folder: `samples.csv`, one line a run."""
+
+    def __init__(self, folder: Path, scene: Scene) -> None:
+        """Read what is there, less a last line that was cut short, and go on behind it.
+
+        Raises ConveyorError if the runs are of another scene or another version, or the folder can't be written.
+        """
+        self.path = folder / SAMPLES
+        try:
+            check_origin(folder, scene)
+            kept = self._whole_lines()
+            self.found = _parsed(kept, self.path)
+            """Runs that were there, in the order in which they were finished."""
+            self._file = open(self.path, "ab")  # noqa: SIM115 (closed by close)
+            self._file.truncate(len(kept))
+            if not kept:
+                self._write(_COLUMNS)
+        except OSError as error:
+            raise _unwritable(folder, error) from None
+
+    def append(self, sample: Sample) -> None:
+        """Add a finished run; when this returns, it is with the operating system."""
+        way = sample.setting
+        error = "" if way.error is None else repr(way.error)
+        values = [repr(sample.values[item.name]) if item.name in sample.values else "" for item in OBSERVABLES]
+        self._write(
+            (way.integrator, way.per_tick, repr(way.stiffness), error, sample.seed, *values,
+             repr(sample.wall), sample.failure)
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _write(self, row: Any) -> None:
+        line = io.StringIO()
+        csv.writer(line, lineterminator="\n").writerow(row)
+        self._file.write(line.getvalue().encode())
+        self._file.flush()
+
+    def _whole_lines(self) -> bytes:
+        content = self.path.read_bytes() if self.path.exists() else b""
+        return content[: content.rfind(b"\n") + 1]
+
+
+def check_origin(folder: Path, scene: Scene) -> None:
+    """Make sure that what is in a folder, or will be, is of this scene and this version; the folder is made.
+
+    Raises ConveyorError if it is not, or the folder can't be written.
+    """
+    origin, path = _origin(scene), folder / ORIGIN
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not path.exists() and not (folder / SAMPLES).exists():
+            part = path.with_suffix(".part")
+            part.write_text(json.dumps(origin, indent=2) + "\n", encoding="utf-8")
+            os.replace(part, path)
+        found = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    except ValueError:
+        found = {}
+    other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
+    if other:
+        raise ConveyorError(
+            f"{path}: its runs were made with another {' and another '.join(other)}, so they can't be compared with "
+            "new ones; expected another folder, or this one emptied to begin anew"
+        )
+
+
+def fingerprint(scene: Scene) -> str:
+    """A short text that tells a scene and a version from all others."""
+    return _hash(*(value.encode() for value in _origin(scene).values()))[:8]
+
+
+def _unwritable(folder: Path, error: OSError) -> ConveyorError:
+    return ConveyorError(f"{error.filename or folder}: {error.strerror}, expected a folder to write to")
+
+
+def _origin(scene: Scene) -> dict[str, str]:
+    """What decides a run, beside its setting and seed."""
+    return {
+        "scene": _hash(scene.source_text.encode(), scene.overrides_text.encode()),
+        "engine": ENGINE_HASH,
+        "version of conveyor_sim": sources_hash(),
+        "definition of settings": _hash_of_sources(setting, stiffness),
+        "definition of observables": _hash_of_sources(observables, jitter, itinerary),
+    }
+
+
+def _hash_of_sources(*modules: ModuleType) -> str:
+    return _hash(*(Path(str(module.__file__)).read_bytes() for module in modules))
+
+
+def _hash(*parts: bytes) -> str:
+    return hashlib.blake2b(b"\0".join(parts), digest_size=8).hexdigest()
+
+
+def _parsed(content: bytes, path: Path) -> list[Sample]:
+    try:
+        rows = list(csv.reader(io.StringIO(content.decode(), newline="")))
+        if rows and tuple(rows[0]) != _COLUMNS:
+            raise ValueError
+        return [_sample(dict(zip(_COLUMNS, row, strict=True))) for row in rows[1:]]
+    except ValueError:
+        raise ConveyorError(
+            f"{path}: not a file of finished runs as conveyor_sim writes it; expected another folder, or the file "
+            "removed to begin anew"
+        ) from None
+
+
+def _sample(row: dict[str, str]) -> Sample:
+    return Sample(
+        setting=Setting(
+            row["integrator"],
+            int(row["per_tick"]),
+            float(row["stiffness"]),
+            float(row["error"]) if row["error"] else None,
+        ),
+        seed=int(row["seed"]),
+        values={item.name: float(row[item.name]) for item in OBSERVABLES if row[item.name]},
+        wall=float(row["wall"]),
+        failure=row["failure"],
+    )

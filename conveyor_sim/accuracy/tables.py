@@ -1,0 +1,303 @@
+"""A study as tables: what each says, once; block.py renders them for terminals and as Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import TypeVar
+
+from rich.console import Group
+
+from conveyor_sim.accuracy.block import Block, Column
+from conveyor_sim.accuracy.pareto import front, place_of
+from conveyor_sim.accuracy.results import (
+    DEEP,
+    Comparison,
+    Cost,
+    Errors,
+    Horizon,
+    Order,
+    Point,
+    Sample,
+    StiffnessRow,
+    Study,
+)
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.words import digits, percent, setting_name, spread, with_unit
+
+Row = TypeVar("Row")
+Placed = tuple[Point, Errors, Cost]
+Quantity = tuple[str, Callable[[StiffnessRow], str]]
+
+
+def terminal(study: Study) -> Group:
+    """The study for a rich console of 80 columns or more, the answer last."""
+    return Group(*blocks(study))
+
+
+def markdown(study: Study) -> str:
+    """The same as Markdown, a heading of the third level above each table."""
+    return "\n".join(block.markdown() for block in blocks(study))
+
+
+def blocks(study: Study) -> list[Block]:
+    """The tables that the study has rows for, and the answer."""
+    parts = [
+        _orders(study.orders),
+        _horizons(study),
+        *_work(study),
+        _failures(study.points),
+        _ensembles(study),
+        _lost_runs(study),
+        _stiffness(study.stiffness),
+    ]
+    kept = [block for block in parts if block.groups]
+    if study.skipped:
+        kept.append(Block.of("Left out", (), {}, study.skipped))
+    return [*kept, _answer(study)]
+
+
+def _orders(orders: Sequence[Order]) -> Block:
+    return Block.of(
+        "Closed forms: how fast the error falls with the step",
+        [
+            Column[Order]("integrator", lambda row: row.integrator, left=True),
+            Column("order", lambda row: f"{row.observed:.2f}"),
+            Column("expected", lambda row: digits(row.expected)),
+            Column("steps", lambda row: _range(map(str, row.steps))),
+            Column("error, %", lambda row: _range(_hundredths(error) for error in row.errors)),
+        ],
+        _grouped(orders, lambda row: f"{row.case}: {row.quantity}"),
+        [f"Errors are RMS over {_all(row.phases for row in orders)} phases of entry into a step."],
+    )
+
+
+def _horizons(study: Study) -> Block:
+    doubt = study.reference.doubt
+    return Block.of(
+        "How long trajectories can be compared",
+        [
+            Column[Horizon]("from\ns", lambda row: digits(row.start)),
+            Column("bottles", lambda row: str(row.bottles)),
+            Column("contacts", lambda row: str(row.contacts)),
+            Column("a nudge grows\ntenfold in, s", lambda row: _later(row.by_nudge)),
+            Column("a coarse step's error\ngrows tenfold in, s", lambda row: _later(row.by_error)),
+            Column("compared\nover, s", lambda row: digits(row.length)),
+        ],
+        {"": study.horizons},
+        [
+            f"Reference: {setting_name(study.reference.setting, study.tick)}. It is itself in doubt by "
+            f"{percent(doubt.peak_force)} in peak force, {percent(doubt.impulse)} in impulse, "
+            f"{percent(doubt.energy)} in energy and {_millionths(doubt.position_rms)} um in position."
+        ],
+    )
+
+
+def _work(study: Study) -> list[Block]:
+    """Settings that did not fail: cost and error, and the other errors."""
+    best = {point.setting for point in front(study.points)}
+    recommended = None if study.answer is None else study.answer.setting
+
+    def marks(placed: Placed) -> str:
+        of = placed[0].setting
+        found = [("recommended", of == recommended), ("the scene's own", of == study.own), ("front", of in best)]
+        return ", ".join(word for word, holds in found if holds)
+
+    def is_recommended(placed: Placed) -> bool:
+        return placed[0].setting == recommended
+
+    notes = [
+        f"Costs on {study.machine}. Errors in peak contact force, predicted by the bounds that choose presets. "
+        "k x: factor on every stiffness. Front: nothing else tried is both as cheap and as exact."
+    ]
+    if any(point.setting.error is not None for point in study.points):
+        notes.append(
+            "A method that chooses its own steps has its largest error of a step beside it; dt is its longest."
+        )
+    if any(point.setting.stiffness != 1.0 for point in study.points):
+        notes.append("Other stiffness: at the same restitution, compared with the reference at the scene's own.")
+    placed = [(p, p.errors, p.cost) for p in study.points if p.errors and p.cost and place_of(p) is not None]
+    rows = {"": sorted(placed, key=lambda placed: (placed[2].median, placed[0].setting.key))}
+    setting = [
+        Column[Placed]("integrator", lambda row: _integrator(row[0].setting), left=True),
+        Column("dt\nus", lambda row: _millionths(row[0].dt)),
+        Column("per\ntick", lambda row: str(row[0].setting.per_tick)),
+        Column("k\nx", lambda row: digits(row[0].setting.stiffness)),
+    ]
+    work = [
+        Column[Placed]("cost\nms/s", lambda row: digits(1e3 * row[2].median)),
+        Column("x real\ntime", lambda row: digits(1.0 / row[2].median)),
+        Column("error, %\npredicted", lambda row: _hundredths(row[0].predicted)),
+        Column("error, %\nmeasured", lambda row: _hundredths(row[1].peak_force)),
+        Column("", marks, left=True),
+    ]
+    other = [
+        Column[Placed]("position\nRMS, um", lambda row: _millionths(row[1].position_rms)),
+        Column("position\nmax, um", lambda row: _millionths(row[1].position_max)),
+        Column("impulse\n%", lambda row: _hundredths(row[1].impulse)),
+        Column("energy\n%", lambda row: _hundredths(row[1].energy)),
+    ]
+    return [
+        Block.of("Work and precision, the cheapest first", [*setting, *work], rows, notes, is_recommended),
+        Block.of("The same settings: other errors", [*setting, *other], rows, strong=is_recommended),
+    ]
+
+
+def _failures(points: Sequence[Point]) -> Block:
+    failed = [point for point in points if place_of(point) is None]
+    return Block.of(
+        "Settings that failed",
+        [
+            Column[Point]("integrator", lambda row: _integrator(row.setting), left=True),
+            Column("dt\nus", lambda row: _millionths(row.dt)),
+            Column("k\nx", lambda row: digits(row.setting.stiffness)),
+            Column("why", lambda row: row.failure or "its cost or error could not be measured", left=True),
+        ],
+        {"": sorted(failed, key=lambda point: (point.setting.integrator, -point.dt, point.setting.key))},
+    )
+
+
+def _ensembles(study: Study) -> Block:
+    notes = []
+    if study.ensemble_reference is not None:
+        notes = [
+            f"Compared with {setting_name(study.ensemble_reference, study.tick)}, over seeds that jitter the infeeds. "
+            "Equivalent: the confidence interval of the difference lies within the tolerance of "
+            f"{_all(percent(row.tolerance) for row in study.comparisons)}; different: outside; undecided: neither. "
+            "It resolves: the smallest tolerance that these runs would accept."
+        ]
+    return Block.of(
+        "Long runs: what a line engineer sees",
+        [
+            Column[Comparison]("setting", lambda row: setting_name(row.setting, study.tick), left=True),
+            Column("mean", lambda row: spread(row.mean, row.error)),
+            Column("difference\n%", _interval),
+            Column("verdict", lambda row: row.verdict, left=True),
+            Column("resolves\n%", lambda row: _hundredths(row.resolution)),
+            Column("runs", lambda row: str(row.runs)),
+        ],
+        _grouped(
+            study.comparisons,
+            lambda row: f"{with_unit(row.observable)}: reference {spread(row.reference, row.reference_error)}",
+        ),
+        notes,
+    )
+
+
+def _lost_runs(study: Study) -> Block:
+    return Block.of(
+        "Long runs that ended early",
+        [
+            Column[Sample]("setting", lambda row: setting_name(row.setting, study.tick), left=True),
+            Column("seed", lambda row: str(row.seed)),
+            Column("why", lambda row: row.failure, left=True),
+        ],
+        {"": [sample for sample in study.samples if sample.failure]},
+    )
+
+
+def _stiffness(rows: Sequence[StiffnessRow]) -> Block:
+    """A row a quantity, a column a factor: there are more quantities than factors."""
+    quantities: list[Quantity] = [
+        ("time step, us", lambda row: _millionths(row.dt)),
+        ("cost, of factor 1", lambda row: digits(row.cost_ratio)),
+        ("overlap, % of diameter", lambda row: _hundredths(row.overlap) + (" !" if row.deep else "")),
+        ("error in peak force, %", lambda row: _hundredths(_peak(row.point))),
+    ]
+    base = next((row for row in rows if row.factor == 1.0), None)
+    for name in dict.fromkeys(name for row in rows for name in row.observables):
+        quantities += [(with_unit(name), partial(_mean, name=name)), ("  standard error", partial(_error, name=name))]
+        if base is not None:
+            quantities.append(("  change, %", partial(_change, base=base, name=name)))
+    return Block.of(
+        "Softer contacts at the same restitution: what changes",
+        [Column[Quantity]("stiffness x", lambda quantity: quantity[0], left=True), *map(_factor, rows)],
+        {"": quantities if rows else []},
+        [f"! Overlap above {percent(DEEP)} of the diameter: spacing, counts and sensor edges are wrong by as much."]
+        if any(row.deep for row in rows)
+        else [],
+    )
+
+
+def _factor(row: StiffnessRow) -> Column[Quantity]:
+    return Column(digits(row.factor), lambda quantity: quantity[1](row))
+
+
+def _answer(study: Study) -> Block:
+    answer = study.answer
+    if answer is None:
+        sentence = f"No setting that was tried keeps {percent(study.tolerance)} in peak force."
+        return Block.of("Answer", (), {}, [sentence])
+    if not study.comparisons:
+        verdict = []
+    elif answer.accepted:
+        verdict = ["Long runs accept it: equivalent to the reference in all that was observed."]
+    else:
+        verdict = ["Long runs have not accepted it."]
+    return Block.of("Answer", (), {}, [answer.sentence, *verdict, *answer.doubts])
+
+
+def _integrator(setting: Setting) -> str:
+    return setting.integrator + ("" if setting.error is None else f" {digits(setting.error)} m/s")
+
+
+def _grouped(rows: Iterable[Row], caption: Callable[[Row], str]) -> dict[str, list[Row]]:
+    """Rows by caption, in the order in which captions first come."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(caption(row), []).append(row)
+    return groups
+
+
+def _mean(row: StiffnessRow, name: str) -> str:
+    return digits(row.observables[name][0]) if name in row.observables else "-"
+
+
+def _error(row: StiffnessRow, name: str) -> str:
+    return digits(row.observables[name][1]) if name in row.observables else "-"
+
+
+def _change(row: StiffnessRow, base: StiffnessRow, name: str) -> str:
+    values = [of.observables.get(name, (math.nan, math.nan))[0] for of in (row, base)]
+    if row is base or values[1] == 0.0 or math.isnan(values[0]):
+        return ""
+    change = 100.0 * (values[0] / values[1] - 1.0)
+    return f"{'+' if change > 0.0 else ''}{digits(change)}"
+
+
+def _peak(point: Point | None) -> float | None:
+    return None if point is None or point.errors is None else point.errors.peak_force
+
+
+def _interval(row: Comparison) -> str:
+    """`-0.37 .. +0.04` %: two digits of the interval's length."""
+    length = 100.0 * (row.high - row.low)
+    if not (math.isfinite(length) and length > 0.0):
+        return "-"
+    decimals = max(0, 1 - math.floor(math.log10(length)))
+    low, high = (round(100.0 * end, decimals) + 0.0 for end in (row.low, row.high))  # + 0.0: no minus before a zero
+    return f"{low:+.{decimals}f} .. {high:+.{decimals}f}"
+
+
+def _hundredths(fraction: float | None) -> str:
+    return digits(None if fraction is None else 100.0 * fraction)
+
+
+def _millionths(value: float | None) -> str:
+    """um of m, us of s."""
+    return digits(None if value is None else 1e6 * value)
+
+
+def _later(seconds: float) -> str:
+    return digits(seconds) if math.isfinite(seconds) else "not seen"
+
+
+def _range(texts: Iterable[str]) -> str:
+    first, *rest = texts
+    return f"{first} .. {rest[-1]}" if rest else first
+
+
+def _all(values: Iterable[object]) -> str:
+    """What all rows have, or all that there are: `64`, `64 or 128`."""
+    return " or ".join(map(str, dict.fromkeys(values)))

@@ -1,0 +1,196 @@
+"""The embedded pair 5(4) of Dormand and Prince with error control: the reference that others are measured against.
+
+A step of dt is divided into substeps, the same for all bottles, such that the two methods of the pair differ by at most
+`accuracy.error` (m/s) in each; dt is the longest, so that no contact is stepped over. Six force evaluations a substep.
+
+The error of an impact is proportional to `accuracy.error`, whatever sets in at first touch, and 3 to 12 times as large
+(RMS over phases of entry, test/engine/test_dormand_prince.py): a jump of the force, as a dashpot's, or of its slope is
+passed in a substep so short that it does not matter. Where forces are smooth, friction below v_lim among them, the
+error is less than a hundredth of `accuracy.error` and falls as its power 5/4; across v_lim it is up to three times as
+large. With substeps of dt throughout the order in dt is 5 where forces are smooth, 3 across v_lim, and at first touch
+every method's: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with Hertz.
+
+Of the error in velocity that a jump of the force makes, the pair's difference in velocity shows as little as 1/169,
+that in position over the substep 1/79. The latter counts tenfold: then no jump makes more than 8 times what is seen.
+
+Peak forces are those at the ends of substeps, missed by up to (pi/n)^2/8 at n substeps a contact. A bottle that two
+belts hold on the line where they run against each other lets the force jump all the time, and takes substeps of about
+`accuracy.error` over the jump of its acceleration.
+
+(J. R. Dormand and P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6 (1980) 19-26.)
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import uint64
+
+from ..arrays import Bottles, Member, World
+from ..compile import kernel, part
+from ..forces import bottle_forces, pack_all, pair_phase
+from ..motion import lists_hold, note_moved
+from ..pairs import pack
+from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
+from ..team import BLOCK, share, wait_for_all
+from .phase import RESUME
+
+STAGES = 7
+LAST = STAGES - 1
+TIMES = np.array([0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0])
+WEIGHTS = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
+        [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0],
+        [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0],
+        [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
+        [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
+    ]
+)
+WAYS = ways_of(WEIGHTS)
+ERRORS = np.array([71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -0.025])
+"""(STAGES,), what the new velocity differs by from that of order 4, over h."""
+WAY_ERRORS = np.append(ERRORS[:LAST] @ WEIGHTS[:LAST] + ERRORS[LAST] * WEIGHTS[LAST], 0.0)
+
+WAY_SHARE = 10.0
+"""What the difference in position over h counts for, beside that in velocity."""
+
+SAFETY = 0.9
+SHRINK, GROW = 0.2, 5.0
+"""How much shorter or longer the next substep is at the most."""
+
+LEAST = 1e-13
+"""m/s: to ask for less is to ask for rounding errors to be smaller than they are."""
+
+FLOOR = 1e-9
+"""Of dt: a substep so short is taken whatever its error. A jump of the force costs less than 1e-9 of the speed of
+impact by then, and what is not a number must end."""
+
+
+@kernel
+def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
+    """Take `steps` steps of dt seconds, each in substeps; return how many were finished (see the package's docstring).
+
+    What is not a number even in the shortest substep ends the call as if all were: the state is not finite then.
+    """
+    bottles, allowed = world.bottles, max(world.settings.error, LEAST)
+    slopes: Any = world.slopes
+    begin, stop = share(member, bottles.x.size)
+    stage, h, left = 0, dt, dt
+    if phase == RESUME:
+        stage, h, left = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2]
+    taken = 0
+    pack_all(world, member)
+    while taken < steps:
+        pair_phase(world, member, h, 0.0)
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
+            bottle_forces(world, member, h, 0.0, first, end)
+            keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
+            if stage == 0:
+                keep_state(bottles, world.spin, slopes, first, end)
+                note_peaks(world.load, world.peaks, first, end)
+            if stage == LAST:
+                _note_errors(bottles.radius, world.spin, slopes, h, first, end)
+        if stage == LAST:
+            wait_for_all(member)
+            worst = _largest(slopes.error)
+            if worst <= allowed or h <= FLOOR * dt:
+                for first in range(begin, stop, BLOCK):
+                    end = min(first + BLOCK, stop)
+                    _accept(world, slopes, h, first, end)
+                    if worst == math.inf:
+                        _spoil(bottles, slopes.error, first, end)
+                left -= h
+                if left == 0.0:
+                    left = dt
+                    taken += 1
+                if worst == math.inf:
+                    taken = steps
+            h = _next(h, worst, allowed, left, dt)
+            stage = 0
+            if taken == steps:
+                return steps
+        stage += 1
+        for first in range(begin, stop, BLOCK):
+            end = min(first + BLOCK, stop)
+            go_to(bottles, world.spin, slopes, TIMES, WEIGHTS, WAYS, stage, h, first, end)
+            if stage == LAST:
+                come_to_rest(bottles, world.spin, first, end)
+            pack(bottles, first, end)
+            note_moved(world, member, first, end)
+        if not lists_hold(world, member):
+            if member.rank == 0:
+                slopes.progress[0], slopes.progress[1], slopes.progress[2] = stage, h, left
+            return taken
+    return taken
+
+
+@part
+def _note_errors(radius: Any, spin: Any, slopes: Any, h: float, first: int, end: int) -> None:
+    """Note how far the two methods of the pair are apart after a substep, for each bottle, in m/s.
+
+    The largest of the differences in velocity, in that of the rim, and in position over h (see above); inf for what is
+    not finite.
+    """
+    for i in range(uint64(first), uint64(end)):
+        vx, vy, x, y = 0.0, 0.0, 0.0, 0.0
+        for j in range(STAGES):
+            ax, ay = slopes.ax[j, i], slopes.ay[j, i]
+            vx += ERRORS[j] * ax
+            vy += ERRORS[j] * ay
+            x += WAY_ERRORS[j] * ax
+            y += WAY_ERRORS[j] * ay
+        speed = h * math.sqrt(vx * vx + vy * vy)
+        way = WAY_SHARE * h * math.sqrt(x * x + y * y)
+        slopes.error[i] = _finite(speed if speed > way else way)
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            omega = 0.0
+            for j in range(STAGES):
+                omega += ERRORS[j] * slopes.alpha[j, i]
+            rim = _finite(h * radius[i] * abs(omega))
+            slopes.error[i] = rim if rim > slopes.error[i] else slopes.error[i]
+
+
+@part
+def _finite(error: float) -> float:
+    """The error, or inf where it is not a number: that would be lost among the others."""
+    return error if error < math.inf else math.inf
+
+
+@part
+def _largest(errors: Any) -> float:
+    worst = 0.0
+    for i in range(uint64(errors.size)):
+        worst = errors[i] if errors[i] > worst else worst
+    return worst
+
+
+@part
+def _next(h: float, worst: float, allowed: float, left: float, dt: float) -> float:
+    """Length of the next substep, s, by the largest error in one of h: it divides what is left of the step evenly."""
+    factor = GROW
+    if worst > 0.0:
+        factor = min(GROW, max(SHRINK, SAFETY * math.pow(allowed / worst, 0.2)))
+    return left / math.ceil(left / max(factor * h, 0.5 * FLOOR * dt))
+
+
+@part
+def _accept(world: World, slopes: Any, h: float, first: int, end: int) -> None:
+    """End a substep at the state reached, and begin the next one there, with the forces found there."""
+    turn(world.spin, slopes, WAYS, h, first, end)
+    add_impulses(world.peaks, slopes, WEIGHTS, h, first, end)
+    note_peaks(world.load, world.peaks, first, end)
+    keep_state(world.bottles, world.spin, slopes, first, end)
+    keep_slopes(world.bottles, world.load, world.spin, slopes.normal, slopes, 0, first, end)
+
+
+@part
+def _spoil(bottles: Bottles, errors: Any, first: int, end: int) -> None:
+    """Leave no number as the speed of bottles whose forces were not finite, so that they are found."""
+    for i in range(first, end):
+        if errors[i] == math.inf:
+            bottles.vx[i] = math.nan

@@ -1,0 +1,61 @@
+"""The front holds what nothing beats, and nothing else."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+import pytest
+from accuracy.studies import errors, failed, point, points
+
+from conveyor_sim.accuracy.pareto import front
+from conveyor_sim.accuracy.results import Cost, Point
+
+
+def at(cost: float, error: float, stiffness: float = 1.0) -> Point:
+    return replace(point("rk4", 100, stiffness), cost=Cost(cost, cost, cost), errors=errors(error))
+
+
+def place(of: Point) -> tuple[float, float]:
+    assert of.cost is not None and of.errors is not None
+    return of.cost.median, of.errors.peak_force
+
+
+def beats(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return one != other and one[0] <= other[0] and one[1] <= other[1]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_front_is_what_no_other_beats(seed: int) -> None:
+    rng = random.Random(seed)
+    # Few levels, so that there are ties in cost, in error and in both.
+    cloud = [at(rng.randint(1, 8), rng.randint(1, 8) / 100.0) for _ in range(30)]
+    places = sorted(place(p) for p in cloud if not any(beats(place(other), place(p)) for other in cloud))
+    assert [place(p) for p in front(cloud)] == places
+
+
+def test_failures_are_left_out() -> None:
+    good, blown = at(2.0, 0.1), failed("rk4", 10, "unstable")
+    lost = replace(at(1.0, 0.01), failure="tunnelling: bottle 3")
+    undefined = at(1.0, math.nan)
+    assert front([blown, good, lost, undefined]) == [good]
+    assert front([blown]) == front([]) == []
+
+
+def test_softened_settings_are_in_or_out() -> None:
+    stiff, soft = at(2.0, 0.1), at(1.0, 0.4, stiffness=0.25)
+    assert front([stiff, soft]) == [soft, stiff]
+    assert front([stiff, soft], softened=False) == [stiff]
+
+
+def test_a_softened_setting_that_is_out_hides_nothing() -> None:
+    stiff, soft = at(2.0, 0.1), at(1.0, 0.01, stiffness=0.25)
+    assert front([stiff, soft]) == [soft]
+    assert front([stiff, soft], softened=False) == [stiff]
+
+
+def test_from_the_cheapest_to_the_exactest() -> None:
+    places = [place(p) for p in front(points())]
+    assert places == sorted(places)
+    assert [error for _, error in places] == sorted((error for _, error in places), reverse=True)

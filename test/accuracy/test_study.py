@@ -1,0 +1,133 @@
+"""A study as a whole: its parts fit, and one that was killed goes on to the same tables."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from conveyor_sim.accuracy.files import read_study
+from conveyor_sim.accuracy.measured import MEASURED
+from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.sample_file import SAMPLES
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.study import Effort, run_study, study_folder
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.scene import load_scene
+
+SCENE = """\
+name: three
+duration: 0.3
+tick: 0.005
+contacts: [{between: [glass, glass], stiffness: 20000}]
+bottle_types: {jar: {radius: 0.05, mass: 0.2, material: glass}}
+floor: none
+bottles:
+  - {type: jar, position: [0, 0], velocity: [0.8, 0]}
+  - {type: jar, position: [0.13, 0.01]}
+  - {type: jar, position: [0.26, -0.01]}
+"""
+
+ONE_RUN = Effort(budget=0.0)
+"""One long run of each setting: those are made in any case."""
+
+
+class Silent:
+    def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
+        pass
+
+
+def silent(_what: str, _counted: str) -> AbstractContextManager[Silent]:
+    return nullcontext(Silent())
+
+
+def main(file: str, folder: str) -> None:
+    """What the child of the test below does."""
+    run_study(load_scene(file), Path(folder), 0.01, ONE_RUN, silent)
+
+
+def without_walls(study: Study) -> Study:
+    """All of it but the wall times of long runs."""
+    return replace(study, samples=tuple(replace(sample, wall=0.0) for sample in study.samples))
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study whose process was killed in the middle of its long runs, and beside it its scene."""
+    root = tmp_path_factory.mktemp("study")
+    (root / "scene.yaml").write_text(SCENE)
+    folder = root / "killed"
+    code = f"import test_study; test_study.main({str(root / 'scene.yaml')!r}, {str(folder)!r})"
+    child = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parent)
+    while child.poll() is None and not (folder / SAMPLES).exists():
+        time.sleep(0.05)
+    while child.poll() is None and (folder / SAMPLES).read_bytes().count(b"\n") < 2:
+        time.sleep(0.01)
+    child.send_signal(signal.SIGKILL)
+    assert child.wait() == -signal.SIGKILL, "the study ended before it could be killed"
+    return folder
+
+
+def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Path) -> None:
+    """What was measured is not measured again, and finished runs stay; the rest is as if nothing had happened."""
+    scene = load_scene(interrupted.parent / "scene.yaml")
+    copy = interrupted.with_name("from_measured")
+    copy.mkdir()
+    for name in (MEASURED, "origin.json"):
+        shutil.copy(interrupted / name, copy)
+    before = (interrupted / SAMPLES).read_bytes()
+    resumed = run_study(scene, interrupted, 0.01, ONE_RUN, silent)
+    whole = run_study(scene, copy, 0.01, ONE_RUN, silent)
+    assert (interrupted / SAMPLES).read_bytes().startswith(before[: before.rfind(b"\n") + 1])
+    assert without_walls(resumed) == without_walls(whole)
+    assert read_study(interrupted / "study.json") == resumed
+
+    assert resumed.answer is not None
+    assert resumed.answer.error <= 0.01
+    settings = {point.setting: point for point in resumed.points}
+    exact = settings[resumed.answer.setting].errors
+    assert exact is not None
+    assert exact.peak_force == resumed.answer.error
+    assert {row.factor for row in resumed.stiffness} >= {1.0, 0.25}
+    soft = next(row for row in resumed.stiffness if row.factor == 0.25)
+    stiff = next(row for row in resumed.stiffness if row.factor == 1.0)
+    # Impact peaks go as the root of the stiffness.
+    ratio = soft.observables["peak force, 99th percentile"][0] / stiff.observables["peak force, 99th percentile"][0]
+    assert ratio == pytest.approx(0.5, rel=0.1)
+
+
+def test_a_folder_of_another_scene_is_refused(interrupted: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text(SCENE.replace("0.8, 0", "0.9, 0"))
+    before = {file.name: file.read_bytes() for file in interrupted.iterdir() if file.is_file()}
+    with pytest.raises(ConveyorError, match=r"origin\.json: .* another scene"):
+        run_study(load_scene(other), interrupted, 0.01, ONE_RUN, silent)
+    assert {file.name: file.read_bytes() for file in interrupted.iterdir() if file.is_file()} == before
+    assert study_folder(load_scene(other)) != study_folder(load_scene(interrupted.parent / "scene.yaml"))
+
+
+def test_damaged_measurements_are_named(interrupted: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "damaged"
+    copy.mkdir()
+    shutil.copy(interrupted / "origin.json", copy)
+    (copy / MEASURED).write_text('{"machine": 3}')
+    with pytest.raises(ConveyorError, match=r"measured\.json: .*expected"):
+        run_study(load_scene(interrupted.parent / "scene.yaml"), copy, 0.01, ONE_RUN, silent)
+
+
+def test_keys_of_settings_tell_them_apart() -> None:
+    settings = [
+        Setting("rk4", 10),
+        Setting("rk4", 100),
+        Setting("rk4", 10, 0.25),
+        Setting("dormand_prince", 10, error=1e-6),
+        Setting("dormand_prince", 10, error=1e-5),
+    ]
+    assert len({setting.key for setting in settings}) == len(settings)

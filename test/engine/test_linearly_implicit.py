@@ -1,0 +1,131 @@
+"""The linearly implicit method: exact energy in a lasting contact, momentum, and steps far beyond explicit limits."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scenes import MASS, RADIUS, base, belt, bottle, contact, polyline, scene, simulation
+from worlds import ALONE, FAR, state_of
+
+from conveyor_sim.engine.integrators import START
+from conveyor_sim.engine.integrators.linearly_implicit import advance
+from conveyor_sim.simulation import Simulation
+
+G, MU = 9.81, 0.4
+METHOD = "linearly_implicit"
+
+
+def test_a_spring_in_contact_keeps_its_energy() -> None:
+    """The midpoint rule keeps a quadratic energy, if the tangent is the spring's and the system is solved."""
+    stiffness, depth, steps = 5000.0, 0.01, 30
+    given = scene(
+        contacts=[contact(stiffness)],
+        floor="none",
+        accuracy={"integrator": METHOD},
+        bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
+    )
+    state = state_of(given, [(0.0, 0.0), (2.0 * RADIUS - depth, 0.0)])
+    quarter = 0.5 * math.pi * math.sqrt(0.5 * MASS / stiffness)
+    bottles = state.world.bottles
+    for _ in range(steps):
+        advance(state.world, ALONE, 1, 0.9 * quarter / steps, START)
+        overlap = 2.0 * RADIUS - (bottles.x[1] - bottles.x[0])
+        assert overlap > 0.0
+        energy = 0.5 * MASS * float((bottles.vx[:2] ** 2).sum()) + 0.5 * stiffness * overlap**2
+        # Solved to 1e-8 of each kick.
+        assert energy == pytest.approx(0.5 * stiffness * depth**2, rel=1e-7)
+
+
+def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
+    """48 bottles, hexagonally packed, that a belt presses onto a wall; steps of `ratio` times the explicit limit."""
+    rows, columns, pitch = 6, 8, 0.131
+    height, length = (rows - 1) * pitch * math.sqrt(3.0) / 2.0, columns * pitch + 0.2
+    laws = {"damping": ("paper", 0.1), "friction": 0.1}
+    side = RADIUS + 0.0005
+    dt = round(ratio * 2.0 / math.sqrt(6.0 * stiffness / MASS), 9)
+    grid = {
+        "type": "bottle",
+        "origin": [length - RADIUS - 0.001 - (columns - 0.5) * pitch, 0.0],
+        "rows": rows,
+        "columns": columns,
+        "pitch": pitch,
+        "pattern": "hexagonal",
+    }
+    walls = [(0.0, -side), (length, -side), (length, height + side), (0.0, height + side)]
+    return simulation(
+        tick=dt,
+        duration=1000 * dt,
+        gravity=G,
+        accuracy={"integrator": METHOD, "per_tick": 1},
+        contacts=[contact(stiffness, **laws), contact(2.0 * stiffness, "steel", **laws)],
+        base=base(MU),
+        belts={"belt": belt(0.25, (-1.0, -1.0), 5.0, 5.0)},
+        rails={"walls": polyline(walls)},
+        bottles=[{"grid": grid}],
+    )
+
+
+@pytest.mark.parametrize("ratio", [5.0, 20.0])
+def test_a_packing_rests_at_steps_far_beyond_the_explicit_limit(ratio: float) -> None:
+    """The wall carries mu m g a bottle, less what the sides take by friction; nothing ever goes fast."""
+    sim = packing(ratio)
+    fastest = 0.0
+    while sim.time < 2.0:
+        sim.advance()
+        state = sim.bottles()
+        fastest = max(fastest, float(np.hypot(state.vx, state.vy).max()))
+    assert fastest < 0.5
+    assert np.hypot(state.vx, state.vy).max() < 1e-3
+    contacts = sim.contacts()
+    wall = (contacts.kind == 1) & (contacts.nx > 0.9)
+    sides = (contacts.kind == 1) & (np.abs(contacts.ny) > 0.9)
+    carried = contacts.normal_force[wall].sum() + np.abs(contacts.tangential_force[sides]).sum()
+    # The rest is in motion still: bottles creep along each other below v_lim.
+    assert carried == pytest.approx(48 * MU * MASS * G, rel=0.05)
+
+
+def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> None:
+    """A bottle set down on a belt is taken along: its slip falls to rest and never turns round."""
+    limit = 0.01 / (MU * G)
+    tick = round(10.0 * limit, 6)
+    sim = simulation(
+        tick=tick,
+        duration=1000 * tick,
+        gravity=G,
+        accuracy={"integrator": METHOD, "per_tick": 1},
+        base=base(MU),
+        belts={"belt": belt(0.5)},
+        bottles=[bottle(0.0, 0.0)],
+    )
+    slips = []
+    for _ in range(60):
+        sim.advance()
+        slips.append(0.5 - float(sim.bottles().vx[0]))
+    rises = [later - earlier for earlier, later in pairwise(slips)]
+    assert max(rises) < 1e-9  # m/s: what the solver leaves
+    assert min(slips) > -1e-9
+    assert slips[-1] < 1e-6
+
+
+def test_momentum_of_a_closed_system() -> None:
+    """However early the solver stops: contact forces are equal and opposite."""
+    rng = np.random.default_rng(4)
+    places = [(0.14 * i + 0.005 * rng.random(), 0.14 * j + 0.005 * rng.random()) for i in range(5) for j in range(5)]
+    speeds = rng.normal(0.0, 0.5, (25, 2))
+    sim = simulation(
+        accuracy={"integrator": METHOD, "per_tick": 4},
+        contacts=[contact(1e5, damping=("normal", 5.0), friction=0.3)],
+        floor="none",
+        bottles=[bottle(x, y, float(u), float(v)) for (x, y), (u, v) in zip(places, speeds, strict=True)],
+    )
+    before = speeds.sum(axis=0)
+    touched = 0
+    for _ in range(40):
+        sim.advance()
+        touched += len(sim.contacts().a)
+    state = sim.bottles()
+    assert touched > 20
+    np.testing.assert_allclose([state.vx.sum(), state.vy.sum()], before, rtol=0.0, atol=1e-12)
