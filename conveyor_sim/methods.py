@@ -8,6 +8,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+HUGE = 1e100
+"""Times the time of a share that a step may be before its power may be more than a double holds."""
+
 STEP_ERROR = 1e-6
 """m/s, default of the largest error of a step, of a method that divides its steps itself."""
 
@@ -24,7 +27,8 @@ class Share:
 
     def at(self, dt: float) -> float:
         """Relative error at a time step in s."""
-        return self.coefficient * math.pow(dt / self.time, self.power)
+        many = dt / self.time
+        return self.coefficient * math.pow(many, self.power) if many < HUGE else math.inf
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,12 @@ class Method:
     slip: float
     """Of mu (w dt)^2 / 2, the kick of friction in the last step of an impact, over the speed of impact."""
     second_order: bool
-    """Whether smooth damping and friction are met at order 2 or more."""
+    """Whether smooth damping is met at order 2 or more."""
+    creep: float = 0.0
+    """Of n^-creep_order, the part by which creep on curved belts is off at n steps in v_lim / (mu g)."""
+    creep_order: float = 1.0
+    creep_steps: float = 0.0
+    """The fewest such steps for which that holds; in fewer, creep is off by about one part in them."""
     explicit: bool = True
     """Whether it is unstable or chatters in long steps."""
     own_error: float = 0.0
@@ -64,6 +73,16 @@ class Method:
         lost = max(jumping, falling)
         return [Share("dashpot at first touch", lost / rate, 1.0 / rate, 1.0)] if lost > 0.0 else []
 
+    def creep_off(self, steps: float) -> float:
+        """Relative error of creep on curved belts at so many steps in v_lim / (mu g)."""
+        if self.creep == 0.0 or steps >= self.creep_steps:
+            return self.creep * math.pow(steps, -self.creep_order)
+        return 1.0 / steps
+
+    def slip_steps(self, creep: float) -> float:
+        """Steps in v_lim / (mu g) by which creep is off by at most so much; 0: it never is."""
+        return max(self.creep_steps, math.pow(self.creep / creep, 1.0 / self.creep_order))
+
     def growing(self, name: str, coefficient: float, exponent: float, rate: float, frequency: float) -> Share:
         """A dashpot that grows with the overlap as (w t)^exponent, c / m_r in 1/s at its largest; rad/s."""
         if not self.second_order:
@@ -73,13 +92,25 @@ class Method:
 
 METHODS: Mapping[str, Method] = {
     # 1/sqrt(3), RMS over phases of the greatest, is 0.58.
-    "semi_implicit_euler": Method(peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, onset=0.35, slip=1.3, second_order=False),
+    "semi_implicit_euler": Method(
+        peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, onset=0.35, slip=1.3, second_order=False, creep=1.0
+    ),
     "velocity_verlet": Method(peak=0.6, jump=0.6, touch=0.0, tsuji=0.3, onset=0.2, slip=2.7, second_order=True),
     "rk4": Method(peak=0.55, jump=0.2, touch=0.7, tsuji=0.11, onset=0.17, slip=0.5, second_order=True),
     "dormand_prince": Method(
         peak=0.5, jump=0.0, touch=0.0, tsuji=0.0, onset=0.17, slip=0.0, second_order=True, explicit=False, own_error=8.0
     ),
     "linearly_implicit": Method(
-        peak=0.57, jump=0.34, touch=1.0, tsuji=0.24, onset=0.22, slip=1.0, second_order=True, explicit=False
+        peak=0.57,
+        jump=0.34,
+        touch=1.0,
+        tsuji=0.24,
+        onset=0.22,
+        slip=1.0,
+        second_order=True,
+        creep=0.4,
+        creep_order=2.0,
+        creep_steps=4.0,
+        explicit=False,
     ),
 }

@@ -46,7 +46,7 @@ def table() -> str:
             "by which a peak between two of so many steps is missed, (π/n)²/8",
             lambda tolerance: percent((math.pi / least_steps(tolerance)) ** 2 / 8.0),
         ),
-        ("steps in v_lim/(μ g), methods of first order", lambda tolerance: f"{least_steps(tolerance):.3g}"),
+        ("steps in v_lim/(μ g), semi-implicit Euler", lambda tolerance: f"{least_steps(tolerance):.3g}"),
         (
             "by which creep on curved belts is then off",
             lambda tolerance: percent(1.0 / least_steps(tolerance)),

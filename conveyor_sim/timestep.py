@@ -44,12 +44,12 @@ def hertz_contact_time(stiffness: float, reduced_mass: float, speed: float) -> f
 
 def lattice_bound(stiffness: float, mass: float) -> float:
     """Half of the stability limit of a hexagonal packing, 2 / sqrt(6 k / m), in s."""
-    return 1.0 / math.sqrt(6.0 * stiffness / mass)
+    return math.sqrt(mass / stiffness / 6.0)
 
 
 def wedge_bound(stiffness: float, mass: float) -> float:
     """Half of the stability limit of a bottle between two rails, 2 / sqrt(2 k / m), in s."""
-    return 1.0 / math.sqrt(2.0 * stiffness / mass)
+    return math.sqrt(mass / stiffness / 2.0)
 
 
 def damping_bound(coefficient: float, reduced_mass: float) -> float:

@@ -199,7 +199,7 @@ def test_shorter_steps_are_never_predicted_worse(integrator: str) -> None:
         finer = {term.quantity: term.value for term in fine.prediction.terms}
         for term in coarse.prediction.terms:
             assert finer.get(term.quantity, 0.0) <= term.value
-    assert models[-1].steps_per_tick > 10 * models[0].steps_per_tick
+    assert models[-1].steps_per_tick > 5 * models[0].steps_per_tick
 
 
 def test_an_undamped_peak_is_missed_by_its_part_of_pi_over_n_squared_over_8() -> None:
@@ -284,12 +284,9 @@ def test_the_tangential_speed_after_an_impact(integrator: str) -> None:
 @pytest.mark.parametrize("steps", [8, 20, 80])
 @pytest.mark.parametrize("integrator", METHODS)
 def test_the_creep_on_a_turn_table(integrator: str, steps: int) -> None:
-    """2, 5 and 20 steps in v_lim / (mu g): a method of first order loses as much as predicted, others next to nothing.
-
-    dr/dt = v_lim (1 - sqrt(1 - Omega^2 r / (mu g))), by a step too short to lose much of it.
-    """
+    """2, 5 and 20 steps in v_lim / (mu g): semi-implicit Euler loses as predicted, most lose next to nothing."""
     radius, sims = 0.5, []
-    omega = math.sqrt(0.5 * MU * G / radius)
+    omega = math.sqrt(0.8 * MU * G / radius)
     for table in (turntable(omega, radius, steps=steps, integrator=integrator), turntable(omega, radius, steps=2000)):
         table.advance(50)
         start = distance(table)
@@ -297,10 +294,12 @@ def test_the_creep_on_a_turn_table(integrator: str, steps: int) -> None:
         sims.append((table, distance(table) - start))
     (table, creep), (_, expected) = sims
     error = abs(creep / expected - 1.0)
-    if METHODS[integrator].second_order:
+    if METHODS[integrator].creep == 0.0:
         assert error < 1e-3
         assert table.model.prediction.terms == ()
     else:
         (term,) = table.model.prediction.terms
         assert term.quantity == "creep on curved belts"
-        assert 0.5 * term.value < error <= term.value
+        assert error <= term.value
+        # Fewer than 4 of its steps are the implicit Euler method's, whose error passes through 0 on the way.
+        assert steps == 8 or 0.5 * term.value < error

@@ -108,7 +108,8 @@ class WorkPrecision:
         return [self._point(setting, errors, costs, failures) for setting in settings]
 
     def _follow(self, simulation: Simulation, index: int, start: Start) -> Trajectory:
-        return follow(simulation, start.simulation, round(self.horizons[index].length / self.scene.tick))
+        """From a start over its horizon and a tick, which `errors_of` wants besides."""
+        return follow(simulation, start.simulation, round(self.horizons[index].length / self.scene.tick) + 1)
 
     def _runs(self, simulation: Simulation, setting: Setting) -> tuple[list[tuple[Trajectory, Trajectory]], str]:
         """Runs of a setting beside the reference's, and why it fails, if it does."""

@@ -79,7 +79,11 @@ def _strongest(scene: Scene, setting: Setting, progress: Callable[[float], None]
 
 
 def _lead(scene: Scene) -> int:
-    """Ticks from a start to the strongest tick: the longest contact that ends, and one."""
+    """Ticks from a start to that of the peak: the first half of the longest contact that ends.
+
+    A short contact, of the beginning of which up to a twentieth of a tick would be lost, gets none.
+    """
     terms = terms_of(scene)
     times = [duration(collision_of(meeting, terms), impact_speed(scene)) for meeting in meetings(terms)]
-    return 1 + math.ceil(max((time for time in times if time < math.inf), default=0.0) / scene.tick)
+    longest = max((time for time in times if time < math.inf), default=0.0)
+    return math.ceil(0.5 * longest / scene.tick - 0.05)

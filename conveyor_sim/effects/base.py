@@ -22,25 +22,33 @@ def _friction(scene: Scene, on: Collection[str]) -> Cause | None:
 
 
 def _friction_bounds(terms: Terms) -> list[Bound]:
-    if terms.laws.base_friction is None or _implicit_point(terms) or not terms.method.explicit:
+    if terms.laws.base_friction is None or _implicit_point(terms):
         return []
     mu, g, limit = float(terms.laws.base_friction.max()), terms.scene.gravity, terms.scene.slip_limit
-    bounds = [Bound("base friction", base_friction_bound(mu, g, limit), f"half of v_lim / (mu g) at mu = {mu:g}", True)]
-    if not terms.method.second_order:
-        reason = f"{terms.steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
-        bounds.append(Bound("base slip", slip_time(mu, g, limit) / terms.steps, reason))
+    bounds = []
+    if terms.method.explicit:
+        reason = f"half of v_lim / (mu g) at mu = {mu:g}"
+        bounds.append(Bound("base friction", base_friction_bound(mu, g, limit), reason, stability=True))
+    if (steps := _slip_steps(terms)) > 0.0:
+        reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
+        bounds.append(Bound("base slip", slip_time(mu, g, limit) / steps, reason))
     return bounds
+
+
+def _slip_steps(terms: Terms) -> float:
+    """Steps in v_lim / (mu g) by which a method of first order is off by one part in `least_steps`."""
+    return terms.method.slip_steps(1.0 / terms.steps)
 
 
 def _creep(terms: Terms, dt: float) -> list[Term]:
     """Of a bottle held on its circle by friction: its velocity lags by half a step (test/physics/test_turntable.py)."""
-    if terms.laws.base_friction is None or terms.method.second_order or "curved_belts" not in terms.on:
+    if terms.laws.base_friction is None or "curved_belts" not in terms.on:
         return []
     mu = float(terms.laws.base_friction.max())
-    time = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit)
-    lag = "more" if _implicit_point(terms) else "less"
-    reason = f"so much {lag}, one part in the {time / dt:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
-    return [Term("creep on curved belts", min(1.0, dt / time), reason)]
+    steps = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit) / dt
+    off = terms.method.creep_off(steps)
+    reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
+    return [Term("creep on curved belts", off, reason)] if off > 0.0 else []
 
 
 def _implicit_point(terms: Terms) -> bool:
@@ -59,19 +67,20 @@ def _ring(scene: Scene, on: Collection[str]) -> Cause | None:
 
 def _ring_bounds(terms: Terms) -> list[Bound]:
     """The slope of the spinning ring's moment at rest is that of the sliding point's force, for J / (m R_b^2)."""
-    if terms.laws.base_friction is None or not terms.method.explicit:
+    if terms.laws.base_friction is None:
         return []
     mu = float(terms.laws.base_friction.max())
-    time = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit)
+    time, steps = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit), _slip_steps(terms)
     stable, exact = [], []
     for kind in terms.types:
         if kind.base_radius is not None:
             spin = time * kind.moment_of_inertia / (kind.mass * kind.base_radius**2)
             reason = f"v_lim J / (mu g m R_b^2) at mu = {mu:g}, R_b = {kind.base_radius:g} m"
-            stable.append((0.5 * spin, f"half of {reason}"))
-            exact.append((spin / terms.steps, f"{terms.steps:.3g} steps in {reason}"))
-    bounds = tightest("spin on the base", stable, stability=True)
-    return bounds if terms.method.second_order else [*bounds, *tightest("base spin", exact)]
+            if terms.method.explicit:
+                stable.append((0.5 * spin, f"half of {reason}"))
+            if steps > 0.0:
+                exact.append((spin / steps, f"{steps:.3g} steps in {reason}"))
+    return [*tightest("spin on the base", stable, stability=True), *tightest("base spin", exact)]
 
 
 def _belts(scene: Scene, on: Collection[str]) -> Cause | None:
@@ -93,9 +102,10 @@ BASE_FRICTION = Effect(
     absent="no friction under the bottles",
     needs="mu by belt and bottle type, velocity of each surface",
     bounds=_friction_bounds,
-    bound="half of v_lim / (mu g); with a method of first order, 2 / sqrt(tolerance) steps in it, 20 at 1 %",
+    bound="half of v_lim / (mu g); with semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %; with the "
+    "linearly implicit method 4 steps in it, as it is stable in any",
     side=_creep,
-    beside="of creep on curved belts, with a method of first order, one part in the steps in v_lim / (mu g)",
+    beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
 )
 RING_BASE = Effect(
     name="ring_base",

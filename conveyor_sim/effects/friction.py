@@ -61,7 +61,7 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
         resolved = math.pi * mu * meeting.reduced_mass * mobility * speed / terms.scene.slip_limit
         steps = math.pi / (w * dt)
         if mu > 0.0 and steps < resolved:
-            kick = 0.5 * terms.method.slip * mu * (w * dt) ** 2
+            kick = 0.5 * terms.method.slip * mu * (w * dt) * (w * dt)
             reason = (
                 f"{steps:.3g} steps an impact of {meeting.what} at {speed:g} m/s, of {resolved:.3g}, 2 pi mu v / v_lim"
             )

@@ -5,18 +5,14 @@ docs/accuracy.md shows the same for the scenes that it is made from.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
-from scenes import base, belt, contact, line, polyline, scene
+from scenes import base, belt, line, polyline, scene
 
 from conveyor_sim.accuracy.candidates import preset_setting
 from conveyor_sim.accuracy.precision import WorkPrecision
 from conveyor_sim.model import build_model
 from conveyor_sim.presets import PRESETS
-from conveyor_sim.scene import Scene, load_scene
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
+from conveyor_sim.scene import Scene
 
 
 def silent(_done: float, _whole: float) -> None:
@@ -41,28 +37,9 @@ def hertz_on_a_table() -> Scene:
     )
 
 
-def stiff_pet() -> Scene:
-    """Light bottles of low restitution, thrown at each other and at a wall on a running belt."""
-    laws = {"damping": ("paper", 6.0), "friction": 0.3}
-    return scene(
-        duration=1.0,
-        contacts=[contact(2e5, **laws), contact(4e5, "steel", **laws)],
-        bottle_types={"bottle": {"radius": 0.03, "mass": 0.03, "material": "glass"}},
-        base=base(0.3),
-        belts={"belt": belt(0.7)},
-        rails={"wall": polyline([(0.6, -1.0), (0.6, 1.0)])},
-        bottles=[
-            {"type": "bottle", "position": [0.1 * i, 0.02 * (i % 3)], "velocity": [0.9 - 0.3 * i, 0.1]}
-            for i in range(5)
-        ],
-    )
-
-
 SCENES = {
-    "push": lambda: load_scene(EXAMPLES / "push.yaml", {"duration": 7.0}),
     "mixed line": mixed_line,
     "hertz on a table": hertz_on_a_table,
-    "stiff pet": stiff_pet,
 }
 
 

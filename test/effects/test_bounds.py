@@ -156,11 +156,11 @@ def test_implicit_friction_lifts_the_bounds_of_friction() -> None:
         ("velocity_verlet", {"base friction", "normal damping", "contact friction", *ELASTIC}),
         ("rk4", {"base friction", "normal damping", "contact friction", *ELASTIC}),
         ("dormand_prince", {"impact of two bottles"}),
-        ("linearly_implicit", {"impact of two bottles"}),
+        ("linearly_implicit", {"impact of two bottles", "base slip"}),
     ],
 )
 def test_integrators_are_bounded_by_what_they_can_not_do(integrator: str, expected: set[str]) -> None:
-    """Slip under bottles by methods of first order; impacts alone where long steps stay stable, or are divided."""
+    """Slip under bottles where it is met at a low order; nothing for stability in steps that are, or are divided."""
     rough = contact(5e3, friction=0.3, damping=("normal", 0.1))
     assert set(bounds(rough, floor={"friction": 0.4}, accuracy={"integrator": integrator})) == expected
 

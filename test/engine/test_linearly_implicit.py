@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from conveyor_sim.simulation import Simulation
 
 G, MU = 9.81, 0.4
 METHOD = "linearly_implicit"
+LAWS: dict[str, Any] = {"damping": ("paper", 0.1), "friction": 0.1}
 
 
 def test_a_spring_in_contact_keeps_its_energy() -> None:
@@ -43,7 +45,6 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
     """48 bottles, hexagonally packed, that a belt presses onto a wall; steps of `ratio` times the explicit limit."""
     rows, columns, pitch = 6, 8, 0.131
     height, length = (rows - 1) * pitch * math.sqrt(3.0) / 2.0, columns * pitch + 0.2
-    laws = {"damping": ("paper", 0.1), "friction": 0.1}
     side = RADIUS + 0.0005
     dt = round(ratio * 2.0 / math.sqrt(6.0 * stiffness / MASS), 9)
     grid = {
@@ -60,7 +61,7 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
         duration=1000 * dt,
         gravity=G,
         accuracy={"integrator": METHOD, "per_tick": 1},
-        contacts=[contact(stiffness, **laws), contact(2.0 * stiffness, "steel", **laws)],
+        contacts=[contact(stiffness, **LAWS), contact(2.0 * stiffness, "steel", **LAWS)],
         base=base(MU),
         belts={"belt": belt(0.25, (-1.0, -1.0), 5.0, 5.0)},
         rails={"walls": polyline(walls)},
@@ -96,9 +97,11 @@ def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> Non
         duration=1000 * tick,
         gravity=G,
         accuracy={"integrator": METHOD, "per_tick": 1},
+        contacts=[contact(1e5, **LAWS), contact(2e5, "steel", **LAWS)],
         base=base(MU),
-        belts={"belt": belt(0.5)},
-        bottles=[bottle(0.0, 0.0)],
+        belts={"belt": belt(0.5, (-1.0, -1.0), 5.0, 5.0)},
+        rails={"far": polyline([(0.0, 3.0), (1.0, 3.0)])},
+        bottles=[bottle(0.0, 0.0), bottle(0.0, 1.0)],
     )
     slips = []
     for _ in range(60):
