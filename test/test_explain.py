@@ -81,15 +81,17 @@ def test_bounds_are_told_with_the_one_that_rules() -> None:
     assert any(line.startswith("time step 126.6 us: 79 steps a tick: standard (1 % in") for line in lines)
 
 
-MISSED = percent(WHOLE_SCENE * 0.6 * (math.pi / 14.05) ** 2 / 8)
-"""14 ms of contact without damping in steps of 1 ms."""
+MISSED, BRAKED = 0.6 * (math.pi / 14.05) ** 2 / 8, 0.4 * 9.81 * 1e-3 / (2 * 0.2 * 1.0)
+"""Of a peak, in steps of 1 ms, and of the speed of impact, a fifth of 1 m/s: 14 ms of contact without damping."""
+EXPECTED = percent(WHOLE_SCENE * math.hypot(MISSED, BRAKED))
 
 
 def test_the_errors_to_expect_are_told_with_their_reasons() -> None:
     lines = explained(TEXT.replace("duration: 1.0", "duration: 1.0\naccuracy: {per_tick: 10}"))
     (force,) = [line for line in lines if line.startswith("predicted error")]
-    impact = "impact of two bottles, 14 steps a contact, peak between steps"
-    assert force.startswith(f"predicted error {MISSED} in contact force: {impact}")
+    parts = f"braking by the base {percent(BRAKED)}, peak between steps {percent(MISSED)},"
+    impact = f"impact of two bottles, 14 steps a contact, {parts}"
+    assert force.startswith(f"predicted error {EXPECTED} in contact force: {impact}")
     assert any(line.startswith("0.32 % in tangential speed after an impact: 14 steps an impact") for line in lines)
 
 
@@ -98,7 +100,8 @@ def test_a_setting_in_one_line() -> None:
     line = setting_line(build_model(scene))
     assert "\n" not in line
     assert line.startswith("semi_implicit_euler, dt = 1 ms (10 steps a tick, given in the scene; ")
-    assert line.endswith("; predicted error: 0.37 % in contact force, 0.32 % in tangential speed after an impact")
+    tangential = "0.32 % in tangential speed after an impact"
+    assert line.endswith(f"; predicted error: {EXPECTED} in contact force, {tangential}")
 
 
 def test_a_scene_without_bounds() -> None:

@@ -12,7 +12,7 @@ from conveyor_sim.accuracy.collision import Collision, damping_ratio, duration, 
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.simulation import Simulation
 
-STRONG = 4.0
+STRONG = 3.0
 """Of zeta n: from there on the dashpot's jump at first touch, 0.3 x 2 pi zeta / n, is well above what the spring alone
 makes, 0.7 / n^2."""
 
@@ -58,10 +58,8 @@ class HeadOn:
 
     @property
     def strength(self) -> float:
-        """zeta, or what damping that sets in at zero is like."""
-        if self.collision.damping == "onset":
-            return self.collision.meeting.value(self.collision.meeting.law.damping_onset) * self.speed / 3.0
-        return damping_ratio(self.collision) if self.collision.damping else 0.0
+        """zeta of a dashpot whose order differs from the spring's, else 0."""
+        return damping_ratio(self.collision) if self.collision.damping in ("paper", "normal", "tsuji") else 0.0
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -115,17 +113,15 @@ class HeadOn:
         elastic, damping = self.collision.elastic, self.collision.damping
         steps = self.steps[-4:]
         spring = 2.5 if elastic == "hertz" else 2.0
-        if damping and self.strength * steps[0] < STRONG:
-            # A dashpot that hardly matters: not at all, or from some step on.
-            return spring if self.strength * steps[-1] < WEAK else None
         if not damping:
             return spring
-        if damping in ("paper", "normal"):
-            return 1.0
-        if damping == "tsuji":
-            return min(float(smooth_order), 1.25)
-        # The first-order error of semi-implicit Euler, dt/2 (da/dv) a, is that of another elastic law: e is the same.
-        return min(max(2.0, float(smooth_order)), spring)
+        if damping == "onset":
+            # Semi-implicit Euler's first-order error, dt/2 (da/dv) a, is that of another elastic law: e is the same.
+            return min(max(2.0, float(smooth_order)), spring)
+        if self.strength * steps[0] < STRONG:
+            # A dashpot that hardly matters: not at all, or in short steps only.
+            return spring if self.strength * steps[-1] < WEAK else None
+        return min(float(smooth_order), 1.25) if damping == "tsuji" else 1.0
 
 
 def sliding_loss(collision: Collision, speed: float, slip: float, restitution: float, turns: bool) -> float:

@@ -3,12 +3,16 @@
 from collections.abc import Collection
 
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Terms, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, impact_speed, tightest
 from conveyor_sim.laws import base_friction
+from conveyor_sim.methods import Share
 from conveyor_sim.prediction import Term
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, base_friction_bound, slip_time
+
+MEETING = 0.2
+"""Of the fastest speed in a scene: at which most bottles meet, on the scenes of docs/accuracy.md."""
 
 
 def _friction(scene: Scene, on: Collection[str]) -> Cause | None:
@@ -49,6 +53,14 @@ def _creep(terms: Terms, dt: float) -> list[Term]:
     off = terms.method.creep_off(steps)
     reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
     return [Term("creep on curved belts", off, reason)] if off > 0.0 else []
+
+
+def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
+    """Semi-implicit Euler brakes by half a step too much or too little: speeds of impact are off by mu g dt / 2."""
+    if terms.laws.base_friction is None or terms.method.second_order:
+        return []
+    braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
+    return [Share("braking by the base", 1.0, 2.0 * MEETING * impact_speed(terms.scene) / braking, 1.0)]
 
 
 def _implicit_point(terms: Terms) -> bool:
@@ -104,6 +116,8 @@ BASE_FRICTION = Effect(
     bounds=_friction_bounds,
     bound="half of v_lim / (mu g); with semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %; with the "
     "linearly implicit method 4 steps in it, as it is stable in any",
+    shares=_braked,
+    share="with semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
     side=_creep,
     beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
 )
