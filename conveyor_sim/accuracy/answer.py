@@ -71,7 +71,9 @@ def _doubts(chosen: Point, reference: Reference, comparisons: Sequence[Compariso
     if reference.doubt.peak_force > 0.1 * _error(chosen):
         doubts.append(f"The reference itself is only sure to {percent(reference.doubt.peak_force)} in peak force.")
     undecided = [row for row in comparisons if row.verdict == "undecided"]
-    if undecided:
+    if comparisons and max(row.runs for row in comparisons) < 2:
+        doubts.append("The budget allowed one long run of each, which compares nothing; --thorough makes more.")
+    elif undecided:
         texts = [f"{row.observable} to {percent(row.resolution)} ({row.runs} runs)" for row in undecided]
         doubts.append(f"Long runs could not decide within the budget; they resolve {', '.join(texts)}.")
     if not comparisons:

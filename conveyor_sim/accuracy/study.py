@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Protocol
@@ -17,7 +17,9 @@ from conveyor_sim.accuracy.files import write_study
 from conveyor_sim.accuracy.measured import Measured, measured_once
 from conveyor_sim.accuracy.results import Answer, Comparison, Point, Sample, StiffnessRow, Study
 from conveyor_sim.accuracy.sample_file import fingerprint
-from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.setting import Setting, with_setting
+from conveyor_sim.accuracy.words import digits
+from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 
 EXACT = 0.1
@@ -80,7 +82,7 @@ def run_study(scene: Scene, folder: Path, tolerance: float, effort: Effort, bars
         ensemble_reference=reference,
         stiffness=tuple(_stiffness_rows(scene, measured.points, samples)),
         skipped=measured.skipped,
-        answer=_answer(measured, comparisons, tolerance),
+        answer=_with_stability(_answer(measured, comparisons, tolerance), scene),
     )
     write_study(study, folder)
     return study
@@ -88,6 +90,21 @@ def run_study(scene: Scene, folder: Path, tolerance: float, effort: Effort, bars
 
 def _answer(measured: Measured, comparisons: Sequence[Comparison], tolerance: float) -> Answer | None:
     return find_answer(measured.points, measured.reference, comparisons, tolerance)
+
+
+def _with_stability(answer: Answer | None, scene: Scene) -> Answer | None:
+    """The answer, with a doubt if its step is beyond a bound of stability, which is one of the worst case."""
+    if answer is None:
+        return None
+    model = build_model(with_setting(scene, answer.setting))
+    tightest = min((bound for bound in model.bounds if bound.stability), key=lambda bound: bound.dt, default=None)
+    if tightest is None or model.dt <= tightest.dt:
+        return answer
+    doubt = (
+        f"Its step is {digits(model.dt / tightest.dt)} x beyond the bound of stability by {tightest.name} "
+        f"({tightest.reason}): it held here, but may chatter in a longer queue."
+    )
+    return replace(answer, doubts=(*answer.doubts, doubt))
 
 
 def _long_runs(
