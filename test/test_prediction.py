@@ -248,7 +248,7 @@ def test_what_a_queue_presses_with_is_expected_too() -> None:
     assert prediction.force_reason == "a single-file queue of 100"
 
 
-@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "rk4"])
 def test_the_tangential_speed_after_an_impact(integrator: str) -> None:
     """Bottles that roll off each other, in steps too long for their friction: the kick of the last step bounds it."""
     steps, mu, touching = 20, 0.3, 2.0 * RADIUS
@@ -282,7 +282,7 @@ def test_the_tangential_speed_after_an_impact(integrator: str) -> None:
 
 
 @pytest.mark.parametrize("steps", [8, 20, 80])
-@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "linearly_implicit"])
 def test_the_creep_on_a_turn_table(integrator: str, steps: int) -> None:
     """2, 5 and 20 steps in v_lim / (mu g): semi-implicit Euler loses as predicted, most lose next to nothing."""
     radius, sims = 0.5, []

@@ -12,7 +12,7 @@ from scenes import MASS, RADIUS, bottle, contact, kind, line, scene, segment, si
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.simulation import Simulation
 
-INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince"]
+INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "dormand_prince"]
 TICKS = 300
 
 

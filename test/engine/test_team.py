@@ -44,7 +44,6 @@ def crowd(**fields: Any) -> Scene:
 VARIANTS: dict[str, dict[str, Any]] = {
     "as it is": {},
     "velocity Verlet": {"accuracy": {"per_tick": 100, "integrator": "velocity_verlet"}},
-    "RK4": {"accuracy": {"per_tick": 100, "integrator": "rk4"}},
     "Dormand and Prince": {"accuracy": {"per_tick": 50, "integrator": "dormand_prince", "error": 1e-3}},
     "linearly implicit": {"accuracy": {"per_tick": 20, "integrator": "linearly_implicit"}},
     "implicit friction": {"friction_solver": "implicit"},
