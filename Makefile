@@ -9,6 +9,8 @@ DISTRO ?= jazzy
 SCENE ?= config/paper_plant.yaml
 VENV := $(if $(filter jazzy,$(DISTRO)),.venv,.venv-$(DISTRO))
 PYTHON := $(VENV)/bin/python
+# Two processes of tests; a module stays in one, for its tests share nodes and what was compiled.
+SIDE_BY_SIDE := --numprocesses=2 --dist=loadfile
 
 # The environment is private: nothing of a sourced ROS, nor of another environment of ROS wheels, may reach it.
 ifneq ($(AMENT_PREFIX_PATH)$(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
@@ -27,7 +29,7 @@ run: set-up
 	@$(PYTHON) -m conveyor_sim.ros.main_job "$(SCENE)"
 
 test: set-up-test
-	@$(PYTHON) -m pytest $(ARGS)
+	@$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(ARGS)
 
 bench: set-up-bench
 	@$(PYTHON) -m bench $(ARGS)
