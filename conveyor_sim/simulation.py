@@ -3,8 +3,6 @@
 import copy
 import hashlib
 import math
-import os
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,11 +10,9 @@ import numpy as np
 
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import list_contacts
-from conveyor_sim.engine.crew import Crew
 from conveyor_sim.engine.footing import find_carriers, refresh_footing
-from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
-from conveyor_sim.engine.thread_choice import ThreadChoice
-from conveyor_sim.errors import SimulationError
+from conveyor_sim.guard import GuardEvent
+from conveyor_sim.integration import Integration
 from conveyor_sim.line.commands import CommandOutcome, refusal
 from conveyor_sim.line.infeed import infeed_states
 from conveyor_sim.line.outfeed import outfeed_states
@@ -49,22 +45,20 @@ class Simulation:
     of `advance`, whoever observes and on however many threads. Raises SceneError for a scene that can't be.
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+    def __init__(self, scene: Scene, threads: int | None = None, shorten: bool = True) -> None:
         """Put the bottles of a scene in place. threads: to step with; None: as many as turn out to be fastest.
+        shorten: have a tick that the guard objects to done again in shorter steps, before the run is stopped.
 
         Raises ValueError for less than one thread.
         """
         if threads is not None and threads < 1:
             raise ValueError(f"threads: {threads}, expected 1 or more, or None to have them chosen")
-        cores = len(os.sched_getaffinity(0))
-        self._crew = Crew(cores if threads is None else threads)
-        self._choice = ThreadChoice(cores) if threads is None else None
         self.scene = scene
         self.model = build_model(scene)
         self.tick = 0
         bottles = list(initial_bottles(scene))
         self._state = State(self.model, len(bottles) or FIRST_SLOTS)
-        self._advance = INTEGRATORS[self.model.integrator]
+        self._integration = Integration(self._state, threads, shorten)
         self._every = {output: scene.every(output) for output in scene.TOPICS}
         self._pending: list[tuple[tuple[str, ...], tuple[float, ...], str]] = []
         self._outcomes: list[CommandOutcome] = []
@@ -74,6 +68,7 @@ class Simulation:
         self._centre_radius = np.array(
             [shape.centre_radius if shape.kind == "curved" else math.inf for shape in self.model.belt_shapes]
         )
+        self._outermost = np.array([shape.outermost for shape in self.model.belt_shapes])
         self._watchdogs = {
             index: Watchdog(max(1, math.ceil(belt.watchdog / scene.tick - 1e-9)))
             for index, belt in enumerate(belts)
@@ -113,14 +108,16 @@ class Simulation:
         )
 
     def advance(self, ticks: int = 1) -> None:
-        """Let `ticks` ticks pass. Raises SimulationError if the state is no longer finite."""
+        """Let `ticks` ticks pass. Raises SimulationError, in one sentence, for a tick that the guard can't let pass;
+        the state is that at its beginning then.
+        """
         for _ in range(ticks):
             self._apply_commands()
             peaks = self._state.world.peaks
             if peaks is not None and self.due("bottles"):
                 peaks.force[:] = 0.0
                 peaks.impulse[:] = 0.0
-            self._integrate()
+            self._integration.take_tick(self.tick, self._fastest_surface())
             self.tick += 1
             self._remove()
             self._feed()
@@ -138,10 +135,24 @@ class Simulation:
         outcomes, self._outcomes = self._outcomes, []
         return outcomes
 
+    def take_guard_events(self) -> list[GuardEvent]:
+        """What the guard has to tell since the last call, in order."""
+        return self._integration.take_events()
+
+    @property
+    def shortened_ticks(self) -> int:
+        """Ticks so far that were done again in shorter steps."""
+        return self._integration.shortened_ticks
+
+    @property
+    def deepest_overlap(self) -> float:
+        """The largest overlap over a radius so far that the guard has seen."""
+        return self._integration.deepest_overlap
+
     @property
     def threads(self) -> int:
         """Threads that the next tick is to be stepped with."""
-        return self._crew.most if self._choice is None else self._choice.size
+        return self._integration.threads
 
     def take_state_of(self, other: "Simulation") -> None:
         """Take over the bottles, the time and the belts' speeds of another Simulation of the same line.
@@ -153,6 +164,7 @@ class Simulation:
         self._actual[:] = other._actual
         self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
         self._state.take(other._state)
+        self._integration.forget_energy()
         self._set_surfaces()
 
     def displace(self, dx: F8, dy: F8, dvx: F8 | None = None, dvy: F8 | None = None) -> None:
@@ -168,6 +180,7 @@ class Simulation:
                 column[slots] += change
         self._state.world.neighbourhood.stale[0] = 1
         self._state.make_lists()
+        self._integration.forget_energy()
 
     def due(self, output: str) -> bool:
         """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""
@@ -205,7 +218,7 @@ class Simulation:
         room = 64
         while True:
             kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
-            count = list_contacts(self._state.world, self._crew.team(1)[0].found, kind, ends[0], ends[1], values)
+            count = list_contacts(self._state.world, self._integration.found, kind, ends[0], ends[1], values)
             if count <= room:
                 break
             room = count
@@ -279,6 +292,12 @@ class Simulation:
             self._actual[:] = self._commanded
             self._set_surfaces()
 
+    def _fastest_surface(self) -> float:
+        """Speed of the fastest point of any belt, m/s."""
+        if not self.model.belts:
+            return 0.0
+        return float(np.max(np.abs(self._actual) * self._outermost))
+
     def _set_surfaces(self) -> None:
         world, surface = self._state.world, self._state.world.surface
         if surface is None or not self.model.belts:
@@ -293,29 +312,6 @@ class Simulation:
                 surface.turn[index] = turn
                 surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
         refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)
-
-    def _integrate(self) -> None:
-        """One tick in whole steps; a list that turned out too short is grown within it, without a trace."""
-        done, phase, steps = 0, START, self.model.steps_per_tick
-        began = time.perf_counter()
-        while True:
-            done += self._crew.advance(
-                self.threads, self._advance, self._state.world, steps - done, self.model.dt, phase
-            )
-            if not self._state.world.neighbourhood.stale[0]:
-                break
-            self._state.make_lists()
-            phase = RESUME
-        if self._choice is not None:
-            self._choice.took(time.perf_counter() - began, steps * self._state.world.bottles.id.size)
-        bottles = self._state.world.bottles
-        bad = ~np.isfinite(bottles.x + bottles.y + bottles.vx + bottles.vy)
-        if bad.any():
-            raise SimulationError(
-                f"bottle {bottles.id[bad].min()} has no finite position or velocity "
-                f"after the tick that began at {self.time:g} s: "
-                f"dt = {self.model.dt:g} s is too long for this scene ({self.model.dt_reason}); choose a finer accuracy"
-            )
 
 
 def compile_kernels(scene: Scene) -> None:

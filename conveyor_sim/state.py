@@ -30,6 +30,7 @@ from conveyor_sim.engine.arrays import (
     Stage,
     Surface,
     Triple,
+    Watch,
     World,
 )
 from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
@@ -254,6 +255,7 @@ class State:
                 bucket=np.zeros(buckets + 1, np.uint32),
                 order=np.zeros(slots, np.uint32),
             ),
+            watch=Watch(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
             pairs=self._pairs(entries),
             slots=_slots(slots, entries) if model.pair_law is not None else None,
             pair_law=model.pair_law,

@@ -1,16 +1,12 @@
-"""Chatter: explicit friction in too long a step turns the slip round at every step, within +-v_lim.
-
-No check of finiteness sees it, nor does an average: velocities are watched from step to step. Their second differences
-change sign at every step then, and only then: an impact bends a velocity for some steps to one side.
-"""
+"""Chatter (`guard/chatter.py`) of a scene with a setting, looked for from a state of the scene on."""
 
 import numpy as np
 
 from conveyor_sim.accuracy.failures import place
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.engine.arrays import F8
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.guard.chatter import chatter_of
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -55,14 +51,3 @@ class ChatterProbe:
         return (
             f"chattering: {place(bottles, worst)} shakes by {share:.2g} of slip_limit at every step at {state.time:g} s"
         )
-
-
-def chatter_of(velocities: F8) -> F8:
-    """Amplitude (bottles,) by which velocities (steps, components, bottles) jump to and fro, m/s.
-
-    v_n = (-1)^n A has second differences of 4 A, each against the one before: the median over the steps of the root of
-    minus their product.
-    """
-    bends = np.diff(velocities, n=2, axis=0)
-    against = -(bends[1:] * bends[:-1]).sum(axis=1)
-    return np.asarray(np.sqrt(np.maximum(np.median(against, axis=0), 0.0)) / 4.0)

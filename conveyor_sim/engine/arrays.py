@@ -434,6 +434,19 @@ class Neighbourhood(NamedTuple):
     """(S,), slots by bucket."""
 
 
+class Watch(NamedTuple):
+    """The deepest overlaps since the guard last looked (`watch.py`): of two bottles, and of a bottle with a rail."""
+
+    depth: F8
+    """(2,), over the (smaller) radius."""
+    bottle: I8
+    """(2,), slots; the lower one of two."""
+    other: I8
+    """(2,), slot of the other bottle; number of the rail."""
+    due: I8
+    """(1,), not 0: lists were made anew since."""
+
+
 class StaticGrid(NamedTuple):
     """Cells over the plant; each lists what a bottle with its axis in it can come near: pieces and belts."""
 
@@ -483,6 +496,7 @@ class World(NamedTuple):
     linear: Linear | None
     implicit: Implicit | None
     neighbourhood: Neighbourhood
+    watch: Watch
     pairs: Pairs | None
     slots: Slots | None
     pair_law: ContactLaw | None

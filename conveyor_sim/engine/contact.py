@@ -38,7 +38,7 @@ def contact_force(
     implicit: dt/m_t in s/kg for friction at the slip after the step, or None.
     """
     depth = 0.0 if overlap < 0.0 else overlap
-    normal = _elastic(law.stiffness, law.hertz, law.curve, curves, e, depth)
+    normal = elastic_force(law.stiffness, law.hertz, law.curve, curves, e, depth)
     normal = _damped(normal, law.damping_normal, law.damping_tsuji, law.damping_onset, e, depth, closing)
     normal = share * _dragged(normal, law.damping_paper, e, depth, closing)
     tangential = _tangential(
@@ -59,8 +59,8 @@ def contact_force(
 
 
 @part
-def _elastic(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
-    """k delta (23) + k_h delta^1.5 + table."""
+def elastic_force(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
+    """k delta (23) + k_h delta^1.5 + table, N; depth: m, not negative."""
     normal = 0.0
     if stiffness is not None:
         normal += stiffness[e] * depth

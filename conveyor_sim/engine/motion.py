@@ -11,6 +11,7 @@ from .arrays import Bottles, Load, Member, World
 from .compile import part
 from .rebuild import moved_too_far, rebuild
 from .team import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
+from .watch import watch_overlaps
 
 TINY = 1e-100
 """m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
@@ -97,5 +98,17 @@ def lists_hold(world: World, member: Member) -> bool:
         if member.rank == 0:
             lower_flag(member, MOVED)
             rebuild(world)
+            world.watch.due[0] = 1
         wait_for_all(member)
     return world.neighbourhood.stale[0] == 0
+
+
+@part
+def watch_rebuilt(world: World, member: Member) -> None:
+    """At the end of a step: look at the overlaps if the lists were made anew since the last look (`watch.py`)."""
+    if world.watch.due[0] != 0:
+        wait_for_all(member)
+        if member.rank == 0:
+            watch_overlaps(world, member.found)
+            world.watch.due[0] = 0
+        wait_for_all(member)

@@ -43,6 +43,11 @@ class BeltShape:
         """Radius of a curved belt's centre line (m), where its speed holds."""
         return self.inner_radius + self.width / 2
 
+    @property
+    def outermost(self) -> float:
+        """Speed of the fastest point of the surface, over that of the belt."""
+        return 1.0 if self.kind == "straight" else (self.inner_radius + self.width) / self.centre_radius
+
     def outline(self, n: int = 64) -> Array:
         """Corners of the area, (k, 2), counter-clockwise, first not repeated; an arc has n points.
 

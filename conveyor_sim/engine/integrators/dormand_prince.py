@@ -29,7 +29,7 @@ from numba import uint64
 from ..arrays import Bottles, Member, World
 from ..compile import kernel, part
 from ..forces import bottle_forces, pack_all, pair_phase
-from ..motion import lists_hold, note_moved
+from ..motion import lists_hold, note_moved, watch_rebuilt
 from ..pairs import pack
 from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
 from ..team import BLOCK, share, wait_for_all
@@ -104,6 +104,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                     if worst == math.inf:
                         _spoil(bottles, slopes.error, first, end)
                 left -= h
+                watch_rebuilt(world, member)
                 if left == 0.0:
                     left = dt
                     taken += 1

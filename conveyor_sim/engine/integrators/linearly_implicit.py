@@ -21,7 +21,7 @@ from ..base import add_base_friction
 from ..compile import kernel, part
 from ..conjugate_gradients import LEAST, RELATIVE, begin_search, factor, kick_with_rest, largest_kick, search
 from ..footing import check_footing
-from ..motion import accumulate_peaks, lists_hold, settle
+from ..motion import accumulate_peaks, lists_hold, settle, watch_rebuilt
 from ..rebuild import moved_too_far
 from ..slots import sum_pair_forces
 from ..tangent_base import resist_base
@@ -81,6 +81,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 raise_flag(member, MOVED)
         if not lists_hold(world, member):
             return step + 1
+        watch_rebuilt(world, member)
     return steps
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Member, World
 from ..compile import kernel
 from ..forces import bottle_forces, pack_all, pair_phase
-from ..motion import lists_hold, note_moved
+from ..motion import lists_hold, note_moved, watch_rebuilt
 from ..pairs import pack
 from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
 from ..team import BLOCK, share
@@ -75,3 +75,5 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             if member.rank == 0:
                 slopes.progress[0] = stage
             return taken
+        if stage == 0:
+            watch_rebuilt(world, member)

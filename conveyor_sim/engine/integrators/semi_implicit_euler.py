@@ -13,7 +13,7 @@ from numba import uint64
 from ..arrays import Bottles, Load, Member, World
 from ..compile import kernel, part
 from ..forces import bottle_forces, pack_all, pair_phase
-from ..motion import accumulate_peaks, lists_hold, note_moved, settle
+from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
 from ..pairs import pack_row
 from ..team import BLOCK, share
 
@@ -35,6 +35,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             note_moved(world, member, first, end)
         if not lists_hold(world, member):
             return step + 1
+        watch_rebuilt(world, member)
     return steps
 
 

@@ -18,6 +18,7 @@ from ..motion import (
     note_moved,
     recall_velocities,
     store_velocities,
+    watch_rebuilt,
 )
 from ..team import BLOCK, share
 from .phase import RESUME, START
@@ -40,6 +41,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 note_moved(world, member, first, end)
             if not lists_hold(world, member):
                 return step
+            watch_rebuilt(world, member)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             store_velocities(world.stage, bottles, world.spin, first, end)

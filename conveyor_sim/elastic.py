@@ -1,0 +1,37 @@
+"""Energy that contacts have taken up by their elastic laws."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays import F8, ContactLaw
+from conveyor_sim.model import Model
+
+
+def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int64], overlap: F8) -> F8:
+    """Work (J) that the elastic law of each contact has taken up: k d^2 / 2, 2/5 k d^2.5, the area under a table.
+
+    law: one of the Model's tables; entries: (n,), in it; overlap: (n,), m.
+    """
+    stored = np.zeros(overlap.size)
+    if law is None:
+        return stored
+    if law.stiffness is not None:
+        stored += 0.5 * law.stiffness[entries] * overlap**2
+    if law.hertz is not None:
+        stored += 0.4 * law.hertz[entries] * overlap**2.5
+    if law.curve is not None:
+        for index in np.flatnonzero(law.curve[entries] >= 0):
+            stored[index] += _area(model, int(law.curve[entries[index]]), float(overlap[index]))
+    return stored
+
+
+def _area(model: Model, curve: int, overlap: float) -> float:
+    """Integral (J) of a table of forces up to an overlap (m); its last slope goes on."""
+    assert model.curves is not None
+    points = slice(int(model.curves.start[curve]), int(model.curves.start[curve + 1]))
+    x, force = model.curves.overlap[points], model.curves.force[points]
+    pieces = 0.5 * (force[1:] + force[:-1]) * np.diff(x)
+    last = int(np.clip(np.searchsorted(x, overlap, side="right") - 1, 0, x.size - 2))
+    slope = (force[last + 1] - force[last]) / (x[last + 1] - x[last])
+    beyond = overlap - x[last]
+    return float(pieces[:last].sum() + (force[last] + 0.5 * slope * beyond) * beyond)

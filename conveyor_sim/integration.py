@@ -1,0 +1,134 @@
+"""One tick of the engine: whole steps on a crew of threads, with the guard looking on."""
+
+import os
+import time
+
+import numpy as np
+
+from conveyor_sim.engine.arrays import RailContacts
+from conveyor_sim.engine.crew import Crew
+from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.engine.thread_choice import ThreadChoice
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.guard import Guard, GuardEvent, Violation, chatter
+from conveyor_sim.guard.memory import Memory
+from conveyor_sim.state import State
+
+SHORTER = (4, 16, 64)
+"""By what factors steps are shortened, one after another, for a tick that the guard objects to."""
+
+
+class Integration:
+    """Takes a State through time, tick by tick."""
+
+    def __init__(self, state: State, threads: int | None, shorten: bool) -> None:
+        """threads: to step with, None has them chosen. shorten: do a tick again before the run is stopped."""
+        cores = len(os.sched_getaffinity(0))
+        self._state = state
+        self._model = state.model
+        self._advance = INTEGRATORS[state.model.integrator]
+        self._crew = Crew(cores if threads is None else threads)
+        self._choice = ThreadChoice(cores) if threads is None else None
+        self._shorter = SHORTER if shorten else ()
+        self._guard = Guard(state, self.found)
+        self._events: list[GuardEvent] = []
+        self._chatters = False
+        self._listening = self._ticks_between_listening()
+        self.shortened_ticks = 0
+
+    @property
+    def threads(self) -> int:
+        """Threads that the next tick is to be stepped with."""
+        return self._crew.most if self._choice is None else self._choice.size
+
+    @property
+    def found(self) -> RailContacts:
+        """Scratch of the calling thread."""
+        return self._crew.team(1)[0].found
+
+    @property
+    def deepest_overlap(self) -> float:
+        """The largest overlap over a radius so far."""
+        return self._guard.deepest
+
+    def take_events(self) -> list[GuardEvent]:
+        """What the guard has to tell since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    def forget_energy(self) -> None:
+        """The state was changed from outside."""
+        self._guard.forget_energy()
+
+    def take_tick(self, tick: int, surface_speed: float) -> None:
+        """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
+        seconds = tick * self._model.tick_ns * 1e-9
+        wrong = self._guard.begin(tick, surface_speed)
+        if wrong is not None:
+            raise SimulationError(wrong.sentence(seconds, 1))
+        began = time.perf_counter()
+        self._take_steps(1)
+        if self._choice is not None:
+            steps = self._model.steps_per_tick
+            self._choice.took(time.perf_counter() - began, steps * self._state.world.bottles.id.size)
+        wrong = self._guard.end(self._model.dt)
+        if wrong is not None:
+            self._do_again(tick, seconds, wrong)
+        self._tell(tick + 1)
+
+    def _do_again(self, tick: int, seconds: float, wrong: Violation) -> None:
+        """In shorter steps, from the beginning of the tick, where the guard has put the state back."""
+        for factor in self._shorter if wrong.curable else ():
+            self._take_steps(factor)
+            if self._guard.end(self._model.dt / factor) is None:
+                self.shortened_ticks += 1
+                text = f"{wrong.sentence(seconds, 1)}; the tick was done again in steps {factor} times shorter"
+                self._events.append(GuardEvent(tick + 1, "shorter_steps", wrong.bottle, wrong.x, wrong.y, text))
+                return
+        raise SimulationError(wrong.sentence(seconds, max(self._shorter, default=1)))
+
+    def _take_steps(self, factor: int) -> None:
+        """One tick in steps shortened by a factor; lists that turn out too short are grown in it, without a trace."""
+        done, phase, steps, dt = 0, START, factor * self._model.steps_per_tick, self._model.dt / factor
+        while True:
+            done += self._crew.advance(self.threads, self._advance, self._state.world, steps - done, dt, phase)
+            if not self._state.world.neighbourhood.stale[0]:
+                return
+            self._state.make_lists()
+            phase = RESUME
+
+    def _tell(self, tick: int) -> None:
+        """What does not stop a run, told the first time."""
+        if (event := self._guard.soft(tick)) is not None:
+            self._events.append(event)
+        if self._listening and not self._chatters and tick % self._listening == 0:
+            self._listen(tick)
+
+    def _ticks_between_listening(self) -> int:
+        """How often chatter is listened to; 0: there is none to be heard."""
+        model = self._model
+        rubs = model.base_friction is not None or any(
+            law is not None and law.friction is not None for law in (model.pair_law, model.rail_law)
+        )
+        if not rubs or model.friction_solver == "implicit" or model.integrator not in chatter.EXPLICIT:
+            return 0
+        return -(-chatter.EVERY // model.steps_per_tick)
+
+    def _listen(self, tick: int) -> None:
+        """Take some steps on, one by one, and go back."""
+        state, model = self._state, self._model
+        memory = Memory()
+        memory.keep(state.world)
+        velocities = [chatter.velocities_of(state.world)]
+        for _ in range(chatter.STEPS):
+            self._crew.advance(self.threads, self._advance, state.world, 1, model.dt, START)
+            state.make_lists()
+            velocities.append(chatter.velocities_of(state.world))
+        memory.put_back(state)
+        amplitude = chatter.chatter_of(np.array(velocities))
+        amplitude[state.world.bottles.id < 0] = 0.0
+        worst = int(np.argmax(amplitude))
+        share = amplitude[worst] / model.settings.slip_limit
+        if share > chatter.LEAST:
+            self._chatters = True
+            self._events.append(self._guard.chatters(tick, worst, share))
