@@ -18,4 +18,8 @@ class BagError(ConveyorError):
 
 
 class SimulationError(ConveyorError):
-    """A simulation that can't go on."""
+    """A simulation that can't go on. `kind`: `unstable`, or `tunnelling` for what is about to be passed through."""
+
+    def __init__(self, message: str, kind: str = "unstable") -> None:
+        super().__init__(message)
+        self.kind = kind

@@ -65,7 +65,7 @@ class Integration:
         seconds = tick * self._model.tick_ns * 1e-9
         wrong = self._guard.begin(tick, surface_speed)
         if wrong is not None:
-            raise SimulationError(wrong.sentence(seconds, 1))
+            raise SimulationError(wrong.sentence(seconds, 1), wrong.kind)
         began = time.perf_counter()
         self._take_steps(1)
         if self._choice is not None:
@@ -78,14 +78,17 @@ class Integration:
 
     def _do_again(self, tick: int, seconds: float, wrong: Violation) -> None:
         """In shorter steps, from the beginning of the tick, where the guard has put the state back."""
+        tried, first = 1, wrong
         for factor in self._shorter if wrong.curable else ():
             self._take_steps(factor)
-            if self._guard.end(self._model.dt / factor) is None:
+            again = self._guard.end(self._model.dt / factor)
+            if again is None:
                 self.shortened_ticks += 1
-                text = f"{wrong.sentence(seconds, 1)}; the tick was done again in steps {factor} times shorter"
-                self._events.append(GuardEvent(tick + 1, "shorter_steps", wrong.bottle, wrong.x, wrong.y, text))
+                text = f"{first.sentence(seconds, 1)}; the tick was done again in steps {factor} times shorter"
+                self._events.append(GuardEvent(tick + 1, "shorter_steps", first.bottle, first.x, first.y, text))
                 return
-        raise SimulationError(wrong.sentence(seconds, max(self._shorter, default=1)))
+            tried, wrong = factor, again
+        raise SimulationError(wrong.sentence(seconds, tried), wrong.kind)
 
     def _take_steps(self, factor: int) -> None:
         """One tick in steps shortened by a factor; lists that turn out too short are grown in it, without a trace."""

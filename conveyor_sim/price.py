@@ -86,8 +86,8 @@ class Pricing:
         """at: simulated time of the warm state, s; None: half of the duration."""
         self._scene = scene
         self._ticks = max(1, round((0.5 * scene.duration if at is None else at) / scene.tick))
-        self._warm = Simulation(scene, threads=1)
-        self._full = Simulation(_variant(scene, self._warm.model, []), threads=1)
+        self._warm = Simulation(scene, threads=1, shorten=False)
+        self._full = Simulation(_variant(scene, self._warm.model, []), threads=1, shorten=False)
         self._variants: list[_Variant] = []
         self._failed: dict[str, str] = {}
 
@@ -106,7 +106,7 @@ class Pricing:
         self._full.advance()
         for done, (name, off) in enumerate(wanted):
             progress(done, len(wanted))
-            simulation = Simulation(_variant(self._scene, model, off), threads=1)
+            simulation = Simulation(_variant(self._scene, model, off), threads=1, shorten=False)
             simulation.take_state_of(self._warm)
             try:
                 simulation.advance()

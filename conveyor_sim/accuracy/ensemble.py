@@ -181,7 +181,7 @@ def _end_with(lifeline: Connection) -> None:
 def _rehearse(work: _Work) -> None:
     """Have numba compile or load what a setting needs, in this process; what can't be is told by its runs."""
     try:
-        simulation = Simulation(work.scene(0), threads=1)
+        simulation = Simulation(work.scene(0), threads=1, shorten=False)
         simulation.advance()
     except ConveyorError:
         return
@@ -196,7 +196,7 @@ def _run(work: _Work, seed: int) -> Sample:
     values: dict[str, float] = {}
     failure = ""
     try:
-        simulation = Simulation(work.scene(seed), threads=1)
+        simulation = Simulation(work.scene(seed), threads=1, shorten=False)
         disturb(simulation, seed)
         values = observe(simulation)
     except ConveyorError as error:

@@ -44,7 +44,9 @@ def variant(scene: Scene, setting: Setting, **fields: Any) -> Simulation:
     """
     outputs = {**dict.fromkeys(scene.TOPICS, 0), **fields.pop("outputs", {})}
     effects = {"peaks": "on", **fields.pop("effects", {})}
-    return Simulation(with_setting(scene, setting, outputs=outputs, effects=effects, **fields), threads=1)
+    return Simulation(
+        with_setting(scene, setting, outputs=outputs, effects=effects, **fields), threads=1, shorten=False
+    )
 
 
 def follow(simulation: Simulation, start: Simulation, ticks: int) -> Trajectory:
@@ -57,7 +59,7 @@ def follow(simulation: Simulation, start: Simulation, ticks: int) -> Trajectory:
             try:
                 simulation.advance()
             except SimulationError as error:
-                return Trajectory(tuple(frames), str(error))
+                return Trajectory(tuple(frames), f"{error.kind}: {error}")
             frames.append(_frame(simulation))
     return Trajectory(tuple(frames), "")
 

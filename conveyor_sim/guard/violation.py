@@ -45,13 +45,14 @@ class Violation:
     """What was found, as a clause that begins with the bottle."""
     why: str
     """The cause, and after a semicolon what helps."""
+    kind: Literal["unstable", "tunnelling"]
     curable: bool = True
     """Whether shorter steps may help."""
 
     def sentence(self, time: float, tried: int) -> str:
-        """In one sentence; time: s, at the beginning of the tick; tried: by what factor steps were shortened."""
-        helps = "" if tried == 1 else f" (steps {tried} times shorter do not help)"
-        return f"{self.what} in the tick that began at {time:g} s at ({self.x:.4g}, {self.y:.4g}) m{helps}: {self.why}"
+        """In one sentence; time: s, at the beginning of the tick; tried: by what factor steps were shorter."""
+        even = "" if tried == 1 else f", even in steps {tried} times shorter"
+        return f"{self.what} in the tick that began at {time:g} s at ({self.x:.4g}, {self.y:.4g}) m{even}: {self.why}"
 
 
 class Words:
@@ -64,24 +65,24 @@ class Words:
     def put_in(self, slot: int) -> Violation:
         """A bottle that was not finite before a step was taken."""
         what = f"bottle {self._id(slot)} has no finite position or velocity before a step was taken"
-        return self._violation(slot, what, "the number was written into the state; reset it", curable=False)
+        return self._unstable(slot, what, "the number was written into the state; reset it", curable=False)
 
     def not_finite(self, slot: int) -> Violation:
         """A bottle that is not finite any more."""
-        return self._violation(slot, f"bottle {self._id(slot)} has no finite position or velocity", self._too_long())
+        return self._unstable(slot, f"bottle {self._id(slot)} has no finite position or velocity", self._too_long())
 
     def far(self, slot: int, speed: float, dt: float) -> Violation:
         """A bottle that moves too far in one step. speed: m/s."""
         what = f"bottle {self._id(slot)} moves {1e3 * speed * dt:.3g} mm in one step of {dt:g} s"
         limit = f"more than {1e3 * self._model.settings.skin:.3g} mm could pass through a contact unseen"
-        return self._violation(slot, what, f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy")
+        return self._tunnelling(slot, what, f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy")
 
     def energy(self, slot: int, before: float, after: float, explained: float) -> Violation:
         """Energy (J) that came from nowhere; slot: of the fastest bottle."""
         rise = f"from {before:.3g} to {after:.3g} J"
         what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
         why = f"belts explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
-        return self._violation(slot, what, why)
+        return self._unstable(slot, what, why)
 
     def pair(self, slot: int, other: int, depth: float) -> Violation:
         """Two bottles that overlap too deep; depth: over the smaller radius."""
@@ -94,7 +95,7 @@ class Words:
         radius = float(self._model.type_radius[kinds].min())
         entry = int(kinds[0]) * len(self._model.bottle_types) + int(kinds[1])
         why = self._too_soft(self._model.pair_law, entry, radius, reduced, relative, depth, "bottles")
-        return self._violation(slot, what, why)
+        return self._tunnelling(slot, what, why)
 
     def rail(self, slot: int, rail: int, depth: float) -> Violation:
         """A bottle that has sunk too deep into a rail; depth: over the radius."""
@@ -106,7 +107,7 @@ class Words:
         what = f"bottle {self._id(slot)} sinks {depth:.2g} of its radius into rail {shape.name}"
         radius, mass = float(model.type_radius[kind]), float(model.type_mass[kind])
         why = self._too_soft(model.rail_law, entry, radius, mass, speed, depth, f"rail {shape.name}")
-        return self._violation(slot, what, why)
+        return self._tunnelling(slot, what, why)
 
     def place(self, slot: int) -> tuple[int, float, float]:
         """Id, x and y (m)."""
@@ -136,8 +137,11 @@ class Words:
         model = self._model
         return f"dt = {model.dt:g} s is too long for this scene ({model.dt_reason}); choose a finer accuracy"
 
-    def _violation(self, slot: int, what: str, why: str, curable: bool = True) -> Violation:
-        return Violation(*self.place(slot), what, why, curable)
+    def _unstable(self, slot: int, what: str, why: str, curable: bool = True) -> Violation:
+        return Violation(*self.place(slot), what, why, "unstable", curable)
+
+    def _tunnelling(self, slot: int, what: str, why: str) -> Violation:
+        return Violation(*self.place(slot), what, why, "tunnelling")
 
     def _id(self, slot: int) -> int:
         return int(self._bottles.id[slot])
