@@ -130,6 +130,8 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool, t
         reached = achieved(model, done.peak_force)
         if reached is not None:
             click.echo(reached.sentence)
+        for said in done.guard:
+            click.echo(f"guard: {said}")
     else:
         report(done.bag, done.wall)
 

@@ -56,16 +56,12 @@ class Integration:
         events, self._events = self._events, []
         return events
 
-    def forget_energy(self) -> None:
-        """The state was changed from outside."""
-        self._guard.forget_energy()
-
     def take_tick(self, tick: int, surface_speed: float) -> None:
         """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
         seconds = tick * self._model.tick_ns * 1e-9
         wrong = self._guard.begin(tick, surface_speed)
         if wrong is not None:
-            raise SimulationError(wrong.sentence(seconds, 1), wrong.kind)
+            raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
         began = time.perf_counter()
         self._take_steps(1)
         if self._choice is not None:
@@ -88,7 +84,11 @@ class Integration:
                 self._events.append(GuardEvent(tick + 1, "shorter_steps", first.bottle, first.x, first.y, text))
                 return
             tried, wrong = factor, again
-        raise SimulationError(wrong.sentence(seconds, tried), wrong.kind)
+        raise self._stopped(tick, wrong, wrong.sentence(seconds, tried))
+
+    def _stopped(self, tick: int, wrong: Violation, text: str) -> SimulationError:
+        self._events.append(GuardEvent(tick, "stopped", wrong.bottle, wrong.x, wrong.y, text))
+        return SimulationError(text, wrong.kind)
 
     def _take_steps(self, factor: int) -> None:
         """One tick in steps shortened by a factor; lists that turn out too short are grown in it, without a trace."""

@@ -15,6 +15,7 @@ from types import FrameType
 from conveyor_sim.achieved import PeakWatch
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -32,6 +33,8 @@ class Run:
     """Ended early by Ctrl-C or a request to terminate."""
     peak_force: float | None
     """N, the largest normal contact force; None where the scene has no effect `peaks`."""
+    guard: tuple[str, ...]
+    """What the guard said."""
 
 
 def run_scene(
@@ -51,7 +54,11 @@ def run_scene(
         peaks = PeakWatch(simulation)
         start = time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
-            simulation.advance(1)
+            try:
+                simulation.advance(1)
+            except SimulationError:
+                outputs.after_failure()
+                raise
             outputs.after_tick()
             peaks.after_tick()
             if progress is not None:
@@ -59,7 +66,8 @@ def run_scene(
         if recorder is not None:
             recorder.close()
         wall = time.monotonic() - start
-        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force)
+        noticed = tuple(event.text for event in outputs.take_noticed())
+        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, noticed)
 
 
 @contextmanager

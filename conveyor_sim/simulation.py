@@ -164,7 +164,6 @@ class Simulation:
         self._actual[:] = other._actual
         self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
         self._state.take(other._state)
-        self._integration.forget_energy()
         self._set_surfaces()
 
     def displace(self, dx: F8, dy: F8, dvx: F8 | None = None, dvy: F8 | None = None) -> None:
@@ -180,7 +179,6 @@ class Simulation:
                 column[slots] += change
         self._state.world.neighbourhood.stale[0] = 1
         self._state.make_lists()
-        self._integration.forget_energy()
 
     def due(self, output: str) -> bool:
         """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""

@@ -15,7 +15,7 @@ from rich.console import Group
 from rich.table import Table
 
 from conveyor_sim.achieved import Achieved, achieved
-from conveyor_sim.bag.messages import BOTTLES, OUTCOME, SIGNALS
+from conveyor_sim.bag.messages import BOTTLES, GUARD_EVENT, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.errors import SceneError
 from conveyor_sim.model import Model, build_model
@@ -24,6 +24,7 @@ from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
+GUARD_TEXTS = 3
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,10 @@ class Summary:
     """The errors to expect; None if the scene was recorded by a version that chose another time step."""
     achieved: Achieved | None
     """What the peak force says; None if it or the prediction is not known."""
+    guard: dict[str, int]
+    """How often the guard said something, by kind (`GuardEvent.kind`)."""
+    guard_texts: list[str]
+    """What it said, the first times."""
     commands: int
     refused: int
     """Of the commands."""
@@ -127,10 +132,11 @@ class _Tally:
         self._bottles: BottleColumns | None = None
         self._signals: NDArray[np.float64] | None = None
         self._outcomes: Counter[bool] = Counter()
+        self._guard: list[tuple[str, str]] = []
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
-            if bag.types[topic] in (BOTTLES, SIGNALS, OUTCOME):
+            if bag.types[topic] in (BOTTLES, SIGNALS, OUTCOME, GUARD_EVENT):
                 self._take(bag.types[topic], bag.decode(topic, data))
 
     def _take(self, kind: str, message: Any) -> None:
@@ -142,6 +148,8 @@ class _Tally:
             self._unknown = self._unknown or bool(np.isnan(self._bottles.peak_force).any())
         elif kind == SIGNALS:
             self._signals = message.values
+        elif kind == GUARD_EVENT:
+            self._guard.append((message.kind, message.text))
         else:
             self._outcomes[bool(message.accepted)] += 1
 
@@ -166,6 +174,8 @@ class _Tally:
             setting=f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}",
             predicted=None if model is None else model.prediction.sentence,
             achieved=None if model is None else achieved(model, peak),
+            guard=dict(Counter(kind for kind, _ in self._guard)),
+            guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
@@ -243,8 +253,16 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("setting", summary.setting),
         ("predicted error", "not known" if summary.predicted is None else summary.predicted),
         ("achieved", "not known" if summary.achieved is None else summary.achieved.sentence),
+        ("guard", _guard(summary)),
         ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
     ]
+
+
+def _guard(summary: Summary) -> str:
+    if not summary.guard:
+        return "nothing to tell"
+    counts = ", ".join(f"{count} x {kind.replace('_', ' ')}" for kind, count in summary.guard.items())
+    return "\n".join([counts, *summary.guard_texts])
 
 
 def _table(*headings: str) -> Table:

@@ -14,6 +14,7 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 
 if TYPE_CHECKING:
+    from conveyor_sim.guard import GuardEvent
     from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.simulation import Simulation
 
@@ -22,6 +23,7 @@ CONTACTS = "conveyor_msgs/msg/Contacts"
 BELTS = "conveyor_msgs/msg/Belts"
 SIGNALS = "conveyor_msgs/msg/Signals"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
+GUARD_EVENT = "conveyor_msgs/msg/GuardEvent"
 LINE = "conveyor_msgs/msg/Line"
 POSES = "geometry_msgs/msg/PoseArray"
 MARKERS = "visualization_msgs/msg/MarkerArray"
@@ -98,6 +100,12 @@ def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
         "reason": outcome.reason,
     }
     return _serialize(OUTCOME, header, values)
+
+
+def guard_message(event: GuardEvent, header: Header) -> bytes:
+    """conveyor_msgs/GuardEvent."""
+    values = {name: getattr(event, name) for name in ("kind", "bottle", "x", "y", "text")}
+    return _serialize(GUARD_EVENT, header, values)
 
 
 def poses_message(columns: BottleColumns, header: Header) -> bytes:

@@ -13,6 +13,7 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.qos import QOS, Qos
 
 if TYPE_CHECKING:
+    from conveyor_sim.guard import GuardEvent
     from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.observe.columns import BottleColumns
     from conveyor_sim.simulation import Simulation
@@ -25,7 +26,7 @@ class Output:
     name: str
     type: str
     rate: str | None
-    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes)."""
+    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes, guard)."""
 
     @property
     def qos(self) -> Qos:
@@ -39,6 +40,7 @@ OUTPUTS: dict[str, Output] = {
         Output("line", messages.LINE, None),
         Output("plant", messages.MARKERS, None),
         Output("outcomes", messages.OUTCOME, None),
+        Output("guard", messages.GUARD_EVENT, None),
         Output("bottles", messages.BOTTLES, "bottles"),
         Output("poses", messages.POSES, "poses"),
         Output("markers", messages.MARKERS, "poses"),
@@ -91,6 +93,7 @@ class Outputs:
         self._sinks = sinks
         self._run_id = run_id
         self._frame_id = frame_id
+        self._noticed: list[GuardEvent] = []
 
     def start(self) -> None:
         """Writes what is latched (line, plant) and the state at the present tick."""
@@ -101,11 +104,24 @@ class Outputs:
 
     def after_tick(self) -> list[CommandOutcome]:
         """Writes the outcomes of the tick's commands, then every topic that is due; returns the outcomes."""
+        outcomes = self.after_failure()
+        self._write_state()
+        return outcomes
+
+    def after_failure(self) -> list[CommandOutcome]:
+        """Writes what is known of a tick that failed: what became of its commands, and what the guard says."""
         outcomes = self._sim.take_outcomes()
         for outcome in outcomes:
             self.tell(outcome)
-        self._write_state()
+        for event in self._sim.take_guard_events():
+            self._noticed.append(event)
+            self._hand_out("guard", self._header(event.tick), messages.guard_message, event)
         return outcomes
+
+    def take_noticed(self) -> list[GuardEvent]:
+        """What the guard said since the last call; it has been written."""
+        noticed, self._noticed = self._noticed, []
+        return noticed
 
     def tell(self, outcome: CommandOutcome) -> None:
         """Writes one outcome that belongs to no tick to come."""

@@ -21,12 +21,13 @@ def look(world: World, found: RailContacts, closely: bool) -> tuple[int, int, fl
 
     Returns the first slot whose bottle is not finite (-1: none), the slot of the fastest one (-1: no bottle), the
     square of its speed (m^2/s^2), and the kinetic and elastic energies (J), tangential springs not counted. Unless
-    closely: nothing of overlaps, and energies of 0.
+    closely: nothing of overlaps, and an elastic energy of 0.
     """
     bad, fastest, square = _bottles(world.bottles, world.spin)
-    if not closely:
-        return bad, fastest, square, 0.0, 0.0
-    return bad, fastest, square, kinetic_energy(world), watch_overlaps(world, found)
+    elastic = 0.0
+    if closely:
+        elastic = watch_overlaps(world, found)
+    return bad, fastest, square, kinetic_energy(world), elastic
 
 
 @kernel

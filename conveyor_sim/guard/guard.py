@@ -7,7 +7,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays import RailContacts
 from conveyor_sim.engine.compile import entry
-from conveyor_sim.engine.watch import kinetic_energy, look
+from conveyor_sim.engine.watch import look
 from conveyor_sim.guard.memory import Memory
 from conveyor_sim.guard.violation import GuardEvent, Violation, Words
 from conveyor_sim.state import State
@@ -15,15 +15,15 @@ from conveyor_sim.state import State
 DEEPEST = 0.75
 """Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""
 
-GROWTH = 4.0
+GROWTH, GROWTH_WITH_SPRINGS = 2.0, 4.0
 """Of kinetic and elastic energy in a tick, what belts do apart: explicit methods swing by less in a contact that they
-can follow, and tangential springs, which are not counted, hold no more."""
+can follow. Tangential springs are not counted, and may give back as much again."""
 
 SOFT = 0.2
 """Overlap over the radius from which it is told: places and gaps are wrong by as much."""
 
 CLOSELY = 128
-"""Steps after which overlaps and energy are looked at again at the latest; a look costs about half a step."""
+"""Steps after which overlaps and energy are looked at again at the latest; a close look costs about half a step."""
 
 
 class Guard:
@@ -37,11 +37,14 @@ class Guard:
         self._memory = Memory()
         self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
         self._closely = False
-        self._elastic: float | None = None
-        self._before = 0.0
+        sprung = any(
+            law is not None and law.tangential_stiffness is not None
+            for law in (self._model.pair_law, self._model.rail_law)
+        )
+        self._growth = GROWTH_WITH_SPRINGS if sprung else GROWTH
+        self._kinetic = 0.0
         self._work = 0.0
-        self._look: Any = entry(look, state.world, found, True)
-        self._kinetic: Any = entry(kinetic_energy, state.world)
+        self._entry: Any = entry(look, state.world, found, True)
         self._soft: Violation | None = None
         self.deepest = 0.0
 
@@ -53,45 +56,33 @@ class Guard:
         model, world = self._model, self._state.world
         self._memory.keep(world)
         self._closely = tick % self._every == 0
-        if self._closely:
-            if self._every > 1 or self._elastic is None:
-                *_, kinetic, self._elastic = self._look(world, self._found, True)
-                self._forget()
-            else:
-                kinetic = self._kinetic(world)
-            self._before = kinetic + self._elastic
-            weight = float(world.bottles.weight.sum())
-            friction = 0.0 if model.base_friction is None else float(model.base_friction.max())
-            self._work = weight * friction * surface_speed * model.tick_ns * 1e-9
-            if model.gravity > 0.0:
-                self._work += 0.5 * weight / model.gravity * model.settings.slip_limit**2
-            # What is not finite makes the energy so.
-            if math.isfinite(self._before):
-                return None
-        bad = self._look(world, self._found, False)[0]
+        bad, _, _, self._kinetic, _ = self._entry(world, self._found, False)
+        weight = float(world.bottles.weight.sum())
+        friction = 0.0 if model.base_friction is None else float(model.base_friction.max())
+        self._work = weight * friction * surface_speed * model.tick_ns * 1e-9
+        if model.gravity > 0.0:
+            self._work += 0.5 * weight / model.gravity * model.settings.slip_limit**2
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
-        """What is wrong with the state at the end of a tick, reached in steps of dt (s)."""
+        """What is wrong with the state at the end of a tick, reached in steps of dt (s); it is put back then."""
         world, model = self._state.world, self._model
-        bad, fastest, square, kinetic, elastic = self._look(world, self._found, self._closely)
+        bad, fastest, square, kinetic, _ = self._entry(world, self._found, self._closely)
         deep = world.watch.depth.copy()
         bottle, other = world.watch.bottle.copy(), world.watch.other.copy()
         self._forget()
-        self._elastic = elastic if self._closely else self._elastic
         if bad >= 0:
-            return self._told().not_finite(bad)
+            return self._put_back().not_finite(bad)
         if fastest < 0:
             return None
         speed = math.sqrt(square)
         if speed * dt > model.settings.skin:
-            return self._told().far(fastest, speed, dt)
-        after = kinetic + elastic
-        if self._closely and after > GROWTH * self._before + self._work:
-            return self._told().energy(fastest, self._before, after, self._work)
+            return self._put_back().far(fastest, speed, dt)
+        if kinetic > self._growth * self._kinetic + self._work and (energies := self._grown()):
+            return self._put_back().energy(fastest, *energies, self._work)
         worst = int(np.argmax(deep))
         if deep[worst] > SOFT >= self.deepest or deep[worst] > DEEPEST:
-            words = self._told() if deep[worst] > DEEPEST else Words(model, world)
+            words = self._put_back() if deep[worst] > DEEPEST else Words(model, world)
             about = words.rail if worst else words.pair
             found = about(int(bottle[worst]), int(other[worst]), float(deep[worst]))
             if deep[worst] > DEEPEST:
@@ -117,19 +108,25 @@ class Guard:
         )
         return GuardEvent(tick, "chatter", bottle, x, y, text)
 
-    def put_back(self) -> None:
-        """Have the state as it was at the beginning of the tick."""
+    def _grown(self) -> tuple[float, float] | None:
+        """Energy (J) before and after the tick if it grew by too much: a contact that opened may explain a speed."""
+        after = Memory()
+        after.keep(self._state.world)
+        total = self._energy()
+        self._put_back()
+        before = self._energy()
+        after.put_back(self._state)
+        return (before, total) if total > self._growth * before + self._work else None
+
+    def _energy(self) -> float:
+        *_, kinetic, elastic = self._entry(self._state.world, self._found, True)
+        self._forget()
+        return float(kinetic + elastic)
+
+    def _put_back(self) -> Words:
+        """Have the state as it was at the beginning of the tick, to find words for."""
         self._memory.put_back(self._state)
         self._forget()
-        self._elastic = None
-
-    def forget_energy(self) -> None:
-        """The state was changed from outside: its energy is not that of the tick before."""
-        self._elastic = None
-
-    def _told(self) -> Words:
-        """Words for the state at the beginning of the tick, which is put back for that."""
-        self.put_back()
         return Words(self._model, self._state.world)
 
     def _forget(self) -> None:

@@ -18,15 +18,15 @@ REMEDY_DEPTH = 0.1
 
 @dataclass(frozen=True)
 class GuardEvent:
-    """Something the guard tells of a run that goes on."""
+    """Something the guard tells."""
 
     tick: int
-    """At the end of which it was found."""
-    kind: Literal["shorter_steps", "chatter", "soft"]
+    """At the end of which it was found; for `stopped`, the last one that was reached."""
+    kind: Literal["shorter_steps", "chatter", "soft", "stopped"]
     bottle: int
-    """Id; -1 if it is about all."""
+    """Id."""
     x: float
-    """m, of the bottle at the beginning of the tick."""
+    """m, of its axis; of a tick that failed, at its beginning."""
     y: float
     text: str
     """One sentence."""

@@ -20,7 +20,9 @@ WALL = "wall time from first to last tick (s)"
 
 
 class Diagnostics:
-    """Level WARN after a second with overruns or refused commands, ERROR while the simulation can't go on."""
+    """Level WARN after a second with overruns, refused commands or a word of the guard, ERROR while it can
+    not go on.
+    """
 
     def __init__(self, node: Node, stepper: Stepper, sink: RosSink) -> None:
         self._stepper = stepper
@@ -31,6 +33,7 @@ class Diagnostics:
         self._last_tick = 0
         self._last_overruns = 0
         self._last_refused = 0
+        self._last_guard_events = 0
         # A steady clock: with use_sim_time the node's own would stand still while paused.
         node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -41,8 +44,9 @@ class Diagnostics:
         tick, counts = simulation.tick, simulation.counts
         overruns = pacer.overruns - self._last_overruns
         refused = stepper.refused_commands - self._last_refused
+        noticed = stepper.guard_events - self._last_guard_events
         status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
-        status.level, status.message = _verdict(stepper, overruns, refused)
+        status.level, status.message = _verdict(stepper, overruns, refused, noticed)
         values = {
             "state": stepper.state.name,
             "run_id": session.run_id,
@@ -57,6 +61,9 @@ class Diagnostics:
             "overruns": pacer.overruns,
             "wall time given up (s)": f"{pacer.lost:.3f}",
             "refused commands": stepper.refused_commands,
+            "guard events": stepper.guard_events,
+            "ticks in shorter steps": simulation.shortened_ticks,
+            "deepest overlap (of a radius)": f"{simulation.deepest_overlap:.3g}",
             "lockstep owner": stepper.lockstep.owner,
             "bottles present": counts.present,
             "bottles fed": counts.fed,
@@ -69,6 +76,7 @@ class Diagnostics:
         message.header.stamp = to_time(simulation.stamp_ns)
         self._publisher.publish(message)
         self._last_overruns, self._last_refused = pacer.overruns, stepper.refused_commands
+        self._last_guard_events = stepper.guard_events
 
     def _measured(self, tick: int, tick_s: float) -> float:
         """Simulated seconds per wall second since the last message; 0 after a reset."""
@@ -78,10 +86,11 @@ class Diagnostics:
         return factor
 
 
-def _verdict(stepper: Stepper, overruns: int, refused: int) -> tuple[bytes, str]:
+def _verdict(stepper: Stepper, overruns: int, refused: int, noticed: int) -> tuple[bytes, str]:
     if stepper.failure:
         return DiagnosticStatus.ERROR, f"stopped: {stepper.failure}"
     told = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
+    told += [f"{noticed} warnings of the guard"] * bool(noticed)
     if told:
         return DiagnosticStatus.WARN, f"{' and '.join(told)} since the last message"
     return DiagnosticStatus.OK, State(stepper.state).name

@@ -9,6 +9,7 @@ from pathlib import Path
 from conveyor_sim.achieved import PeakWatch, achieved
 from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -44,7 +45,11 @@ class Session:
         """Advance by one tick and write what is due; what became of the commands. Raises SimulationError, BagError."""
         if self._first_tick_at is None:
             self._first_tick_at = time.monotonic()
-        self.simulation.advance(1)
+        try:
+            self.simulation.advance(1)
+        except SimulationError:
+            self.outputs.after_failure()
+            raise
         outcomes = self.outputs.after_tick()
         self._peaks.after_tick()
         self.wall = time.monotonic() - self._first_tick_at

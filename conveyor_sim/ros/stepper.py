@@ -85,6 +85,7 @@ class Stepper:
         self.state = State.PLAYING if playing else State.PAUSED
         self.failure = ""  # why it can't go on before a reset
         self.refused_commands = 0
+        self.guard_events = 0
         self.lockstep = Lockstep(lockstep_max_ticks)
         self.pacer = Pacer(real_time_factor, self.session.simulation.model.tick_ns * 1e-9)
         self._outcomes: list[CommandOutcome] = []  # for the next lockstep answer
@@ -308,6 +309,9 @@ class Stepper:
         for outcome in outcomes:
             if not outcome.accepted:
                 self._refused(outcome.source, f"at tick {outcome.tick}: {outcome.reason}")
+        for event in self.session.outputs.take_noticed():
+            self.guard_events += 1
+            self._log.warning(f"guard: {event.text}")
         in_lockstep = self._advance is not None and self._advance.paced
         if in_lockstep or self.lockstep.owner:
             self._outcomes += outcomes

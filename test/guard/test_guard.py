@@ -1,0 +1,220 @@
+"""The guard: a fault of each kind is injected, and is cured by shorter steps or told in one sentence."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import MASS, NO_FLOOR, RADIUS, base, belt, bottle, contact, segment, simulation, stiffness_for
+
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.guard import GuardEvent
+from conveyor_sim.guard.chatter import EVERY
+from conveyor_sim.simulation import Simulation
+
+STOP = {"stop": segment((0.6, -1.0), (0.6, 1.0))}
+
+
+def told(sim: Simulation) -> GuardEvent:
+    """The only thing that the guard said."""
+    (event,) = sim.take_guard_events()
+    return event
+
+
+def against_a_stop(speed: float, stiffness: float, per_tick: int, **fields: Any) -> Simulation:
+    """A bottle half a radius before a rail, in ticks of 10 ms."""
+    return simulation(
+        **{
+            "accuracy": {"per_tick": per_tick},
+            "contacts": [contact(stiffness, "steel")],
+            "rails": STOP,
+            "bottles": [bottle(0.6 - 1.5 * RADIUS, 0.0, speed)],
+            **NO_FLOOR,
+            **fields,
+        }
+    )
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("column", ["x", "vy"])
+def test_what_was_not_finite_before_a_step_is_told_at_once(value: float, column: str) -> None:
+    sim = simulation(contacts=[contact(1e3)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.5)], **NO_FLOOR)
+    sim.advance(3)
+    getattr(sim._state.world.bottles, column)[1] = value
+    with pytest.raises(SimulationError) as stopped:
+        sim.advance()
+    assert str(stopped.value).startswith(
+        "bottle 1 has no finite position or velocity before a step was taken in the tick that began at 0.03 s at ("
+    )
+    assert sim.tick == 3
+    assert told(sim).kind == "stopped"
+
+
+def struck_too_hard(shorten: bool = True) -> Simulation:
+    """A contact of 1 ms in steps of 1 ms, beyond 2 / w, throws a bottle back many times faster."""
+    stiffness = stiffness_for(1e-3, MASS)
+    assert 2.0 / math.sqrt(stiffness / MASS) < 1e-3
+    return Simulation(against_a_stop(1.0, stiffness, 10).scene, threads=1, shorten=shorten)
+
+
+def test_a_spring_that_a_step_is_too_long_for_is_cured_by_shorter_ones() -> None:
+    """Elastic, the bottle comes back as fast as it came, as far as four steps a contact can tell."""
+    sim = struck_too_hard()
+    sim.advance(10)
+    assert sim.bottles().vx[0] == pytest.approx(-1.0, rel=0.4)
+    assert sim.shortened_ticks == 1
+    event = told(sim)
+    assert (event.kind, event.bottle) == ("shorter_steps", 0)
+    assert re.search(
+        r"rises from 0\.1 to \S+ J in the tick that began at 0\.0\d s .*; "
+        r"the tick was done again in steps 4 times shorter$",
+        event.text,
+    )
+
+
+def test_without_shorter_steps_the_same_is_told_and_the_tick_not_taken() -> None:
+    sim = struck_too_hard(shorten=False)
+    before = []
+    with pytest.raises(SimulationError, match="is the fastest while the energy of all rises") as stopped:
+        for _ in range(20):
+            before.append((sim.tick, sim.bottles().x[0], sim.bottles().vx[0]))
+            sim.advance()
+    assert stopped.value.kind == "unstable"
+    assert before[-1] == (sim.tick, sim.bottles().x[0], sim.bottles().vx[0])
+
+
+def test_a_bottle_that_would_step_over_a_rail_is_caught() -> None:
+    """At 20 m/s a step of 10 ms is three radii: shorter steps find the rail, and the bottle comes back."""
+    sim = against_a_stop(20.0, 1e6, 1)
+    sim.advance(2)
+    assert sim.bottles().x[0] < 0.6 - RADIUS
+    assert sim.bottles().vx[0] == pytest.approx(-20.0, rel=0.2)
+    assert "moves 200 mm in one step of 0.01 s" in sim.take_guard_events()[0].text
+
+
+def test_what_no_step_can_stop_is_told_with_the_stiffness_that_can() -> None:
+    """Faster than R sqrt(k/m) = 14.5 m/s, a bottle passes a rail of 10 kN/m by energy alone (physics.md)."""
+    stiffness = 1e4
+    most = RADIUS * math.sqrt(stiffness / MASS)
+    assert most == pytest.approx(14.5, abs=0.05)
+    slow = against_a_stop(0.7 * most, stiffness, 500)
+    slow.advance(5)
+    assert slow.bottles().vx[0] == pytest.approx(-0.7 * most, rel=1e-3)
+    fast = against_a_stop(1.1 * most, stiffness, 500)
+    with pytest.raises(SimulationError) as stopped:
+        fast.advance(5)
+    assert stopped.value.kind == "tunnelling"
+    sentence = re.fullmatch(
+        r"bottle 0 sinks (\S+) of its radius into rail stop in the tick that began at 0 s at \(\S+, 0\) m, even in "
+        r"steps 64 times shorter: it came with 16 m/s, and the contact with rail stop stops 14\.5 m/s within a radius; "
+        r"give it a stiffness of about (\S+) N/m",
+        str(stopped.value),
+    )
+    assert sentence is not None
+    assert 0.75 < float(sentence[1]) <= 1.0
+    assert fast.bottles().x[0] == 0.6 - 1.5 * RADIUS
+    event = told(fast)
+    assert (event.kind, event.tick, event.x, event.text) == ("stopped", 0, 0.6 - 1.5 * RADIUS, str(stopped.value))
+    cured = against_a_stop(1.1 * most, float(sentence[2]), 500)
+    cured.advance(5)
+    assert cured.bottles().vx[0] == pytest.approx(-1.1 * most, rel=1e-2)
+    assert cured.deepest_overlap < 0.11
+
+
+def test_two_bottles_that_would_pass_through_each_other() -> None:
+    sim = simulation(
+        accuracy={"per_tick": 200},
+        contacts=[contact(1e3)],
+        bottles=[bottle(0.0, 0.0, 8.0), bottle(2.2 * RADIUS, 0.0, -8.0)],
+        **NO_FLOOR,
+    )
+    with pytest.raises(SimulationError, match=r"bottle 0 overlaps bottle 1 by \S+ of a radius .* it came with 16 m/s"):
+        sim.advance(5)
+
+
+def test_a_soft_contact_is_told_once_with_the_force_that_presses_it() -> None:
+    """A bottle on a belt against a stop sinks in by mu m g / k: 0.3 of the radius."""
+    pressing = 0.4 * MASS * 9.81
+    stiffness = pressing / (0.3 * RADIUS)
+    sim = simulation(
+        accuracy={"per_tick": 200},
+        contacts=[contact(stiffness, "steel", ("normal", 2.0 * math.sqrt(stiffness * MASS)))],
+        base=base(0.4),
+        belts={"belt": belt(0.2)},
+        rails=STOP,
+        bottles=[bottle(0.6 - RADIUS, 0.0)],
+        slip_limit=0.01,
+    )
+    sim.advance(300)
+    event = told(sim)
+    assert event.kind == "soft"
+    assert re.match(r"bottle 0 sinks 0\.2\d* of its radius into rail stop at \(\S+, 0\) m: it is pressed with about "
+                    r"0\.5\d* N", event.text)  # fmt: skip
+    assert sim.deepest_overlap == pytest.approx(0.3, rel=0.01)
+
+
+@pytest.mark.parametrize(("of_bound", "shakes"), [(0.9, False), (1.9, True)])
+def test_chatter_is_told_where_it_shakes_more_than_a_quarter_of_the_limit(of_bound: float, shakes: bool) -> None:
+    """The slip settles at +-2 (1 - 1/b) v_lim for b = dt mu g / v_lim; without the guard nobody sees it."""
+    mu, limit, per_tick = 0.4, 0.01, 64
+    dt = round(of_bound * limit / (mu * 9.81), 8)
+    sim = simulation(
+        tick=per_tick * dt,
+        accuracy={"per_tick": per_tick},
+        slip_limit=limit,
+        base=base(mu),
+        belts={"belt": belt(0.2)},
+        bottles=[bottle(0.1, 0.2, 0.2 - 0.3 * limit)],
+    )
+    sim.advance(EVERY // per_tick)
+    events = sim.take_guard_events()
+    assert len(events) == shakes
+    if shakes:
+        share = float(re.search(r"shakes by (\S+) of slip_limit at every step", events[0].text)[1])  # type: ignore[index]
+        assert share == pytest.approx(2.0 * (1.0 - 1.0 / of_bound), abs=0.01)
+        assert (events[0].kind, events[0].bottle) == ("chatter", 0)
+
+
+def test_a_driven_line_has_nothing_to_tell() -> None:
+    """Belts do work, bottles fall in and out: no false alarm in a second at the preset."""
+    sim = simulation(
+        contacts=[contact(2e5, damping=("normal", 20.0)), contact(2e5, "steel", ("normal", 20.0))],
+        base=base(0.4),
+        belts={"belt": belt(1.0)},
+        rails=STOP,
+        bottles=[bottle(-2.0 + 2.1 * RADIUS * i, 0.01 * (-1) ** i) for i in range(12)],
+    )
+    sim.advance(100)
+    sim.command(["belts/belt/cmd_speed"], [-1.0])
+    sim.advance(100)
+    assert sim.take_guard_events() == []
+    assert sim.shortened_ticks == 0
+
+
+def unsteady(threads: int) -> Simulation:
+    """Bottles with tangential springs, friction and rotation on a belt, in steps that one contact is too stiff for."""
+    sprung = {"friction": 0.5, "tangential": {"stiffness": 3000.0, "damping": 0.2}}
+    stiff = stiffness_for(1e-4, MASS)
+    given = simulation(
+        accuracy={"per_tick": 20},
+        contacts=[contact(5e3, **sprung), contact(stiff, "steel", **sprung)],
+        rails={"stop": segment((0.6, -1.0), (0.6, 1.0)), "side": segment((-1.0, -RADIUS), (0.6, -RADIUS))},
+        bottles=[bottle(0.6 - (2 * i + 1.05) * RADIUS, 0.002 * (i % 2), 1.0) for i in range(5)],
+        **NO_FLOOR,
+    ).scene
+    return Simulation(given, threads)
+
+
+def test_a_cured_run_has_the_same_bits_however_it_is_divided_and_on_any_threads() -> None:
+    whole, parted = unsteady(1), unsteady(2)
+    whole.advance(40)
+    for _ in range(40):
+        parted.advance(1)
+        parted.bottles()
+    assert whole.shortened_ticks == parted.shortened_ticks > 0
+    assert whole.state_hash() == parted.state_hash()
+    assert np.isfinite(whole.bottles().vx).all()
+    assert whole.take_guard_events() == parted.take_guard_events()
