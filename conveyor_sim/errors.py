@@ -17,6 +17,10 @@ class BagError(ConveyorError):
     """A recording that can't be written, read, recovered or replayed."""
 
 
+class CheckpointError(ConveyorError):
+    """A checkpoint that can't be written, read or gone on from."""
+
+
 class SimulationError(ConveyorError):
     """A simulation that can't go on. `kind`: `unstable`, or `tunnelling` for what is about to be passed through."""
 

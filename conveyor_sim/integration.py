@@ -2,6 +2,8 @@
 
 import os
 import time
+from dataclasses import astuple
+from typing import Any
 
 import numpy as np
 
@@ -55,6 +57,21 @@ class Integration:
         """What the guard has to tell since the last call."""
         events, self._events = self._events, []
         return events
+
+    def memory(self) -> dict[str, Any]:
+        """What is remembered from tick to tick beside the State, as plain data for `recall`."""
+        return {
+            "events": [astuple(event) for event in self._events],
+            "chatters": self._chatters,
+            "shortened_ticks": self.shortened_ticks,
+            "deepest": self._guard.deepest,
+        }
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Take over what another one of the same Model remembered."""
+        self._events = [GuardEvent(*event) for event in memory["events"]]
+        self._chatters, self.shortened_ticks = memory["chatters"], memory["shortened_ticks"]
+        self._guard.deepest = memory["deepest"]
 
     def take_tick(self, tick: int, surface_speed: float) -> None:
         """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""

@@ -147,12 +147,15 @@ def build_model(scene: Scene) -> Model:
         base_friction=laws.base_friction,
         gravity=scene.gravity,
         engine_hash=ENGINE_HASH,
-        versions=(
-            f"conveyor_sim={__version__}+{sources_hash()}",
-            *(f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy")),
-        ),
+        versions=versions_here(),
         machine=_machine(),
     )
+
+
+def versions_here() -> tuple[str, ...]:
+    """ "package=version" of what can change a bit, beside the engine (`ENGINE_HASH`)."""
+    packages = (f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy"))
+    return f"conveyor_sim={__version__}+{sources_hash()}", *packages
 
 
 def _given_steps(scene: Scene) -> int | None:

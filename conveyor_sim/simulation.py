@@ -4,10 +4,14 @@ import copy
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from conveyor_sim.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import list_contacts
 from conveyor_sim.engine.footing import find_carriers, refresh_footing
@@ -20,9 +24,11 @@ from conveyor_sim.line.process_image import ProcessImage, speed_command
 from conveyor_sim.line.watchdog import Watchdog
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.part_memory import as_tuples, recall, remembered
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import FIRST_SLOTS, State
+from conveyor_sim.world_arrays import changing_arrays
 
 
 @dataclass(frozen=True)
@@ -81,6 +87,25 @@ class Simulation:
         self._feed()
         self._state.make_lists()
         self._set_surfaces()
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], threads: int | None = None, scene: Scene | None = None) -> "Simulation":
+        """Go on from a checkpoint as if the run had never stopped: the same bits, on any number of threads.
+
+        scene: must be the one that was saved, but for `duration` and `description`; None: the one in the file.
+        Raises CheckpointError for a file that is missing, no checkpoint, not whole, of another version or scene.
+        """
+        checkpoint = read_checkpoint(Path(path), scene)
+        simulation = cls(checkpoint.scene, threads)
+        simulation._go_on_from(checkpoint)
+        return simulation
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a checkpoint: the whole state at this tick, in place of what the file held. The run does not notice.
+
+        Raises CheckpointError if the file can't be written, which leaves what it held.
+        """
+        write_checkpoint(Path(path), self.scene, self._memory(), changing_arrays(self._state.world))
 
     @property
     def time(self) -> float:
@@ -245,6 +270,37 @@ class Simulation:
             digest.update(getattr(bottles, name).tobytes())
         digest.update(self._commanded.tobytes() + self._actual.tobytes() + self._state.springs())
         return int.from_bytes(digest.digest(), "little")
+
+    @property
+    def _parts(self) -> dict[str, Any]:
+        """What remembers something from tick to tick beside the State."""
+        return {"watchdogs": self._watchdogs, "infeeds": self._infeeds, "outfeeds": self._outfeeds}
+
+    def _memory(self) -> dict[str, Any]:
+        """All that changes as it runs but the arrays of the World, as plain data."""
+        return {
+            "tick": self.tick,
+            "next_id": self._state.next_id,
+            "pending": self._pending,
+            "outcomes": [astuple(outcome) for outcome in self._outcomes],
+            "commanded": self._commanded.tolist(),
+            "actual": self._actual.tolist(),
+            "parts": remembered(self._parts),
+            "integration": self._integration.memory(),
+        }
+
+    def _go_on_from(self, checkpoint: Checkpoint) -> None:
+        memory = checkpoint.memory
+        try:
+            self.tick = memory["tick"]
+            self._pending = list(as_tuples(memory["pending"]))
+            self._outcomes = [CommandOutcome(*told) for told in as_tuples(memory["outcomes"])]
+            self._commanded[:], self._actual[:] = memory["commanded"], memory["actual"]
+            recall(self._parts, memory["parts"])
+            self._integration.recall(memory["integration"])
+            self._state.go_on_from(checkpoint.arrays, memory["next_id"])
+        except (KeyError, AttributeError, TypeError, ValueError) as error:
+            raise damaged(checkpoint.path, error) from error
 
     def _slots(self) -> np.ndarray:
         ids = self._state.world.bottles.id

@@ -41,6 +41,7 @@ from conveyor_sim.engine.slots import WIDTH
 from conveyor_sim.engine.team import UNIT
 from conveyor_sim.model import Model
 from conveyor_sim.plant import belt_arrays, listed
+from conveyor_sim.world_arrays import Arrays, with_arrays
 
 FIRST_SLOTS = 16
 
@@ -104,6 +105,14 @@ class State:
         self._free = np.flatnonzero(bottles.id < 0).tolist()
         self._equip(np.flatnonzero(bottles.id >= 0))
         self.make_lists()
+
+    def go_on_from(self, arrays: Arrays, next_id: int) -> None:
+        """Take the arrays of another State of the same Model for its own (`changing_arrays`), lists included.
+
+        Raises ValueError where they are not those of such a State.
+        """
+        self.world, self.next_id = with_arrays(self.world, arrays), next_id
+        self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
 
     def _equip(self, slots: "slice | NDArray[np.int64]") -> None:
         """Give the bottles in some slots what is constant for their types."""

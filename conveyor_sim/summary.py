@@ -161,7 +161,7 @@ class _Tally:
         return Summary(
             scene=line.scene_name,
             bag=str(self._bag.path),
-            simulated=self._bag.time(self._last_tick),
+            simulated=self._bag.time(max(0, self._last_tick - int(line.tick))),
             wall=wall,
             fed=self._signal_sum("infeeds/", "/fed"),
             removed=self._signal_sum("outfeeds/", "/removed"),

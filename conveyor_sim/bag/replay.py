@@ -73,6 +73,11 @@ def replay(path: str | Path, progress: Callable[[float, float], None] | None = N
     Raises BagError, and SceneError if the recorded scene is refused.
     """
     with open_bag(path) as bag:
+        if bag.line.tick > 0:
+            raise BagError(
+                f"{bag.path}: began from a checkpoint at tick {bag.line.tick}, expected a run from tick 0: "
+                "the recording does not hold what was before"
+            )
         simulation = _simulation(bag)
         environment = _environment(bag, simulation)
         return _Replay(bag, simulation, environment, progress).run()

@@ -31,6 +31,7 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", ros_qos(QOS["diagnostics"]))
         self._last_wall = time.monotonic()
         self._last_tick = 0
+        self._last_run = ""
         self._last_overruns = 0
         self._last_refused = 0
         self._last_guard_events = 0
@@ -54,7 +55,7 @@ class Diagnostics:
             "simulated time (s)": f"{simulation.time:.9g}",
             "end of run (s)": f"{session.last_tick * pacer.tick:.9g}",
             "real_time_factor": f"{pacer.factor:g}",
-            "real_time_factor measured": f"{self._measured(tick, pacer.tick):.4g}",
+            "real_time_factor measured": f"{self._measured(session.run_id, tick, pacer.tick):.4g}",
             WALL: f"{session.wall:.3f}",
             "dt (s)": f"{simulation.model.dt:.9g}",
             "steps per tick": simulation.model.steps_per_tick,
@@ -78,11 +79,12 @@ class Diagnostics:
         self._last_overruns, self._last_refused = pacer.overruns, stepper.refused_commands
         self._last_guard_events = stepper.guard_events
 
-    def _measured(self, tick: int, tick_s: float) -> float:
-        """Simulated seconds per wall second since the last message; 0 after a reset."""
+    def _measured(self, run: str, tick: int, tick_s: float) -> float:
+        """Simulated seconds per wall second since the last message; 0 in the first one of a run."""
         now = time.monotonic()
-        factor = max(0, tick - self._last_tick) * tick_s / (now - self._last_wall)
-        self._last_wall, self._last_tick = now, tick
+        ticks = tick - self._last_tick if run == self._last_run else 0
+        factor = ticks * tick_s / (now - self._last_wall)
+        self._last_wall, self._last_tick, self._last_run = now, tick, run
         return factor
 
 

@@ -13,6 +13,7 @@ from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.explain import setting_line
 from conveyor_sim.resources import scene_path
 from conveyor_sim.ros import parameters
+from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.diagnostics import Diagnostics
@@ -24,7 +25,7 @@ from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.scene import load_scene
-from conveyor_sim.simulation import compile_kernels
+from conveyor_sim.simulation import Simulation, compile_kernels
 
 
 class SimNode:
@@ -66,8 +67,10 @@ class SimNode:
         sink = RosSink(node, distro, {"markers": RateCap(given.marker_rate)})
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
-        def open_session(resets: int) -> Session:
-            return Session(scene, sink, bag_folder(given.record, resets), given.frame_id, distro, given.threads)
+        def open_session(runs: int, checkpoint: Path | None) -> Session:
+            threads = given.threads or None
+            new = Simulation(scene, threads) if checkpoint is None else Simulation.load(checkpoint, threads, scene)
+            return Session(new, sink, bag_folder(given.record, runs), given.frame_id, distro)
 
         stepper = Stepper(
             open_session,
@@ -84,6 +87,7 @@ class SimNode:
 
         subscribe_commands(node, stepper)
         Services(node, executor, stepper, quit_soon=quit_soon)
+        CheckpointServices(node, executor, stepper)
         LockstepService(node, executor, stepper, given.frame_id)
         Diagnostics(node, stepper, sink)
 
@@ -100,11 +104,11 @@ class SimNode:
         self._on_stop()
 
 
-def bag_folder(record: Path | None, resets: int) -> Path | None:
-    """Where the run after so many resets is recorded: `<record>`, then `<record>_1`, `<record>_2`, ..."""
-    if record is None or resets == 0:
+def bag_folder(record: Path | None, runs: int) -> Path | None:
+    """Where the run after so many others is recorded: `<record>`, then `<record>_1`, `<record>_2`, ..."""
+    if record is None or runs == 0:
         return record
-    return record.with_name(f"{record.name}_{resets}")
+    return record.with_name(f"{record.name}_{runs}")
 
 
 def _greeting(stepper: Stepper) -> str:

@@ -84,7 +84,7 @@ class Services:
         # conveyor_msgs' response is flat; the real one keeps its fields in `features`.
         features = response if isinstance(response, own_srv.GetSimulatorFeatures.Response) else response.features
         features.features = FEATURES
-        features.custom_info = f"conveyor_sim {__version__}; also offers lockstep, see docs/ros.md"
+        features.custom_info = f"conveyor_sim {__version__}; also offers lockstep and checkpoints, see docs/ros.md"
         return response
 
     def _get_state(self, _: Any, response: Any) -> Any:

@@ -1,4 +1,4 @@
-"""One run of a scene, from tick 0 to its end: the simulation, what it publishes and what it records."""
+"""One run of a scene, from tick 0 or a checkpoint to its end: the simulation, what it publishes and what it records."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
 
 class Session:
     """A simulation with its sinks. Not for several threads: whoever steps it owns it."""
 
-    def __init__(self, scene: Scene, sink: Sink, bag: Path | None, frame_id: str, distro: str, threads: int) -> None:
-        """Starts the run; `bag` is the folder to record to, if any. threads: to step with, 0 has them chosen.
+    def __init__(self, simulation: Simulation, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
+        """Starts the run from where `simulation` is; `bag` is the folder to record to, if any.
 
-        Raises SceneError, and BagError if the folder can't be written.
+        Raises BagError if the folder can't be written; nothing has been published then.
         """
         self.run_id = uuid.uuid4().hex
         self.bag = bag
@@ -29,7 +28,8 @@ class Session:
         self._frame_id = frame_id
         self.wall = 0.0  # s of wall time from the start of the first tick to the end of the last one
         self._first_tick_at: float | None = None
-        self.simulation = Simulation(scene, threads or None)
+        self.simulation = simulation
+        self._began = simulation.time
         self._recorder = Recorder(bag, distro=distro) if bag else None
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
@@ -59,9 +59,10 @@ class Session:
     def account(self) -> str:
         """How fast the run was, and what its forces say of its accuracy, in one line."""
         simulation = self.simulation
-        told = f"{simulation.time:g} s simulated in {self.wall:.2f} s"
+        simulated = simulation.time - self._began
+        told = f"{simulated:g} s simulated in {self.wall:.2f} s"
         if self.wall > 0.0:
-            told += f", {simulation.time / self.wall:.3g} x real time"
+            told += f", {simulated / self.wall:.3g} x real time"
         reached = achieved(simulation.model, self._peaks.force)
         return told if reached is None else f"{told}; {reached.sentence}"
 

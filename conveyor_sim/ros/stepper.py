@@ -14,6 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 from conveyor_sim.errors import ConveyorError
@@ -62,7 +63,7 @@ class Stepper:
 
     def __init__(
         self,
-        open_session: Callable[[int], Session],
+        open_session: Callable[[int, Path | None], Session],
         *,
         real_time_factor: float,
         playing: bool,
@@ -71,8 +72,9 @@ class Stepper:
         died: Callable[[Exception], None],
         log: Log,
     ) -> None:
-        """`open_session`: opens the run with the given number of resets before it. `beat`: called after each tick and
-        while idle, with the simulated time in ns and the wall time in s. `died`: called if the thread can't go on.
+        """`open_session`: opens the run with the given number of runs before it, from a checkpoint if one is given.
+        `beat`: called after each tick and while idle, with the simulated time in ns and the wall time in s.
+        `died`: called if the thread can't go on.
 
         Raises what `open_session` raises.
         """
@@ -80,8 +82,8 @@ class Stepper:
         self._beat = beat
         self._died = died
         self._log = log
-        self.session = open_session(0)
-        self.resets = 0
+        self.session = open_session(0, None)
+        self._runs = 0  # before this one
         self.state = State.PLAYING if playing else State.PAUSED
         self.failure = ""  # why it can't go on before a reset
         self.refused_commands = 0
@@ -169,19 +171,34 @@ class Stepper:
 
         Raises ConveyorError if the next run can't be opened; there is none to step then, until a reset succeeds.
         """
-        self._abandon("the simulation was reset")
-        self.lockstep.clear()
-        self._outcomes.clear()
-        self._close_recording()
-        self.resets += 1
+        self._leave("the simulation was reset")
+        self._runs += 1
         try:
-            self.session = self._open_session(self.resets)
+            self._enter(self._open_session(self._runs, None))
         except ConveyorError as error:
             self._fail(error)
             raise
-        self.failure, self._ended = "", False
-        self.pacer.restart()
         self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint of the present state. Raises CheckpointError."""
+        self.session.simulation.save(path)
+        self._log.info(f"saved tick {self.session.simulation.tick} to {path}")
+
+    def load(self, path: Path) -> None:
+        """Close this run and its recording and open the next from a checkpoint, PAUSED.
+
+        Raises ConveyorError if that can't be opened; this run then goes on.
+        """
+        session = self._open_session(self._runs + 1, path)
+        self._runs += 1
+        self._leave("a checkpoint was loaded")
+        self._enter(session)
+        self.state = State.PAUSED
+        tick = session.simulation.tick
+        self._log.info(f"loaded {path}: run {session.run_id} from tick {tick}" + _to_bag(session))
+        if tick >= session.last_tick:
+            self._end()
 
     def step(self, ticks: int) -> Future[None]:
         """Advance by `ticks` at full speed. Raises Refused."""
@@ -223,6 +240,18 @@ class Stepper:
 
         self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
+
+    def _leave(self, reason: str) -> None:
+        """End this run, whatever is under way in it."""
+        self._abandon(reason)
+        self.lockstep.clear()
+        self._outcomes.clear()
+        self._close_recording()
+
+    def _enter(self, session: Session) -> None:
+        self.session = session
+        self.failure, self._ended = "", False
+        self.pacer.restart()
 
     def _require_paused(self) -> None:
         if self.state is not State.PAUSED:
