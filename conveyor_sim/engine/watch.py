@@ -16,23 +16,22 @@ from .team import units
 
 
 @kernel
-def look(world: World, found: RailContacts, closely: bool) -> tuple[int, int, float, float, float]:
+def look(world: World, found: RailContacts, closely: bool) -> tuple[int, int, float, float, float, float]:
     """Look at the present state, for which the lists must hold; the deepest overlaps go to `world.watch`.
 
     Returns the first slot whose bottle is not finite (-1: none), the slot of the fastest one (-1: no bottle), the
-    square of its speed (m^2/s^2), and the kinetic and elastic energies (J), tangential springs not counted. Unless
-    closely: nothing of overlaps, and an elastic energy of 0.
+    square of its speed (m^2/s^2), the weight of all (N), and the kinetic and elastic energies (J), tangential springs
+    not counted. Unless closely: nothing of overlaps, and an elastic energy of 0.
     """
-    bad, fastest, square = _bottles(world.bottles, world.spin)
+    bad, fastest, square, weight = _bottles(world.bottles, world.spin)
     elastic = 0.0
     if closely:
         elastic = watch_overlaps(world, found)
-    return bad, fastest, square, kinetic_energy(world), elastic
+    return bad, fastest, square, weight, _kinetic_energy(world), elastic
 
 
-@kernel
-def kinetic_energy(world: World) -> float:
-    """Kinetic energy, J."""
+@part
+def _kinetic_energy(world: World) -> float:
     bottles = world.bottles
     energy = 0.0
     for i in range(bottles.x.size):
@@ -50,17 +49,18 @@ def watch_overlaps(world: World, found: RailContacts) -> float:
 
 
 @part
-def _bottles(bottles: Bottles, spin: Any) -> tuple[int, int, float]:
-    bad, fastest, square = -1, -1, -1.0
+def _bottles(bottles: Bottles, spin: Any) -> tuple[int, int, float, float]:
+    bad, fastest, square, weight = -1, -1, -1.0, 0.0
     for i in range(bottles.x.size):
         if bottles.id[i] >= 0:
+            weight += bottles.weight[i]
             speed = bottles.vx[i] ** 2 + bottles.vy[i] ** 2
             if not math.isfinite(bottles.x[i] + bottles.y[i] + speed + _turn(spin, i)):
                 if bad < 0:
                     bad = i
             elif speed > square:
                 fastest, square = i, speed
-    return bad, fastest, square
+    return bad, fastest, square, weight
 
 
 @part

@@ -3,8 +3,6 @@
 import math
 from typing import Any
 
-import numpy as np
-
 from conveyor_sim.engine.arrays import RailContacts
 from conveyor_sim.engine.compile import entry
 from conveyor_sim.engine.watch import look
@@ -42,6 +40,10 @@ class Guard:
             for law in (self._model.pair_law, self._model.rail_law)
         )
         self._growth = GROWTH_WITH_SPRINGS if sprung else GROWTH
+        tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
+        self._friction = 0.0 if self._model.base_friction is None else tick * float(self._model.base_friction.max())
+        # Bottles that move within the slip limit have no energy worth the name.
+        self._noise = 0.5 * slip**2 / self._model.gravity if self._model.gravity > 0.0 else 0.0
         self._kinetic = 0.0
         self._work = 0.0
         self._entry: Any = entry(look, state.world, found, True)
@@ -56,20 +58,15 @@ class Guard:
         model, world = self._model, self._state.world
         self._memory.keep(world)
         self._closely = tick % self._every == 0
-        bad, _, _, self._kinetic, _ = self._entry(world, self._found, False)
-        weight = float(world.bottles.weight.sum())
-        friction = 0.0 if model.base_friction is None else float(model.base_friction.max())
-        self._work = weight * friction * surface_speed * model.tick_ns * 1e-9
-        if model.gravity > 0.0:
-            self._work += 0.5 * weight / model.gravity * model.settings.slip_limit**2
+        bad, _, _, weight, self._kinetic, _ = self._entry(world, self._found, False)
+        self._work = weight * (self._friction * surface_speed + self._noise)
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
         """What is wrong with the state at the end of a tick, reached in steps of dt (s); it is put back then."""
         world, model = self._state.world, self._model
-        bad, fastest, square, kinetic, _ = self._entry(world, self._found, self._closely)
-        deep = world.watch.depth.copy()
-        bottle, other = world.watch.bottle.copy(), world.watch.other.copy()
+        bad, fastest, square, _, kinetic, _ = self._entry(world, self._found, self._closely)
+        deep = float(world.watch.depth[0]), float(world.watch.depth[1])
         self._forget()
         if bad >= 0:
             return self._put_back().not_finite(bad)
@@ -80,15 +77,16 @@ class Guard:
             return self._put_back().far(fastest, speed, dt)
         if kinetic > self._growth * self._kinetic + self._work and (energies := self._grown()):
             return self._put_back().energy(fastest, *energies, self._work)
-        worst = int(np.argmax(deep))
-        if deep[worst] > SOFT >= self.deepest or deep[worst] > DEEPEST:
-            words = self._put_back() if deep[worst] > DEEPEST else Words(model, world)
-            about = words.rail if worst else words.pair
-            found = about(int(bottle[worst]), int(other[worst]), float(deep[worst]))
-            if deep[worst] > DEEPEST:
+        depth = max(deep)
+        if depth > SOFT >= self.deepest or depth > DEEPEST:
+            worst = deep.index(depth)
+            bottle, other = int(world.watch.bottle[worst]), int(world.watch.other[worst])
+            words = self._put_back() if depth > DEEPEST else Words(model, world)
+            found = (words.rail if worst else words.pair)(bottle, other, depth)
+            if depth > DEEPEST:
                 return found
             self._soft = found
-        self.deepest = max(self.deepest, float(deep[worst]))
+        self.deepest = max(self.deepest, depth)
         return None
 
     def soft(self, tick: int) -> GuardEvent | None:

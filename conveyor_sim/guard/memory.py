@@ -13,15 +13,17 @@ class Memory:
     """One state of the bottles of a State, with peaks and tangential springs."""
 
     def __init__(self) -> None:
+        self._world: World | None = None
+        self._columns: list[NDArray[np.generic]] = []
         self._kept: list[NDArray[np.generic]] = []
 
     def keep(self, world: World) -> None:
         """Take a copy, in place of the one before."""
-        columns = list(_moving(world))
-        if [column.size for column in columns] != [kept.size for kept in self._kept]:
-            self._kept = [column.copy() for column in columns]
+        if world is not self._world:
+            self._world, self._columns = world, list(_moving(world))
+            self._kept = [column.copy() for column in self._columns]
             return
-        for column, kept in zip(columns, self._kept, strict=True):
+        for column, kept in zip(self._columns, self._kept, strict=True):
             np.copyto(kept, column)
 
     def put_back(self, state: State) -> None:
