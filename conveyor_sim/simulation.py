@@ -4,6 +4,7 @@ import copy
 import hashlib
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import astuple, dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
+from conveyor_sim.energy_account import EnergyAccount
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import list_contacts
 from conveyor_sim.engine.footing import find_carriers, refresh_footing
@@ -24,6 +26,7 @@ from conveyor_sim.line.process_image import ProcessImage, speed_command
 from conveyor_sim.line.watchdog import Watchdog
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.part_memory import as_tuples, recall, remembered
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.schema import Scene
@@ -84,9 +87,12 @@ class Simulation:
         self._outfeeds = outfeed_states(scene.outfeeds)
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
+        self._account: EnergyAccount | None = None
         self._feed()
         self._state.make_lists()
         self._set_surfaces()
+        if self.model.has("energy_ledger"):
+            self._account = EnergyAccount(self._state)
 
     @classmethod
     def load(cls, path: str | PathLike[str], threads: int | None = None, scene: Scene | None = None) -> "Simulation":
@@ -190,6 +196,8 @@ class Simulation:
         self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
         self._state.take(other._state)
         self._set_surfaces()
+        if self._account is not None:
+            self._account.restart()
 
     def displace(self, dx: F8, dy: F8, dvx: F8 | None = None, dvy: F8 | None = None) -> None:
         """Move every bottle by (dx, dy) m and change its velocity by (dvx, dvy) m/s; (bottles,), in order of the ids.
@@ -197,12 +205,13 @@ class Simulation:
         For studies of how a disturbance grows. ValueError if the shapes do not match.
         """
         slots, bottles = self._slots(), self._state.world.bottles
-        for column, change in ((bottles.x, dx), (bottles.y, dy), (bottles.vx, dvx), (bottles.vy, dvy)):
-            if change is not None:
-                if np.shape(change) != slots.shape:
-                    raise ValueError(f"a displacement of shape {np.shape(change)}, expected {slots.shape}")
-                column[slots] += change
-        self._state.world.neighbourhood.stale[0] = 1
+        with nullcontext() if self._account is None else self._account.feeding():
+            for column, change in ((bottles.x, dx), (bottles.y, dy), (bottles.vx, dvx), (bottles.vy, dvy)):
+                if change is not None:
+                    if np.shape(change) != slots.shape:
+                        raise ValueError(f"a displacement of shape {np.shape(change)}, expected {slots.shape}")
+                    column[slots] += change
+            self._state.world.neighbourhood.stale[0] = 1
         self._state.make_lists()
 
     def due(self, output: str) -> bool:
@@ -254,6 +263,10 @@ class Simulation:
         """Commanded and actual speeds, m/s."""
         return BeltColumns(self._commanded.copy(), self._actual.copy())
 
+    def ledger(self) -> Ledger | None:
+        """Where energy came from and went since the start; None without the effect `energy_ledger`."""
+        return None if self._account is None else self._account.ledger()
+
     def signals(self) -> np.ndarray:
         """The process image's values, in the order of `process_image.signal_names`; float64."""
         belts = len(self.model.belts)
@@ -274,7 +287,12 @@ class Simulation:
     @property
     def _parts(self) -> dict[str, Any]:
         """What remembers something from tick to tick beside the State."""
-        return {"watchdogs": self._watchdogs, "infeeds": self._infeeds, "outfeeds": self._outfeeds}
+        return {
+            "watchdogs": self._watchdogs,
+            "infeeds": self._infeeds,
+            "outfeeds": self._outfeeds,
+            "account": self._account,
+        }
 
     def _memory(self) -> dict[str, Any]:
         """All that changes as it runs but the arrays of the World, as plain data."""
@@ -317,14 +335,16 @@ class Simulation:
 
     def _remove(self) -> None:
         if self.model.has("outfeed"):
-            for outfeed in self._outfeeds.values():
-                outfeed.take(self._state)
+            with nullcontext() if self._account is None else self._account.removing():
+                for outfeed in self._outfeeds.values():
+                    outfeed.take(self._state)
 
     def _feed(self) -> None:
         if not self.model.has("infeed"):
             return
-        for infeed in self._infeeds.values():
-            infeed.feed(self._state, self.time, self.scene.tick)
+        with nullcontext() if self._account is None else self._account.feeding():
+            for infeed in self._infeeds.values():
+                infeed.feed(self._state, self.time, self.scene.tick)
 
     def _apply_commands(self) -> None:
         pending, self._pending = self._pending, []
@@ -374,3 +394,4 @@ def compile_kernels(scene: Scene) -> None:
     rehearsal.advance(1)
     rehearsal.bottles()
     rehearsal.contacts()
+    rehearsal.ledger()

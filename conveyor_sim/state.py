@@ -14,11 +14,13 @@ from conveyor_sim.engine.arrays import (
     ContactLaw,
     Footing,
     Implicit,
+    Ledger,
     Linear,
     Load,
     Near,
     NearSprings,
     Neighbourhood,
+    PairParts,
     Pairs,
     PairSprings,
     PairTangent,
@@ -34,6 +36,7 @@ from conveyor_sim.engine.arrays import (
     World,
 )
 from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
+from conveyor_sim.engine.ledger import BELTS
 from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
@@ -169,6 +172,8 @@ class State:
             for name in ("ux", "uy", "turn"):
                 if (before := getattr(old.surface, name)) is not None:
                     getattr(new.surface, name)[:] = before
+        if old.ledger is not None and new.ledger is not None:
+            new.ledger.work[: len(old.ledger.work)] = old.ledger.work
         # Higher than all there are, and none is free: still a heap.
         self._free += range(used, slots)
         self.world = new._replace(
@@ -218,6 +223,7 @@ class State:
             touch=forces(model.has("implicit_friction")),
             spring=_pair_springs(entries) if law.tangential_stiffness is not None else None,
             tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
+            parts=PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1)) if model.has("energy_ledger") else None,
         )
 
     def _near(self, slots: int, entries: int, before: Near | None = None) -> Near:
@@ -280,6 +286,7 @@ class State:
             surface=self._surface(),
             footing=self._footing(slots),
             ring=Ring(reals()) if model.has("ring_base") else None,
+            ledger=_ledger(slots, model) if model.has("energy_ledger") else None,
         )
 
     def _surface(self) -> Surface | None:
@@ -343,6 +350,22 @@ def _linear(slots: int) -> Linear:
         way_sum=np.zeros(units),
         most=np.zeros(units),
     )
+
+
+def _ledger(slots: int, model: Model) -> Ledger:
+    units, surfaces = slots // UNIT + 1, len(model.belts) + 1
+    return Ledger(
+        damping=_triple(slots),
+        friction=_triple(slots),
+        base=_triple(slots),
+        belt_power=np.zeros((units, surfaces)),
+        power=np.zeros((SLOPES.get(model.integrator, 1), units, BELTS + surfaces)),
+        work=np.zeros((units, BELTS + surfaces)),
+    )
+
+
+def _triple(entries: int) -> Triple:
+    return Triple(np.zeros(entries), np.zeros(entries), np.zeros(entries))
 
 
 def _pair_tangent(entries: int) -> PairTangent:

@@ -15,12 +15,13 @@ from rich.console import Group
 from rich.table import Table
 
 from conveyor_sim.achieved import Achieved, achieved
-from conveyor_sim.bag.messages import BOTTLES, GUARD_EVENT, OUTCOME, SIGNALS
+from conveyor_sim.bag.messages import BOTTLES, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.errors import SceneError
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.itinerary import Itinerary
+from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
@@ -50,6 +51,33 @@ class Loop:
     returns: int
     per_minute: float
     per_minute_second_half: float
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The energy ledger at the end (`conveyor_sim.observe.ledger`), J."""
+
+    belts: dict[str, float]
+    """Work done by each belt."""
+    fed: float
+    removed: float
+    stored: float
+    """In motion, contacts and tangential springs."""
+    base_friction: float
+    contact_friction: float
+    damping: float
+    residual: float
+    turnover: float
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        share = self.residual / self.turnover if self.turnover else 0.0
+        return (
+            f"{sum(self.belts.values()):.4g} J from belts; {self.base_friction:.4g} J lost under bottles, "
+            f"{self.contact_friction:.4g} J in friction at contacts, {self.damping:.4g} J in damping; "
+            f"residual {100.0 * share:.2g} % of a turnover of {self.turnover:.4g} J"
+        )
 
 
 @dataclass(frozen=True)
@@ -94,6 +122,8 @@ class Summary:
     """How often the guard said something, by kind (`GuardEvent.kind`)."""
     guard_texts: list[str]
     """What it said, the first times."""
+    energy: Energy | None
+    """None if no energy ledger was recorded."""
     commands: int
     refused: int
     """Of the commands."""
@@ -131,12 +161,13 @@ class _Tally:
         self._unknown = False
         self._bottles: BottleColumns | None = None
         self._signals: NDArray[np.float64] | None = None
+        self._ledger: Ledger | None = None
         self._outcomes: Counter[bool] = Counter()
         self._guard: list[tuple[str, str]] = []
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
-            if bag.types[topic] in (BOTTLES, SIGNALS, OUTCOME, GUARD_EVENT):
+            if bag.types[topic] in (BOTTLES, SIGNALS, LEDGER, OUTCOME, GUARD_EVENT):
                 self._take(bag.types[topic], bag.decode(topic, data))
 
     def _take(self, kind: str, message: Any) -> None:
@@ -150,6 +181,8 @@ class _Tally:
             self._signals = message.values
         elif kind == GUARD_EVENT:
             self._guard.append((message.kind, message.text))
+        elif kind == LEDGER:
+            self._ledger = to_columns(Ledger, message)
         else:
             self._outcomes[bool(message.accepted)] += 1
 
@@ -176,6 +209,7 @@ class _Tally:
             achieved=None if model is None else achieved(model, peak),
             guard=dict(Counter(kind for kind, _ in self._guard)),
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
+            energy=None if self._ledger is None else _energy(self._ledger, line.belts),
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
@@ -204,6 +238,21 @@ class _Tally:
         return Loop(self._bag.line.belts[index], len(returns[index]), *rates)
 
 
+def _energy(ledger: Ledger, belts: list[str]) -> Energy:
+    return Energy(
+        # The last entry is the floor's.
+        belts=dict(zip(belts, ledger.belt_work[:-1].tolist(), strict=True)),
+        fed=ledger.fed,
+        removed=ledger.removed,
+        stored=ledger.kinetic + ledger.elastic + ledger.springs,
+        base_friction=ledger.base_friction,
+        contact_friction=ledger.contact_friction,
+        damping=ledger.damping,
+        residual=ledger.residual,
+        turnover=ledger.turnover,
+    )
+
+
 def _model(line: Any) -> Model | None:
     """The model of a recorded scene; None if this version would simulate it in another way."""
     try:
@@ -219,9 +268,12 @@ def render(summary: Summary) -> Group:
     account = Table.grid(padding=(0, 2))
     for name, text in _account(summary):
         account.add_row(name, text)
-    belts = _table("belt", "bottles now", "came on, per min", "second half, per min")
+    energy = summary.energy
+    work = [] if energy is None else ["work, J"]
+    belts = _table("belt", "bottles now", "came on, per min", "second half, per min", *work)
     for name, flow in summary.belts.items():
-        belts.add_row(name, str(flow.bottles), f"{flow.per_minute:.1f}", f"{flow.per_minute_second_half:.1f}")
+        done = [] if energy is None else [f"{energy.belts[name]:.4g}"]
+        belts.add_row(name, str(flow.bottles), f"{flow.per_minute:.1f}", f"{flow.per_minute_second_half:.1f}", *done)
     topics = _table("topic", "messages", "bytes")
     for name, count in sorted(summary.topics.items()):
         topics.add_row(name, f"{count.messages}", f"{count.bytes}")
@@ -254,6 +306,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("predicted error", "not known" if summary.predicted is None else summary.predicted),
         ("achieved", "not known" if summary.achieved is None else summary.achieved.sentence),
         ("guard", _guard(summary)),
+        *([] if summary.energy is None else [("energy", summary.energy.sentence)]),
         ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
     ]
 

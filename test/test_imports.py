@@ -15,7 +15,7 @@ FLOORS = [
     ["plant", "presets", "effects", "world_arrays", "part_memory"],
     ["model"],
     ["state", "elastic", "checkpoint"],
-    ["guard", "line"],
+    ["guard", "line", "energy_account"],
     ["integration"],
     ["simulation"],
     ["bag", "price", "accuracy", "achieved"],

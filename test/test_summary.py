@@ -124,8 +124,26 @@ def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
     record(load_scene(SMALL_LINE, {"outputs": {"signals": 0}}), tmp_path / "bag", 10)
     summary = summarize(tmp_path / "bag")
     assert summary.fed is None
+    assert summary.energy is None
     assert summary.wall is None
     assert summary.real_time_factor is None
+
+
+def test_the_energy_ledger_is_told_with_the_work_of_each_belt(tmp_path: Path) -> None:
+    simulation = record(load_scene(SMALL_LINE, {"outputs": {"ledger": 20}}), tmp_path / "bag", TICKS)
+    ledger, summary = simulation.ledger(), summarize(tmp_path / "bag")
+    assert ledger is not None and summary.energy is not None
+    assert summary.energy.belts == dict(zip(["straight", "turn"], ledger.belt_work.tolist(), strict=False))
+    assert summary.energy.belts["straight"] > 0.0
+    came = sum(summary.energy.belts.values()) + summary.energy.fed + summary.energy.residual
+    dissipated = summary.energy.base_friction + summary.energy.contact_friction + summary.energy.damping
+    assert came - dissipated - summary.energy.removed == pytest.approx(summary.energy.stored)
+    console = Console(width=200)
+    with console.capture() as captured:
+        console.print(render(summary))
+    assert f"% of a turnover of {ledger.turnover:.4g} J" in captured.get()
+    assert f"{ledger.belt_work[0]:.4g}" in captured.get()
+    assert json.loads(write_summary(summary, tmp_path).read_text())["energy"]["residual"] == ledger.residual
 
 
 def test_summary_is_written_as_json(bag: Path, tmp_path: Path) -> None:

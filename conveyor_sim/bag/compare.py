@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.reader import Outcome
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.ledger import Ledger
 
 TOLERANCE = {
     "x": 1e-6,
@@ -88,6 +89,7 @@ COMPARERS = {
     "contacts": _Comparer(_columns(ContactColumns), _contact_name, "a"),
     "belts": _Comparer(_columns(BeltColumns), lambda line, _, index: f"belt {line.belts[index]}"),
     "signals": _Comparer(("values",), lambda line, _, index: f"signal {line.signal_names[index]}"),
+    "ledger": _Comparer(_columns(Ledger), lambda *_: ""),
 }
 """By topic, in the order in which differences of one tick are looked for."""
 
@@ -108,7 +110,7 @@ def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exa
     if exact and recorded.header.stamp != replayed.header.stamp:
         return found("header.stamp", _seconds(recorded), _seconds(replayed))
     for field in comparer.columns:
-        then, now = getattr(recorded, field), getattr(replayed, field)
+        then, now = np.atleast_1d(getattr(recorded, field)), np.atleast_1d(getattr(replayed, field))
         if len(then) != len(now):
             return found(f"the number of entries ({field})", len(then), len(now))
         unequal = np.flatnonzero(_unequal(then, now, None if exact else TOLERANCE.get(field)))

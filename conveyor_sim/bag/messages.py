@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.ledger import Ledger
 
 if TYPE_CHECKING:
     from conveyor_sim.guard import GuardEvent
@@ -22,6 +23,7 @@ BOTTLES = "conveyor_msgs/msg/Bottles"
 CONTACTS = "conveyor_msgs/msg/Contacts"
 BELTS = "conveyor_msgs/msg/Belts"
 SIGNALS = "conveyor_msgs/msg/Signals"
+LEDGER = "conveyor_msgs/msg/Ledger"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
 GUARD_EVENT = "conveyor_msgs/msg/GuardEvent"
 LINE = "conveyor_msgs/msg/Line"
@@ -88,6 +90,11 @@ def belts_message(columns: BeltColumns, header: Header) -> bytes:
 def signals_message(values: NDArray[np.float64], header: Header) -> bytes:
     """conveyor_msgs/Signals: the process image, in the order of Line.signal_names."""
     return _serialize(SIGNALS, header, {"values": values})
+
+
+def ledger_message(ledger: Ledger, header: Header) -> bytes:
+    """conveyor_msgs/Ledger."""
+    return _serialize(LEDGER, header, _by_field(ledger))
 
 
 def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from conveyor_sim.guard import GuardEvent
     from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.observe.columns import BottleColumns
+    from conveyor_sim.observe.ledger import Ledger
     from conveyor_sim.simulation import Simulation
 
 
@@ -47,6 +48,7 @@ OUTPUTS: dict[str, Output] = {
         Output("contacts", messages.CONTACTS, "contacts"),
         Output("belts", messages.BELTS, "belts"),
         Output("signals", messages.SIGNALS, "signals"),
+        Output("ledger", messages.LEDGER, "ledger"),
     )
 }
 """By name; within a tick, messages are written in this order."""
@@ -73,6 +75,13 @@ class Snapshot:
         """The bottles present."""
         return self.sim.bottles()
 
+    @property
+    def ledger(self) -> Ledger:
+        """The energy ledger, which a scene with that output has."""
+        ledger = self.sim.ledger()
+        assert ledger is not None
+        return ledger
+
 
 SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
     "bottles": lambda now, header: messages.bottles_message(now.bottles, header),
@@ -81,6 +90,7 @@ SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
     "contacts": lambda now, header: messages.contacts_message(now.sim.contacts(), header),
     "belts": lambda now, header: messages.belts_message(now.sim.belts(), header),
     "signals": lambda now, header: messages.signals_message(now.sim.signals(), header),
+    "ledger": lambda now, header: messages.ledger_message(now.ledger, header),
 }
 """The topics that have a rate."""
 

@@ -47,6 +47,7 @@ QOS = {
     "contacts": DATA,
     "belts": DATA,
     "signals": DATA,
+    "ledger": DATA,
     "markers": DATA,
     "line": LATCHED,
     "plant": LATCHED,

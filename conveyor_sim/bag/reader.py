@@ -18,6 +18,7 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.ledger import Ledger
 
 T = TypeVar("T")
 
@@ -143,6 +144,10 @@ class Bag(AbstractContextManager["Bag"]):
     def signals(self) -> Iterator[Frame[NDArray[np.float64]]]:
         """Every recorded process image, in the order of line.signal_names."""
         return self._columns("signals", lambda message: message.values)
+
+    def ledger(self) -> Iterator[Frame[Ledger]]:
+        """Every recorded energy ledger."""
+        return self._columns("ledger", lambda message: to_columns(Ledger, message))
 
     def outcomes(self) -> Iterator[Frame[Outcome]]:
         """What became of every command, in order; the tick is the one at which it was applied or refused."""

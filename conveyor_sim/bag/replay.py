@@ -18,6 +18,9 @@ from conveyor_sim.simulation import Simulation
 WATCHDOG = "watchdog"
 """Source of outcomes that the line itself brings about; they are compared, not commanded."""
 
+SENSITIVE = frozenset({"contacts", "ledger"})
+"""Topics that are compared bit for bit or not at all."""
+
 
 @dataclass(frozen=True)
 class ReplayReport:
@@ -67,9 +70,9 @@ class _Messages:
 def replay(path: str | Path, progress: Callable[[float, float], None] | None = None) -> ReplayReport:
     """Replays a bag (recorded by this package or, the same topics, by stock rosbag2) and compares.
 
-    Bottles, Contacts, Belts, Signals and CommandOutcomes are compared bit for bit where the engine, versions and
-    machine are those of the recording; elsewhere within compare.TOLERANCE, Contacts left out. Stops at the first
-    difference. progress(done, total) is told simulated times, s.
+    Bottles, Contacts, Belts, Signals, Ledgers and CommandOutcomes are compared bit for bit where the engine, versions
+    and machine are those of the recording; elsewhere within compare.TOLERANCE, Contacts and Ledgers left out. Stops at
+    the first difference. progress(done, total) is told simulated times, s.
     Raises BagError, and SceneError if the recorded scene is refused.
     """
     with open_bag(path) as bag:
@@ -97,7 +100,7 @@ class _Replay:
         self._exact = not environment
         self._progress = progress
         recorded = bag.counts
-        topics = [topic for topic in COMPARERS if recorded.get(topic) and (self._exact or topic != "contacts")]
+        topics = [topic for topic in COMPARERS if recorded.get(topic) and (self._exact or topic not in SENSITIVE)]
         self._states = [_Messages(bag, topic) for topic in topics]
         self._outcomes = _Messages(bag, "outcomes") if recorded.get("outcomes") else None
         self._compared = dict.fromkeys(topics, 0)

@@ -13,7 +13,7 @@ from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.effects.geometry import ARC_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
 from conveyor_sim.effects.impacts import impact_bounds, impacts
-from conveyor_sim.effects.observers import CONTACT_ARRAYS, PEAKS
+from conveyor_sim.effects.observers import CONTACT_ARRAYS, ENERGY_LEDGER, PEAKS
 from conveyor_sim.effects.rotation import ROTATION
 from conveyor_sim.effects.supply import INFEED, OUTFEED
 from conveyor_sim.effects.terms import Terms, most_bottles, queue_force, queue_length
@@ -62,6 +62,7 @@ EFFECTS: tuple[Effect, ...] = (
     OUTFEED,
     PEAKS,
     CONTACT_ARRAYS,
+    ENERGY_LEDGER,
 )
 """In the order in which they are decided: what is on may call for those after it."""
 

@@ -200,6 +200,14 @@ class PairTangent(NamedTuple):
     """(pairs / UNIT + 1,), part of a maximum."""
 
 
+class PairParts(NamedTuple):
+    """What of the pair forces does not give its work back, (2 P + 1,) as `Pairs.fx` (`ledger.py`)."""
+
+    damping: Triple
+    """N, N, N m."""
+    friction: Triple
+
+
 class Pairs(NamedTuple):
     """Verlet list of bottle pairs, sorted by (i, j), i < j, (P,) by capacity. Explained in `pairs.py`."""
 
@@ -223,6 +231,7 @@ class Pairs(NamedTuple):
     """1 for a closed contact, likewise; for the implicit solver."""
     spring: PairSprings | None
     tangent: PairTangent | None
+    parts: PairParts | None
 
 
 class Gathered(NamedTuple):
@@ -418,6 +427,23 @@ class Ring(NamedTuple):
     """R_b, m."""
 
 
+class Ledger(NamedTuple):
+    """Where the work of forces goes (`ledger.py`); absent when nobody asks."""
+
+    damping: Triple
+    """(S,), N, N, N m, on each bottle in the last evaluation: of the damping in its contacts."""
+    friction: Triple
+    """(S,), likewise of the friction in its contacts, their tangential springs included."""
+    base: Triple
+    """(S,), likewise of what it stands on."""
+    belt_power: F8
+    """(units, H + 1), W, of each belt on a unit of bottles (`team.py`) in the last evaluation; the floor is last."""
+    power: F8
+    """(stages, units, BELTS + H + 1), W, of each account in each stage of a step."""
+    work: F8
+    """(units, BELTS + H + 1), J, the accounts, since the start."""
+
+
 class Neighbourhood(NamedTuple):
     """What a rebuild needs and leaves behind."""
 
@@ -513,6 +539,7 @@ class World(NamedTuple):
     surface: Surface | None
     footing: Footing | None
     ring: Ring | None
+    ledger: Ledger | None
 
 
 class Member(NamedTuple):

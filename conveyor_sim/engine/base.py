@@ -12,7 +12,7 @@ from numba import uint64
 from .arrays import Bottles, Load, Settings
 from .compile import part
 from .friction import implicit_regularisation, regularisation
-from .ring import ring_means, ring_share, straddling_ring
+from .ring import ring_means, ring_share, sum_over_ring
 from .team import units
 
 
@@ -27,11 +27,15 @@ def add_base_friction(
     footing: Any,
     ring: Any,
     implicit: Any,
+    powers: Any,
     dt: float,
     first: int,
     end: int,
 ) -> None:
-    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end."""
+    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end.
+
+    powers: (units, H + 1), W, to which what straddling rings take from each belt is added, or None.
+    """
     if footing is None:
         return
     if ring is None:
@@ -40,7 +44,7 @@ def add_base_friction(
         _ring_friction(
             settings, settings.atan, bottles, spin, load, footing, footing.turn, ring, implicit, dt, first, end
         )
-        _straddling(settings, bottles, spin, load, belts, surface, ring, first, end)
+        _straddling(settings, bottles, spin, load, belts, surface, ring, powers, first, end)
 
 
 @part
@@ -132,6 +136,7 @@ def _straddling(
     belts: Any,
     surface: Any,
     ring: Any,
+    powers: Any,
     first: int,
     end: int,
 ) -> None:
@@ -142,7 +147,7 @@ def _straddling(
         i = belts.uncertain.bottle[entry]
         if ring.radius[i] == 0.0:
             continue
-        fx, fy, moment = straddling_ring(
+        fx, fy, moment = sum_over_ring(
             i,
             belts,
             surface,
@@ -156,6 +161,7 @@ def _straddling(
             bottles.weight[i],
             bottles.type[i],
             settings.slip_limit,
+            powers,
         )
         load.fx[i] += fx
         load.fy[i] += fy

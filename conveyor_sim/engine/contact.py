@@ -12,7 +12,7 @@ from typing import Any
 
 from .arrays import ContactLaw
 from .compile import kernel, part
-from .curve import curve_force
+from .curve import curve_energy, curve_force
 from .friction import friction_share, implicit_share
 
 
@@ -140,6 +140,33 @@ def _add_damping(force: float, damping: Any, e: int, slip: float) -> float:
     if damping is None:
         return force
     return force + damping[e] * slip
+
+
+@part
+def elastic_energy(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
+    """What those laws have stored, J: k delta^2 / 2 + 2/5 k_h delta^2.5 + the area under the table."""
+    energy = 0.0
+    if stiffness is not None:
+        energy += 0.5 * stiffness[e] * depth * depth
+    if hertz is not None:
+        energy += 0.4 * hertz[e] * (depth * depth * math.sqrt(depth))
+    if curve is not None:
+        energy += curve_energy(curves, curve[e], depth)
+    return energy
+
+
+@part
+def drag_force(law: ContactLaw, e: int, overlap: float, velocity: float) -> float:
+    """What paper damping alone adds to a force along a velocity (m/s), N."""
+    return _dragged(0.0, law.damping_paper, e, overlap, velocity)
+
+
+@part
+def spring_energy(law: ContactLaw, e: int, spring: Any) -> float:
+    """What a tangential spring of some elongation (m), or None, has stored, J."""
+    if spring is None:
+        return 0.0
+    return 0.5 * law.tangential_stiffness[e] * spring * spring  # type: ignore[index]
 
 
 @part

@@ -21,3 +21,21 @@ def curve_force(curves: Curves, c: int, overlap: float) -> float:
             high = middle
     slope = (curves.force[high] - curves.force[low]) / (curves.overlap[high] - curves.overlap[low])
     return curves.force[low] + slope * (overlap - curves.overlap[low])
+
+
+@kernel
+def curve_energy(curves: Curves, c: int, overlap: float) -> float:
+    """Area (J) under curve c up to an overlap (m); 0 for c = -1 and without contact."""
+    if c < 0 or overlap <= 0.0:
+        return 0.0
+    energy = 0.0
+    for point in range(curves.start[c], curves.start[c + 1] - 1):
+        width = curves.overlap[point + 1] - curves.overlap[point]
+        slope = (curves.force[point + 1] - curves.force[point]) / width
+        last = point == curves.start[c + 1] - 2
+        into = overlap - curves.overlap[point]
+        if into > width and not last:
+            into = width
+        if into > 0.0:
+            energy += (curves.force[point] + 0.5 * slope * into) * into
+    return energy

@@ -10,6 +10,7 @@ from .arrays import Member, World
 from .base import add_base_friction
 from .compile import kernel, part
 from .footing import check_footing
+from .ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_parts
 from .pairs import find_touching, pack, pair_forces
 from .rails import add_rail_forces, count_rail_contacts
 from .slots import sum_pair_forces, sum_slots
@@ -44,6 +45,7 @@ def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> Non
     """
     _count_closed(world, world.implicit, member, dt)
     pair_forces(world.settings, world.bottles, world.spin, world.pairs, world.curves, world.implicit, member, spring_dt)
+    find_pair_parts(world.settings, world.bottles, world.spin, world.pairs, world.ledger, world.curves, member)
     wait_for_all(member)
 
 
@@ -51,6 +53,7 @@ def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> Non
 def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, first: int, end: int) -> None:
     """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22)."""
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
+    sum_pair_parts(world.pairs, world.slots, world.ledger, first, end)
     add_rail_forces(
         world.settings,
         world.bottles,
@@ -64,11 +67,13 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, fir
         world.rail_law,
         world.curves,
         world.implicit,
+        world.ledger,
         member.found,
         first,
         end,
         spring_dt,
     )
+    keep_load(world.load, world.spin, world.ledger, first, end)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     add_base_friction(
         world.settings,
@@ -80,10 +85,21 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, fir
         world.footing,
         world.ring,
         world.implicit,
+        _belt_power(world.ledger),
         dt,
         first,
         end,
     )
+    find_base_parts(
+        world.bottles, world.spin, world.load, world.belts, world.footing, world.ring, world.ledger, first, end
+    )
+
+
+@part
+def _belt_power(ledger: Any) -> Any:
+    if ledger is None:
+        return None
+    return ledger.belt_power
 
 
 @part

@@ -6,6 +6,7 @@ from .arc import arc_contact
 from .arrays import Bottles, ContactLaw, Load, RailContacts, Settings
 from .compile import kernel, part
 from .contact import contact_force, spring_after, stretched
+from .ledger_parts import add_rail_parts
 from .segment import segment_contact
 from .shares import share_overlaps
 from .team import MOST_CONTACTS, units
@@ -170,6 +171,7 @@ def add_rail_forces(
     law: Any,
     curves: Any,
     implicit: Any,
+    ledger: Any,
     found: RailContacts,
     first: int,
     end: int,
@@ -196,6 +198,7 @@ def add_rail_forces(
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
                 _note_normal(load.normal_sum, load.normal_max, i, normal)
+                _note_parts(ledger, settings, bottles, found, c, i, law, curves, normal, tangential, slip)
                 if spin is not None:
                     spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
                 entry = law_entry(settings, bottles, found, c, i)
@@ -218,6 +221,38 @@ def _note_normal(sums: Any, largest: Any, i: int, normal: float) -> None:
     if sums is not None:
         sums[i] += normal
         largest[i] = normal if normal > largest[i] else largest[i]
+
+
+@part
+def _note_parts(
+    ledger: Any,
+    settings: Settings,
+    bottles: Bottles,
+    found: RailContacts,
+    c: int,
+    i: int,
+    law: ContactLaw,
+    curves: Any,
+    normal: float,
+    tangential: float,
+    slip: float,
+) -> None:
+    if ledger is not None:
+        add_rail_parts(
+            ledger,
+            law,
+            curves,
+            law_entry(settings, bottles, found, c, i),
+            i,
+            found.nx[c],
+            found.ny[c],
+            found.overlap[c],
+            found.share[c],
+            rail_arm(found.overlap[c], bottles.radius[i], settings.lever),
+            normal,
+            tangential,
+            slip,
+        )
 
 
 @part

@@ -12,6 +12,7 @@ import numpy as np
 
 from .belts import carrier, surface_velocity
 from .compile import kernel, part
+from .team import UNIT
 
 POINTS = 32
 """Of a ring that may stand on several belts."""
@@ -93,6 +94,27 @@ def straddling_ring(
     i: the bottle, whose candidate belts are listed; kind: its type. x, y: m, vx, vy: m/s, omega: rad/s, of its axis.
     radius: R_b, m. weight: m g, N.
     """
+    return sum_over_ring(i, belts, surface, floor, x, y, vx, vy, omega, radius, weight, kind, slip_limit, None)
+
+
+@part
+def sum_over_ring(
+    i: int,
+    belts: Any,
+    surface: Any,
+    floor: int,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    omega: float,
+    radius: float,
+    weight: float,
+    kind: int,
+    slip_limit: float,
+    powers: Any,
+) -> tuple[float, float, float]:
+    """As `straddling_ring`; adds the power (W) of each belt to powers, (units, H + 1), if it is not None."""
     squared = 0.25 * slip_limit * slip_limit
     fx = fy = moment = 0.0
     last_x, last_y = x + radius * _COS[POINTS - 1], y + radius * _SIN[POINTS - 1]
@@ -112,9 +134,16 @@ def straddling_ring(
         fx -= pull * slip_x
         fy -= pull * slip_y
         moment -= pull * (arm_x * slip_y - arm_y * slip_x)
+        _add_power(powers, i // UNIT, here, -weight / POINTS * pull * (slip_x * ux + slip_y * uy))
         here_x, here_y, here, before = next_x, next_y, there, after
     share = weight / POINTS
     return share * fx, share * fy, share * moment
+
+
+@part
+def _add_power(powers: Any, unit: int, h: int, power: float) -> None:
+    if powers is not None:
+        powers[unit, h] += power
 
 
 @part

@@ -10,7 +10,7 @@ from conveyor_sim.state import State
 
 
 class Memory:
-    """One state of the bottles of a State, with peaks and tangential springs."""
+    """One state of the bottles of a State, with peaks, tangential springs and the books of the energy ledger."""
 
     def __init__(self) -> None:
         self._world: World | None = None
@@ -47,3 +47,5 @@ def _moving(world: World) -> Iterator[NDArray[np.generic]]:
     for near in (world.near_segments, world.near_arcs):
         if near is not None and near.springs is not None:
             yield from (near.start, near.piece, near.springs.elongation, near.springs.kept_count)
+    if world.ledger is not None:
+        yield world.ledger.work

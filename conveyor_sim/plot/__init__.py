@@ -10,6 +10,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.plot import style
 from conveyor_sim.plot.accuracy import accuracy_figures
 from conveyor_sim.plot.data import Frame, Plant
+from conveyor_sim.plot.energy import energy_figure
 from conveyor_sim.plot.flow import flow_figure, force_figure
 from conveyor_sim.plot.recording import Recording
 from conveyor_sim.plot.series import velocity_figure
@@ -42,7 +43,7 @@ def plot_bag(
 
     `table` shows the widest belt at `times` (s; nearest recorded, default a quarter, half, three quarters and the end),
     `plant` everything at the last of them, `velocity_bottle_ID` the `bottles` (ids; default the 1st and the 50th fed),
-    `flow` and `force` the whole run.
+    `flow` and `force` the whole run, and `energy` too if its ledger was recorded.
     Raises BagError if the bag can't be read, ConveyorError for a time or bottle that it does not hold.
     """
     out = Path(out_dir)
@@ -60,6 +61,9 @@ def plot_bag(
             "flow": flow_figure(recording.flow, recording.belts),
             "force": force_figure(recording.peak_force),
         }
+        energy = recording.energy
+        if energy is not None:
+            figures["energy"] = energy_figure(energy, recording.belts)
         return [path for stem, figure in figures.items() for path in style.save(figure, out / stem)]
 
 

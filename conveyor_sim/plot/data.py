@@ -191,6 +191,24 @@ class PeakForce:
     bottle: NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class Energy:
+    """The energy ledger over time (s), J, each (n,): as in conveyor_msgs/Ledger; `belts` (n, belts) is their work."""
+
+    time: Floats
+    kinetic: Floats
+    elastic: Floats
+    springs: Floats
+    fed: Floats
+    removed: Floats
+    belts: Floats
+    base_friction: Floats
+    contact_friction: Floats
+    damping: Floats
+    residual: Floats
+    turnover: Floats
+
+
 def box_around(points: Floats) -> tuple[float, float, float, float]:
     """Smallest box (x0, y0, x1, y1) around points (k, 2)."""
     low, high = points.min(axis=0), points.max(axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Final
 
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
-from conveyor_sim.plot.data import Contacts, Floats, Flow, Frame, PeakForce, Plant, Velocity
+from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.plot.data import Contacts, Energy, Floats, Flow, Frame, PeakForce, Plant, Velocity
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.geometry import initial_bottles
 
@@ -58,6 +59,20 @@ class Recording:
     def peak_force(self) -> PeakForce:
         """Peak contact force over the bottles, at every recorded Bottles."""
         return self._summary.peak_force
+
+    @property
+    def energy(self) -> Energy | None:
+        """The energy ledger, at every recorded one; None if there is none."""
+        frames = list(self._bag.ledger())
+        if not frames:
+            return None
+        values = {
+            field.name: np.array([getattr(frame.data, field.name) for frame in frames], dtype=np.float64)
+            for field in fields(Ledger)
+        }
+        # The last entry is the floor's.
+        belts = values.pop("belt_work")[:, :-1]
+        return Energy(time=np.array([frame.time for frame in frames], dtype=np.float64), belts=belts, **values)
 
     def frames(self, times: Sequence[float] | None) -> list[Frame]:
         """The line at the recorded instants nearest to `times` (s), in ascending order, each once.

@@ -30,6 +30,7 @@ EffectName = Literal[
     "outfeed",
     "peaks",
     "contact_arrays",
+    "energy_ledger",
 ]
 
 EFFECT_NAMES: tuple[EffectName, ...] = get_args(EffectName)

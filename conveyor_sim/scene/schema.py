@@ -13,7 +13,7 @@ from pydantic import Discriminator, PrivateAttr, Tag
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
-from conveyor_sim.scene.effect_names import Forced
+from conveyor_sim.scene.effect_names import EffectName, Forced
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.rails import Rail
 from conveyor_sim.scene.types import (
@@ -136,6 +136,11 @@ class Outputs(Part):
     contacts: NotNegative = quantity("Every contact with its forces.", "Hz", default=50.0)
     belts: NotNegative = quantity("Speeds of the belts.", "Hz", default=50.0)
     signals: NotNegative = quantity("The process image.", "Hz", default=100.0)
+    ledger: NotNegative = quantity(
+        "The energy ledger: work of each belt, what is dissipated and stored, and what does not close.",
+        "Hz",
+        default=0.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -255,7 +260,8 @@ class Scene(Part):
 
     def _silenced(self, topic: str) -> bool:
         """Whether the effect behind an output is forced off."""
-        return topic == "contacts" and self.effects.get("contact_arrays") == "off"
+        behind: dict[str, EffectName] = {"contacts": "contact_arrays", "ledger": "energy_ledger"}
+        return topic in behind and self.effects.get(behind[topic]) == "off"
 
     @property
     def source_text(self) -> str:

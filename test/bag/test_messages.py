@@ -13,9 +13,19 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns
+from conveyor_sim.observe.ledger import balance
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
+LEDGER = balance(
+    stored=np.array([3.0, 0.5, 0.25]),
+    fed=1.0,
+    removed=0.125,
+    belt_work=np.array([5.0, -1.0, 0.0]),
+    base_friction=0.5,
+    contact_friction=0.25,
+    damping=0.125,
+)
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(5), HEADER)),
     "no bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(0), HEADER)),
@@ -23,6 +33,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "no contacts": (messages.CONTACTS, lambda: messages.contacts_message(contacts(0), HEADER)),
     "belts": (messages.BELTS, lambda: messages.belts_message(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
     "signals": (messages.SIGNALS, lambda: messages.signals_message(np.array([1.0, math.nan]), HEADER)),
+    "ledger": (messages.LEDGER, lambda: messages.ledger_message(LEDGER, HEADER)),
     "poses": (messages.POSES, lambda: messages.poses_message(bottles(7), HEADER)),
     "no poses": (messages.POSES, lambda: messages.poses_message(bottles(0), HEADER)),
     "outcome": (
@@ -59,6 +70,14 @@ def test_header_tells_simulated_time_tick_and_frame() -> None:
     message = decode("contacts")
     stamp = message.header.stamp
     assert (stamp.sec, stamp.nanosec, message.tick, message.header.frame_id) == (12, 340_000_007, 1234, "hall")
+
+
+def test_a_ledger_tells_what_does_not_close() -> None:
+    """1 + 4 J came and 1 J went, 3.75 J are held: 0.25 J are lost, of 8 J."""
+    message = decode("ledger")
+    assert (message.kinetic, message.elastic, message.springs) == (3.0, 0.5, 0.25)
+    assert message.belt_work.tolist() == [5.0, -1.0, 0.0]
+    assert (message.residual, message.turnover) == (-0.25, 8.0)
 
 
 def test_pose_is_position_and_turn_about_the_vertical() -> None:

@@ -60,6 +60,8 @@ def test_rates_are_those_of_the_scene(scene: Scene) -> None:
         "contacts": every_other_tick,
         "belts": every_other_tick,
         "signals": 41,
+        "ledger": 0,
+        "guard": 0,
     }
 
 
@@ -67,7 +69,7 @@ def test_an_output_that_is_switched_off_is_not_written() -> None:
     scene = load_scene(SMALL_LINE, {"outputs": {"poses": 0, "contacts": 0}})
     sink = Collector(set(OUTPUTS))
     run(scene, [sink], 10)
-    assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - {"poses", "markers", "contacts"}
+    assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - {"poses", "markers", "contacts", "ledger", "guard"}
 
 
 def test_stamps_are_simulated_time_above_zero_and_never_go_back(scene: Scene) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from bag.editing import edited
 from bag.small_line import SMALL_LINE, record
@@ -25,6 +26,21 @@ def test_recording_replays_bit_for_bit(bag: Path) -> None:
     assert (report.first_tick, report.last_tick) == (0, 100)
     assert report.compared == {"bottles": 51, "contacts": 51, "belts": 51, "signals": 101, "outcomes": 5}
     assert told[-1] == pytest.approx(1.0)
+
+
+def test_a_recorded_ledger_is_compared_too(tmp_path: Path) -> None:
+    record(load_scene(SMALL_LINE, {"outputs": {"ledger": 20}}), tmp_path / "kept", 100)
+    report = replay(tmp_path / "kept")
+    assert report.difference is None
+    assert report.compared["ledger"] == 21
+
+    def change(name: str, message: Any) -> None:
+        if name == "ledger" and message.tick == 50:
+            message.damping = np.nextafter(message.damping, 1.0)
+
+    difference = replay(edited(tmp_path / "kept", tmp_path / "changed", change)).difference
+    assert difference is not None
+    assert (difference.tick, difference.topic, difference.field) == (50, "ledger", "damping")
 
 
 @pytest.mark.parametrize(

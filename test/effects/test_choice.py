@@ -146,8 +146,12 @@ def choices(**fields: Any) -> dict[str, str]:
             {"outfeed": "outfeeds.out"},
         ),
         (
-            {"outputs": {"bottles": 50, "contacts": 10}, "bottles": TWO[:1]},
-            {"peaks": "outputs.bottles: 50 Hz", "contact_arrays": "outputs.contacts: 10 Hz"},
+            {"outputs": {"bottles": 50, "contacts": 10, "ledger": 5}, "bottles": TWO[:1]},
+            {
+                "peaks": "outputs.bottles: 50 Hz",
+                "contact_arrays": "outputs.contacts: 10 Hz",
+                "energy_ledger": "outputs.ledger: 5 Hz",
+            },
         ),
     ],
 )  # fmt: skip
@@ -163,7 +167,7 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
     off = [choice.name for choice in choose_effects(scene(**line())) if not choice.on]
     assert off == [
         "hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction", "tangential_spring",
-        "ring_base", "peaks", "contact_arrays",
+        "ring_base", "peaks", "contact_arrays", "energy_ledger",
     ]  # fmt: skip
 
 

@@ -22,7 +22,7 @@ BELT_SPEED = 40.0
 """m/s, so fast that what the bottle does hardly turns the pull."""
 
 
-def leaning(against: str, share: float, **tangential: Any) -> Simulation:
+def leaning(against: str, share: float, effects: Any = None, **tangential: Any) -> Simulation:
     """Bottle 0 with tan phi = share * mu; bottle 1, far off, goes with the belt and has the lists made anew."""
     phi = math.atan(share * MU)
     normal = -0.5 * math.pi if against == "rail" else -0.75 * math.pi
@@ -47,7 +47,7 @@ def leaning(against: str, share: float, **tangential: Any) -> Simulation:
         accuracy={"per_tick": 200},
         gravity=G,
         slip_limit=SLIP_LIMIT,
-        effects={"rotation": "off"},
+        effects={"rotation": "off", **(effects or {})},
         contacts=contacts,
         base=base(MU_BASE),
         belts={"belt": belt(BELT_SPEED, corner, 200.0, 200.0, angle=normal + phi, speed_limits=[-50, 50])},

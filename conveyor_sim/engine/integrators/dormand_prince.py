@@ -29,6 +29,7 @@ from numba import uint64
 from ..arrays import Bottles, Member, World
 from ..compile import kernel, part
 from ..forces import bottle_forces, pack_all, pair_phase
+from ..ledger import book_stages, note_powers
 from ..motion import lists_hold, note_moved, watch_rebuilt
 from ..pairs import pack
 from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
@@ -89,6 +90,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             bottle_forces(world, member, h, 0.0, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
+            note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             if stage == 0:
                 keep_state(bottles, world.spin, slopes, first, end)
                 note_peaks(world.load, world.peaks, first, end)
@@ -184,6 +186,8 @@ def _accept(world: World, slopes: Any, h: float, first: int, end: int) -> None:
     """End a substep at the state reached, and begin the next one there, with the forces found there."""
     turn(world.spin, slopes, WAYS, h, first, end)
     add_impulses(world.peaks, slopes, WEIGHTS, h, first, end)
+    book_stages(world.ledger, WEIGHTS, h, first, end)
+    note_powers(world.bottles, world.spin, world.load, world.ledger, 0.0, 0, first, end)
     note_peaks(world.load, world.peaks, first, end)
     keep_state(world.bottles, world.spin, slopes, first, end)
     keep_slopes(world.bottles, world.load, world.spin, slopes.normal, slopes, 0, first, end)

@@ -21,6 +21,8 @@ from ..base import add_base_friction
 from ..compile import kernel, part
 from ..conjugate_gradients import LEAST, RELATIVE, begin_search, factor, kick_with_rest, largest_kick, search
 from ..footing import check_footing
+from ..forces import bottle_forces, pack_all, pair_phase
+from ..ledger import book, note_powers
 from ..motion import accumulate_peaks, lists_hold, settle, watch_rebuilt
 from ..rebuild import moved_too_far
 from ..slots import sum_pair_forces
@@ -79,6 +81,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 bottles, 0.25 * world.settings.skin / dt, first, end
             ):
                 raise_flag(member, MOVED)
+        _book_solution(world, linear, world.ledger, member, dt, lean)
         if not lists_hold(world, member):
             return step + 1
         watch_rebuilt(world, member)
@@ -201,6 +204,7 @@ def _assemble(world: World, member: Member, dt: float, lean: float, first: int, 
         world.footing,
         world.ring,
         None,
+        None,
         dt,
         first,
         end,
@@ -273,3 +277,47 @@ def _turn(spin: Any, linear: Linear, dt: float, lean: float, first: int, end: in
     for i in range(uint64(first), uint64(end)):
         spin.theta[i] += dt * (spin.omega[i] + lean * linear.change.turn[i])
         spin.omega[i] = settle(spin.omega[i] + linear.change.turn[i])
+
+
+@part
+def _book_solution(world: World, linear: Linear, ledger: Any, member: Member, dt: float, lean: float) -> None:
+    """Book a step by what the laws exert where it took the forces: what linear ones differ by is its error."""
+    if ledger is None:
+        return
+    bottles: Bottles = world.bottles
+    begin, stop = share(member, bottles.x.size)
+    change, way, product = linear.change, linear.way, linear.product
+    for first in range(begin, stop, BLOCK):
+        end = min(first + BLOCK, stop)
+        # The new state is kept in what the search has left behind.
+        for i in range(uint64(first), uint64(end)):
+            way.x[i], way.y[i], product.x[i], product.y[i] = bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i]
+            bottles.vx[i] -= change.x[i]
+            bottles.vy[i] -= change.y[i]
+        _look_ahead(world, lean * dt, lean, first, end)
+        _set_velocities(bottles, world.spin, linear, 1.0 - lean, True, first, end)
+    pack_all(world, member)
+    pair_phase(world, member, dt, 0.0)
+    for first in range(begin, stop, BLOCK):
+        end = min(first + BLOCK, stop)
+        bottle_forces(world, member, dt, 0.0, first, end)
+        _set_velocities(bottles, world.spin, linear, 0.5, False, first, end)
+        note_powers(bottles, world.spin, world.load, ledger, 0.0, 0, first, end)
+        book(ledger, 0, dt, first, end)
+        _set_velocities(bottles, world.spin, linear, 0.0, False, first, end)
+        for i in range(uint64(first), uint64(end)):
+            bottles.x[i], bottles.y[i] = way.x[i], way.y[i]
+
+
+@part
+def _set_velocities(bottles: Bottles, spin: Any, linear: Linear, back: float, keep: bool, first: int, end: int) -> None:
+    """Set velocities to those kept after the step less a share of its change; keep: note those of spin first."""
+    change, kept = linear.change, linear.product
+    for i in range(uint64(first), uint64(end)):
+        bottles.vx[i] = kept.x[i] - back * change.x[i]
+        bottles.vy[i] = kept.y[i] - back * change.y[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            if keep:
+                kept.turn[i] = spin.omega[i]
+            spin.omega[i] = kept.turn[i] - back * change.turn[i]

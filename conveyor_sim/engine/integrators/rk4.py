@@ -18,6 +18,7 @@ import numpy as np
 from ..arrays import Member, World
 from ..compile import kernel
 from ..forces import bottle_forces, pack_all, pair_phase
+from ..ledger import book_stages, note_powers
 from ..motion import lists_hold, note_moved, watch_rebuilt
 from ..pairs import pack
 from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
@@ -57,12 +58,14 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 if taken == steps:
                     continue
                 keep_state(bottles, world.spin, slopes, first, end)
+            note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             go_to(bottles, world.spin, slopes, TIMES, WEIGHTS, WAYS, stage + 1, dt, first, end)
             if stage + 1 == STAGES:
                 come_to_rest(bottles, world.spin, first, end)
                 turn(world.spin, slopes, WAYS, dt, first, end)
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
+                book_stages(world.ledger, WEIGHTS, dt, first, end)
             pack(bottles, first, end)
             note_moved(world, member, first, end)
         if taken == steps:

@@ -13,6 +13,7 @@ from numba import uint64
 from ..arrays import Bottles, Load, Member, World
 from ..compile import kernel, part
 from ..forces import bottle_forces, pack_all, pair_phase
+from ..ledger import book_kick
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
 from ..pairs import pack_row
 from ..team import BLOCK, share
@@ -29,6 +30,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             bottle_forces(world, member, dt, dt, first, end)
+            book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
             _move(bottles, world.load, dt, first, end)
             _turn(world.spin, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)

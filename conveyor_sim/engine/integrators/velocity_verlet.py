@@ -10,6 +10,7 @@ touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without,
 from ..arrays import Member, World
 from ..compile import kernel
 from ..forces import bottle_forces, evaluate_forces, pack_all, pair_phase
+from ..ledger import book_kick
 from ..motion import (
     accumulate_peaks,
     drift,
@@ -36,6 +37,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
         if phase != RESUME or step > 0:
             for first in range(begin, stop, BLOCK):
                 end = min(first + BLOCK, stop)
+                book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)
                 kick(bottles, world.spin, world.load, half, first, end)
                 drift(bottles, world.spin, dt, first, end)
                 note_moved(world, member, first, end)
@@ -52,6 +54,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             bottle_forces(world, member, dt, dt, first, end)
             recall_velocities(world.stage, bottles, world.spin, first, end)
+            book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)
             kick(bottles, world.spin, world.load, half, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
     return steps

@@ -1,0 +1,78 @@
+"""What contacts hold: closed forms of the laws, and, at rails that push together, the potential of their force."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import NO_FLOOR, RADIUS, bottle, contact, kind, polyline, scene
+from worlds import ALONE, FAR, rail_forces, rail_scene, state_of
+
+from conveyor_sim.engine.stored_energy import ELASTIC, KINETIC, SPRINGS, find_stored_energy
+from conveyor_sim.state import State
+
+DEEP = 0.004
+"""m"""
+
+
+def stored(state: State) -> np.ndarray:
+    energy = np.full(3, math.nan)
+    find_stored_energy(state.world, ALONE.found, energy)
+    return energy
+
+
+def test_contacts_hold_what_their_laws_take_up() -> None:
+    """k d^2 / 2 (glass on pet), 2/5 k_h d^2.5 (glass), and the area under a table, beyond its end too (pet)."""
+    table = [[0.001, 2.0], [0.003, 10.0]]
+    laws = scene(
+        bottle_types={"bottle": kind(), "other": kind(material="pet")},
+        contacts=[
+            contact(None, hertz_stiffness=1e6),
+            contact(3000.0, "pet"),
+            {"between": ["pet", "pet"], "table": table},
+        ],
+        bottles=[bottle(FAR, FAR), bottle(FAR + 1.0, FAR)],
+        **NO_FLOOR,
+    )
+    near = 2.0 * RADIUS - DEEP
+    points = [(x, y) for y in (0.0, 1.0, 2.0) for x in (0.0, near)]
+    area = 0.5 * 0.001 * 2.0 + 0.002 * 6.0 + 0.001 * 12.0
+    expected = {(0, 0): 0.4 * 1e6 * DEEP**2.5, (0, 1): 0.5 * 3000.0 * DEEP**2, (1, 1): area}
+    for kinds, energy in expected.items():
+        state = state_of(laws, points[:2], kinds=np.array(kinds))
+        assert stored(state)[ELASTIC] == pytest.approx(energy, rel=1e-9)
+    everything = stored(state_of(laws, points, kinds=np.array([0, 0, 0, 1, 1, 1]), velocities=np.full((6, 2), 0.5)))
+    assert everything == pytest.approx([6 * 0.5 * 0.2 * 0.5, sum(expected.values()), 0.0], rel=1e-9)
+    assert (KINETIC, ELASTIC, SPRINGS) == (0, 1, 2)
+
+
+@pytest.mark.parametrize(
+    "course",
+    [
+        [(-1.0, 0.2), (0.0, 0.0), (1.0, 0.2)],
+        [(-1.0, 1.0), (0.0, 0.0), (1.0, 1.0)],
+        [(-1.0, 0.3), (-0.02, 0.0), (0.02, 0.0), (1.0, 0.3)],
+        [(-1.0, -0.5), (0.0, 0.0), (1.0, -0.5)],
+    ],
+    ids=["shallow pocket", "right angle", "three pieces", "convex"],
+)
+def test_pieces_of_a_rail_that_push_together_give_back_what_they_took(course: Any) -> None:
+    """Their force is minus the slope of the energy, wherever a bottle is in the corner."""
+    rails = {"corner": polyline(course)}
+    points = [(x, RADIUS - y) for x in (-0.013, 0.0, 0.004, 0.011) for y in (0.0005, 0.003)]
+    step = 1e-6
+
+    def energy(x: float, y: float) -> float:
+        return float(stored(state_of(rail_scene(rails), [(x, y)]))[ELASTIC])
+
+    slopes = [
+        (
+            (energy(x + step, y) - energy(x - step, y)) / (2.0 * step),
+            (energy(x, y + step) - energy(x, y - step)) / (2.0 * step),
+        )
+        for x, y in points
+    ]
+    forces = rail_forces(rails, points)
+    assert np.abs(forces).max() > 0.5
+    # Where a piece begins to share, the slope bends within a step.
+    np.testing.assert_allclose(-np.array(slopes), forces, atol=2e-3 * np.abs(forces).max())
