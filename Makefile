@@ -2,6 +2,7 @@
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
 # make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about half an hour (ARGS=funnel for one)
+# make fuzz    sets up the same, then plays random scenes and commands (ARGS="--minutes 60"; a failure is kept as a scene)
 # make lint    style and types
 # make clean   removes what set-up and builds made, never runs/
 
@@ -20,7 +21,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test bench accuracy lint clean set-up set-up-test set-up-bench
+.PHONY: help run test bench accuracy fuzz lint clean set-up set-up-test set-up-bench
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -36,6 +37,10 @@ bench: set-up-bench
 
 accuracy: set-up
 	@$(PYTHON) docs/studies/accuracy.py $(ARGS)
+
+# Beside the tests, whose scenes and checks it uses.
+fuzz: set-up-test
+	@PYTHONPATH=.:test $(PYTHON) -m fuzz $(ARGS)
 
 lint: set-up-test
 	@$(PYTHON) -m ruff check .

@@ -10,13 +10,16 @@ import numpy as np
 from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of, prediction_of
 from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.errors import SceneError
 from conveyor_sim.laws import build_laws
 from conveyor_sim.line.process_image import ProcessImage, process_image
 from conveyor_sim.plant import plant_grid, rail_arrays
 from conveyor_sim.prediction import Impact, Prediction
 from conveyor_sim.presets import target
+from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
+from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, fewest_steps, steps_per_tick
 from conveyor_sim.version import __version__, sources_hash
@@ -85,7 +88,7 @@ class Model:
 
 
 def build_model(scene: Scene) -> Model:
-    """Build the Model of a valid scene."""
+    """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
     effects = choose_effects(scene)
     on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
     rails, belts = rail_shapes(scene), belt_shapes(scene)
@@ -101,6 +104,9 @@ def build_model(scene: Scene) -> Model:
     bounds = bounds_of(terms, impacts)
     given = _given_steps(scene)
     steps, reason = steps_per_tick(scene.tick, bounds, given, aim.words)
+    if steps > MOST_STEPS:
+        place = Places(scene).of(("accuracy",))
+        raise SceneError(f"{place}: accuracy: {reason}; expected at most {MOST_STEPS} steps a tick")
     dt = scene.tick_ns * 1e-9 / steps
     return Model(
         name=scene.name,

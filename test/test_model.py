@@ -8,6 +8,7 @@ import pytest
 from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, line, polyline, scene, segment
 
 from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.errors import SceneError
 from conveyor_sim.laws import base_friction
 from conveyor_sim.model import build_model
 from conveyor_sim.simulation import Simulation
@@ -96,6 +97,14 @@ def test_given_steps_are_told() -> None:
     assert "given in the scene" in model.dt_reason
     assert "beyond the bound of stability by contact friction" in model.dt_reason
     assert model.accuracy == "given, 3 steps a tick"
+
+
+def test_more_steps_than_ever_end_are_refused() -> None:
+    stiff = scene(contacts=[contact(1e19)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)])
+    with pytest.raises(
+        SceneError, match=r"^<text>:1: accuracy: \d+ steps a tick.*; expected at most 10000000 steps a tick$"
+    ):
+        build_model(stiff)
 
 
 def test_a_longest_step_is_kept_with_the_fewest_steps() -> None:

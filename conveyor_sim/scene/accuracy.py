@@ -13,6 +13,9 @@ Preset = Literal["draft", "standard", "fine"]
 IntegratorName = Literal["semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit"]
 INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
 
+MOST_STEPS = 10_000_000
+"""In a tick: more would take hours."""
+
 CHOICES = ("preset", "tolerance", "dt", "per_tick")
 """The fields that each choose the time step; one of them at most."""
 
@@ -34,7 +37,7 @@ class Accuracy(Part):
     dt: Positive | None = quantity(
         "Longest time step: a tick is divided into the fewest equal steps that keep it.", "s", default=None
     )
-    per_tick: Annotated[Count, Le(10_000_000)] | None = quantity("The same as a number of steps.", "1", default=None)
+    per_tick: Annotated[Count, Le(MOST_STEPS)] | None = quantity("The same as a number of steps.", "1", default=None)
     error: Positive | None = quantity(
         "Largest error of a step, dormand_prince only, which divides the steps of dt itself. Left out: 1e-6.",
         "m/s",

@@ -1,11 +1,11 @@
 """Contacts that can't be: laws that exclude each other, restitution that has no closed form, tables that fall."""
 
-import math
 from collections.abc import Iterator
 
 from conveyor_sim.scene.contacts import ELASTIC, Contact
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.types import MOST
 from conveyor_sim.scene.words import listed, shown
 
 _RESTITUTION = {
@@ -86,7 +86,7 @@ def _table(path: Path, points: tuple[tuple[float, float], ...]) -> Iterator[Prob
     for index, point in enumerate(points):
         if point == before and index == 0:
             continue
-        if not all(math.isfinite(value) for value in point) or point[0] <= before[0] or point[1] < before[1]:
+        if not all(abs(value) <= MOST for value in point) or point[0] <= before[0] or point[1] < before[1]:
             yield Problem(
                 path,
                 f"point {index + 1}, {shown(point)}, follows {shown(before)}: "

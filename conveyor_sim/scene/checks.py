@@ -39,6 +39,9 @@ def _times(scene: Scene) -> Iterator[Problem]:
     tick = f"{scene.tick:g} s"
     if not is_whole_nanoseconds(scene.duration) or nanoseconds(scene.duration) % scene.tick_ns:
         yield Problem(("duration",), f"{shown(scene.duration)} given, expected a whole number of ticks of {tick} (s)")
+    elif scene.duration >= 2**31:
+        text = f"{shown(scene.duration)} given, expected less than 2^31 (s): a time stamp of ROS holds no more"
+        yield Problem(("duration",), text)
     tick_rate = 1e9 / scene.tick_ns
     for topic in scene.TOPICS:
         rate = getattr(scene.outputs, topic)

@@ -21,7 +21,8 @@ problem is one line that names the file, the line, the field, the value and what
   angles run counter-clockwise from the x-axis.
 - Names begin with a letter and take letters, digits and underscores: they become parts of ROS topics.
 - The order of belts, rails and bottle types in the file is the order of their indices in messages.
-- Numbers must be finite. Unknown fields and keys given twice are refused. YAML anchors and `<<` can be used.
+- Numbers must be finite; what is not 0 has a size from 1e-20 to 1e20.
+- Unknown fields and keys given twice are refused. YAML anchors and `<<` can be used.
 - Each pair of materials that can touch needs one entry in `contacts` (bottle and bottle, bottle and rail), each pair of
   bottle and belt one in `base`.
 - Where a rail ends on another (within 1e-6 m), both are one surface. Rails of curved belts follow those under

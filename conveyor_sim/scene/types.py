@@ -6,11 +6,21 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le, Len
-from pydantic import AllowInfNan, BeforeValidator, Field, GetCoreSchemaHandler, Strict, StringConstraints
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    Strict,
+    StringConstraints,
+)
 from pydantic import ValidationError as _PydanticError
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 COORDINATE_LIMIT = 1e5  # m; farther out a double no longer resolves a contact, and a static grid would not fit memory
+
+LEAST, MOST = 1e-20, 1e20  # in SI units; products and quotients of several quantities stay within a double
 
 _ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad)\s*")
 
@@ -45,11 +55,30 @@ def parse_angle(value: Any) -> Any:
     return math.radians(number) if match[2] == "deg" else number
 
 
-Number = Annotated[float, Strict(), AllowInfNan(False), Says("a number")]
-Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Says("a number greater than 0")]
-NotNegative = Annotated[float, Strict(), AllowInfNan(False), Ge(0), Says("a number, 0 or greater")]
-Restitution = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Le(1), Says("a number greater than 0, at most 1")]
-Tolerance = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Le(0.5), Says("a number greater than 0, at most 0.5")]
+def _sized(value: float) -> float:
+    """A quantity that others are divided by."""
+    if value != 0.0 and not LEAST <= abs(value) <= MOST:
+        raise PydanticCustomError("size", "{text}", {"text": f"a size from {LEAST:g} to {MOST:g}"})
+    return value
+
+
+def _not_huge(value: Any) -> Any:
+    """A quantity, or several, that may be as small as they like."""
+    if any(abs(number) > MOST for number in (value if isinstance(value, tuple) else (value,))):
+        raise PydanticCustomError("size", "{text}", {"text": f"a size of at most {MOST:g}"})
+    return value
+
+
+_small, _sound = AfterValidator(_not_huge), AfterValidator(_sized)
+Number = Annotated[float, Strict(), AllowInfNan(False), Says("a number"), _small]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Says("a number greater than 0"), _sound]
+NotNegative = Annotated[float, Strict(), AllowInfNan(False), Ge(0), Says("a number, 0 or greater"), _sound]
+Restitution = Annotated[
+    float, Strict(), AllowInfNan(False), Gt(0), Le(1), Says("a number greater than 0, at most 1"), _sound
+]
+Tolerance = Annotated[
+    float, Strict(), AllowInfNan(False), Gt(0), Le(0.5), Says("a number greater than 0, at most 0.5"), _sound
+]
 Count = Annotated[int, Strict(), Ge(1), Says("a whole number, 1 or greater")]
 Seed = Annotated[int, Strict(), Ge(0), Le(2**64 - 1), Says("a whole number from 0 to 2^64 - 1")]
 Flag = Annotated[bool, Strict(), Says("true or false")]
@@ -57,9 +86,16 @@ Text = Annotated[str, Says("a text")]
 
 _angle_words = 'an angle, a number or a text like "90 deg"'
 _span_words = 'an angle greater than 0 and at most a full turn, a number or a text like "90 deg"'
-Angle = Annotated[float, Strict(), AllowInfNan(False), BeforeValidator(parse_angle), Says(_angle_words)]
+Angle = Annotated[float, Strict(), AllowInfNan(False), BeforeValidator(parse_angle), Says(_angle_words), _small]
 Span = Annotated[
-    float, Strict(), AllowInfNan(False), Gt(0), Le(2 * math.pi), BeforeValidator(parse_angle), Says(_span_words)
+    float,
+    Strict(),
+    AllowInfNan(False),
+    Gt(0),
+    Le(2 * math.pi),
+    BeforeValidator(parse_angle),
+    Says(_span_words),
+    _sound,
 ]
 
 _coordinate = Annotated[float, Strict(), AllowInfNan(False), Ge(-COORDINATE_LIMIT), Le(COORDINATE_LIMIT)]
@@ -67,8 +103,8 @@ Component = Annotated[float, Strict(), AllowInfNan(False)]
 Point = Annotated[
     tuple[_coordinate, _coordinate], Says(f"a point [x, y] of two numbers within +-{COORDINATE_LIMIT:.0f}")
 ]
-Velocity = Annotated[tuple[Component, Component], Says("a velocity [vx, vy] of two numbers")]
-Limits = Annotated[tuple[Component, Component], Says("two numbers [least, greatest]")]
+Velocity = Annotated[tuple[Component, Component], Says("a velocity [vx, vy] of two numbers"), _small]
+Limits = Annotated[tuple[Component, Component], Says("two numbers [least, greatest]"), _small]
 
 # A name becomes part of a ROS topic, which takes these characters only and at most 255 of them.
 Name = Annotated[

@@ -119,7 +119,7 @@ def _sentence(model: type[BaseModel], problem: ErrorDetails) -> str:
         return _wrong_kind(value, str(problem["ctx"]["text"]))
     if loc[-1] == "[key]":
         return f"{shown(value)} given as a name, expected {problem['ctx']['text']}"
-    if kind == "expected" and len(loc) > 1:
+    if kind == "size" or (kind == "expected" and len(loc) > 1):
         unit = unit_of(field)
         text = str(problem["ctx"]["text"])
         return f"{shown(value)} given, expected {text}" + (f" ({unit})" if unit not in ("", "1") else "")

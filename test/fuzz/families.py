@@ -1,0 +1,110 @@
+"""Families of scenes: one mixture of effects and one integrator each, for every new mixture is compiled."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from typing import Any
+
+INTEGRATORS = ("semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit")
+ELASTIC = ("linear", "hertz", "table")
+DAMPING = ("none", "paper", "normal", "tsuji", "onset")
+FORCED = (
+    {},
+    {"peaks": "on", "contact_arrays": "on"},
+    {"peaks": "off", "contact_arrays": "off"},
+    {"unequal_radii": "on"},
+    {"rotation": "on"},
+    {"bottle_contact": "off"},
+    {"segment_rails": "off"},
+    {"arc_rails": "off"},
+    {"base_friction": "off"},
+    {"belts": "off"},
+    {"infeed": "off"},
+    {"outfeed": "off"},
+    {"rotation": "off", "contact_friction": "off", "paper_damping": "off", "tangential_spring": "off"},
+)
+"""What a scene may force, one of them a family."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """One mixture of effects; a scene of it has at least one of everything named."""
+
+    integrator: str = "semi_implicit_euler"
+    implicit_friction: bool = False
+    atan: bool = False
+    elastic: tuple[str, ...] = ("linear",)
+    damping: tuple[str, ...] = ("normal",)
+    friction: bool = True
+    springs: bool = False
+    base_friction: bool = True
+    ring: bool = False
+    belts: tuple[str, ...] = ("straight",)
+    rails: tuple[str, ...] = ("segment",)
+    types: int = 1
+    infeeds: bool = False
+    outfeeds: bool = False
+    effects: tuple[tuple[str, str], ...] = ()
+
+    def __str__(self) -> str:
+        parts = [self.integrator, *self.elastic, *(f"{law} damping" for law in self.damping)]
+        parts += [name for name in ("implicit_friction", "atan", "friction", "springs", "ring") if getattr(self, name)]
+        parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
+        parts += [f"{self.types} types", *(f"{name} {value}" for name, value in self.effects)]
+        return ", ".join(parts)
+
+
+def random_family(seed: int) -> Family:
+    """The family of a seed; integrators take turns, everything else is drawn."""
+    draw = random.Random(seed)
+    integrator = INTEGRATORS[seed % len(INTEGRATORS)]
+    euler = integrator == INTEGRATORS[0]
+    friction = draw.random() < 0.8
+    return Family(
+        integrator=integrator,
+        implicit_friction=euler and draw.random() < 0.3,
+        atan=draw.random() < 0.25,
+        elastic=_some(draw, ELASTIC),
+        damping=_some(draw, DAMPING),
+        friction=friction,
+        springs=euler and friction and draw.random() < 0.4,
+        base_friction=draw.random() < 0.85,
+        ring=draw.random() < 0.3,
+        belts=_some(draw, ("straight", "curved"), least=0),
+        rails=_some(draw, ("segment", "arc"), least=0),
+        types=draw.choice((1, 1, 2, 3)),
+        infeeds=draw.random() < 0.6,
+        outfeeds=draw.random() < 0.4,
+        effects=tuple(draw.choice(FORCED if draw.random() < 0.5 else FORCED[:1]).items()),
+    )
+
+
+def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
+    """A few of the names, in their order."""
+    chosen: Any = draw.sample(names, draw.randint(least, min(2, len(names))))
+    return tuple(name for name in names if name in chosen)
+
+
+CI_FAMILIES = (
+    Family(
+        elastic=("linear",),
+        damping=("paper", "normal"),
+        belts=("straight", "curved"),
+        rails=("segment", "arc"),
+        types=2,
+        infeeds=True,
+        outfeeds=True,
+    ),
+    Family(integrator="velocity_verlet", elastic=("hertz",), damping=("tsuji",), rails=("segment",), infeeds=True),
+    Family(
+        elastic=("linear",),
+        damping=("normal",),
+        springs=True,
+        ring=True,
+        belts=("straight",),
+        rails=("segment",),
+        infeeds=True,
+    ),
+)
+"""Few, so that CI compiles few kernels."""

@@ -1,0 +1,156 @@
+"""A short run of what `make fuzz` does for as long as one likes, always of the same cases; and what once failed."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fuzz.case import Case, cases, load_case
+from fuzz.commands import Command
+from fuzz.crossing import crossed
+from fuzz.families import CI_FAMILIES, Family, random_family
+from fuzz.invariants import Violation, Watch
+from fuzz.play import failure_kind, play
+from fuzz.wrong import judge, wrong_texts
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from scenes import bottle, contact, kind, scene, segment
+
+from conveyor_sim.errors import SceneError
+from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene.geometry import ArcPiece, SegmentPiece
+from conveyor_sim.simulation import Simulation
+
+KNOWN = sorted(path for path in (Path(__file__).parent / "known").glob("*.yaml") if ".script" not in path.name)
+
+short = settings(
+    derandomize=True,
+    database=None,
+    deadline=None,  # the first case compiles
+    suppress_health_check=list(HealthCheck),  # scenes are large and slow to draw by their nature
+    phases=[Phase.generate],  # `make fuzz` makes failures small
+)
+
+
+@pytest.mark.parametrize("family", CI_FAMILIES, ids=str)
+def test_whatever_the_scene(family: Family) -> None:
+    ran = []
+
+    @settings(short, max_examples=15)
+    @given(cases(family, beyond=False))
+    def holds(case: Case) -> None:
+        ran.append(play(case))
+
+    holds()
+    assert sum(played.how == "run" for played in ran) > len(ran) / 2
+    assert sum(played.bottle_ticks for played in ran) > 1000
+    assert any(played.replayed for played in ran)
+
+
+def test_a_scene_is_read_or_refused_in_words() -> None:
+    judged = []
+
+    @settings(short, max_examples=80)
+    @given(st.one_of(*(wrong_texts(random_family(number)) for number in range(10))))
+    def refused(text: str) -> None:
+        judged.append(judge(text))
+
+    refused()
+    assert any(one.refused for one in judged)
+    assert any(not one.refused for one in judged)
+
+
+@settings(short, max_examples=200)
+@given(st.text() | st.text("[]{}:-,&*!'\"\n 1ae."))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    with pytest.raises(SceneError):
+        parse_scene(text)
+
+
+@pytest.mark.parametrize("file", KNOWN, ids=lambda file: file.stem)
+def test_what_once_failed(file: Path) -> None:
+    play(load_case(file))
+
+
+def small(**fields: object) -> Case:
+    """A case of one bottle that runs into a rail, with a command."""
+    data = {
+        "name": "small", "duration": 1.0, "bottle_types": {"bottle": kind(0.05)},
+        "contacts": [{"between": ["glass", "steel"], "stiffness": 1e4}], "belts": {}, "floor": "none",
+        "rails": {"wall": segment((0.1, -1.0), (0.1, 1.0))}, "bottles": [bottle(0.0, 0.0, 1.0)], **fields,
+    }  # fmt: skip
+    return Case(json.loads(json.dumps(data)), ticks=10, commands=[Command(3, ("belts/none/cmd_speed",), (math.nan,))])
+
+
+def test_a_case_comes_back_from_its_files(tmp_path: Path) -> None:
+    case = small()
+    again = load_case(case.save(tmp_path, "case", "what was wrong"))
+    assert (again.scene, again.ticks, again.calls) == (case.scene, case.ticks, case.calls)
+    assert repr(again.commands) == repr(case.commands)
+    assert play(again).how == "run"
+
+
+class Passing(Simulation):
+    """A line whose bottles are put a way farther at tick 3."""
+
+    way = 0.2
+
+    def advance(self, ticks: int = 1) -> None:
+        super().advance(ticks)
+        if self.tick == 3:
+            self.displace(np.full(1, self.way), np.zeros(1))
+
+
+def test_a_bottle_through_a_rail_is_noticed() -> None:
+    simulation = Passing(parse_scene(small().scene_text))
+    watch = Watch(simulation)
+    with pytest.raises(Violation, match="through a rail"):
+        for _ in range(5):
+            simulation.advance()
+            watch.after_tick([], simulation.take_outcomes())
+    assert simulation.tick == 3
+
+
+def test_a_bottle_that_is_nowhere_is_noticed() -> None:
+    simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
+    watch = Watch(simulation)
+    simulation.displace(np.array([0.0, math.nan]), np.zeros(2))
+    with pytest.raises(Violation, match="not finite"):
+        watch.after_tick([], [])
+
+
+def test_a_lost_bottle_is_noticed() -> None:
+    simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
+    watch = Watch(simulation)
+    simulation._state.remove(0)
+    simulation.advance()
+    with pytest.raises(Violation, match="lost bottle"):
+        watch.after_tick([], [])
+
+
+@pytest.mark.parametrize(
+    ("piece", "way", "through"),
+    [
+        (SegmentPiece((0.0, 0.0), (1.0, 0.0)), ((0.5, -0.1), (0.6, 0.1)), True),
+        (SegmentPiece((0.0, 0.0), (1.0, 0.0)), ((0.5, -0.1), (0.6, -0.01)), False),
+        (SegmentPiece((0.0, 0.0), (1.0, 0.0)), ((1.2, -0.1), (1.1, 0.1)), False),
+        (ArcPiece((0.0, 0.0), 1.0, 0.0, math.pi / 2), ((0.6, 0.6), (0.9, 0.9)), True),
+        (ArcPiece((0.0, 0.0), 1.0, 0.0, math.pi / 2), ((-0.6, 0.6), (-0.9, 0.9)), False),
+        (ArcPiece((0.0, 0.0), 1.0, 0.0, math.pi / 2), ((1.0, 0.1), (0.1, 1.0)), False),
+        (ArcPiece((0.0, 0.0), 1.0, 0.0, 2 * math.pi), ((0.0, 0.0), (0.0, -3.0)), True),
+    ],
+)
+def test_ways_through_pieces(piece: SegmentPiece | ArcPiece, way: object, through: bool) -> None:
+    before, after = np.array(way)[:, None, :]
+    assert crossed(piece, before, after).tolist() == [through]
+
+
+def test_failures_are_told_apart_by_where_they_are_raised() -> None:
+    try:
+        parse_scene(None)  # type: ignore[arg-type]
+    except Exception as error:
+        assert " in " in failure_kind(error)
+    assert failure_kind(Violation("lost bottle", "one")) == "lost bottle"
