@@ -3,6 +3,7 @@
 # make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about half an hour (ARGS=funnel for one)
 # make fuzz    sets up the same, then plays random scenes and commands (ARGS="--minutes 60"; a failure is kept as a scene)
+# make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
 # make lint    style and types
 # make clean   removes what set-up and builds made, never runs/
 
@@ -21,7 +22,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test bench accuracy fuzz lint clean set-up set-up-test set-up-bench
+.PHONY: help run test bench accuracy fuzz stability lint clean set-up set-up-test set-up-bench
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -41,6 +42,9 @@ accuracy: set-up
 # Beside the tests, whose scenes and checks it uses.
 fuzz: set-up-test
 	@PYTHONPATH=.:test $(PYTHON) -m fuzz $(ARGS)
+
+stability: set-up
+	@$(PYTHON) docs/studies/stability.py $(ARGS)
 
 lint: set-up-test
 	@$(PYTHON) -m ruff check .

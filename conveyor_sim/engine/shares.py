@@ -12,6 +12,9 @@ from .compile import part
 
 SWEEPS = 64
 
+IN_LINE = 1e-10
+"""Square of the sine between normals, below which two pieces are one and the same: rounding would be divided by it."""
+
 
 @part
 def share_overlaps(contacts: RailContacts, count: int) -> None:
@@ -42,12 +45,16 @@ def _share_two(contacts: RailContacts, a: int, b: int) -> None:
     over_a, over_b = contacts.overlap[a], contacts.overlap[b]
     if over_b <= cosine * over_a:
         contacts.share[b] = 0.0
-    elif over_a <= cosine * over_b:
+        return
+    if over_a <= cosine * over_b:
         contacts.share[a] = 0.0
+        return
+    # 1 - cosine^2, without its cancellation where the pieces are nearly in line.
+    sine = contacts.nx[a] * contacts.ny[b] - contacts.ny[a] * contacts.nx[b]
+    rest = sine * sine
+    if rest < IN_LINE:
+        contacts.share[a if over_a < over_b else b] = 0.0
     else:
-        # 1 - cosine^2, without its cancellation where the pieces are nearly in line.
-        sine = contacts.nx[a] * contacts.ny[b] - contacts.ny[a] * contacts.nx[b]
-        rest = sine * sine
         contacts.share[a] = (over_a - cosine * over_b) / (rest * over_a)
         contacts.share[b] = (over_b - cosine * over_a) / (rest * over_b)
 

@@ -78,6 +78,8 @@ class Guard:
         if kinetic > self._growth * self._kinetic + self._work and (energies := self._grown()):
             return self._put_back().energy(fastest, *energies, self._work)
         depth = max(deep)
+        if depth > DEEPEST and self._was_deep():
+            return None
         if depth > SOFT >= self.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.watch.bottle[worst]), int(world.watch.other[worst])
@@ -115,6 +117,19 @@ class Guard:
         before = self._energy()
         after.put_back(self._state)
         return (before, total) if total > self._growth * before + self._work else None
+
+    def _was_deep(self) -> bool:
+        """Whether bottles were put in so deep before the tick: they may part."""
+        after, watch = Memory(), self._state.world.watch
+        bottle, other = watch.bottle.copy(), watch.other.copy()
+        after.keep(self._state.world)
+        self._put_back()
+        self._entry(self._state.world, self._found, True)
+        deep = float(self._state.world.watch.depth.max()) > DEEPEST
+        after.put_back(self._state)
+        self._forget()
+        watch.bottle[:], watch.other[:] = bottle, other
+        return deep
 
     def _energy(self) -> float:
         *_, kinetic, elastic = self._entry(self._state.world, self._found, True)

@@ -1,0 +1,59 @@
+"""The numbers behind docs/stability.md: runs the table of hard cases in all settings, and renews the page.
+
+    make stability                                  # all of it, about a quarter of an hour on two free cores
+    make stability ARGS="sudden_reversal transfer"  # the matrix of some rows
+    make stability ARGS=--tables                    # nothing is measured: the page again, from docs/stability/
+
+Whatever is finished is in docs/stability/ when it is interrupted, and is not made again; what other sources made, is.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import partial
+from pathlib import Path
+
+import click
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "test"), str(Path(__file__).parent)]
+
+import stability_hour  # noqa: E402
+import stability_limits  # noqa: E402
+import stability_matrix  # noqa: E402
+from hard_cases.case import read_table  # noqa: E402
+from stability_page import page, picture  # noqa: E402
+
+from conveyor_sim.machine import machine  # noqa: E402
+
+PAGE = ROOT / "docs" / "stability.md"
+FOLDER = ROOT / "docs" / "stability"
+ROWS = tuple(case.name for case in read_table())
+
+
+@click.command()
+@click.argument("rows", nargs=-1, type=click.Choice(ROWS))
+@click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the page.")
+def main(rows: tuple[str, ...], only_tables: bool) -> None:
+    """Run ROWS (default: all) in the matrix, and the studies beside it; renew docs/stability.md."""
+    FOLDER.mkdir(exist_ok=True)
+    if not only_tables:
+        (FOLDER / "machine.txt").write_text(machine() + "\n", encoding="utf-8")
+        _measure(rows)
+    PAGE.write_text(page(PAGE.read_text(encoding="utf-8"), FOLDER), encoding="utf-8")
+
+
+def _measure(rows: tuple[str, ...]) -> None:
+    if rows:
+        stability_matrix.measure(FOLDER / "matrix.csv", len(os.sched_getaffinity(0)), rows)
+        return
+    hour = partial(stability_hour.measure, FOLDER / "hour.csv")
+    stability_matrix.measure(FOLDER / "matrix.csv", len(os.sched_getaffinity(0)), beside=hour)
+    stability_limits.measure(FOLDER / "limits.csv")
+    stability_hour.denormals(FOLDER / "denormals.csv")
+    picture(FOLDER / "worst.png")
+
+
+if __name__ == "__main__":
+    main()
