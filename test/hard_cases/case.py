@@ -14,7 +14,6 @@ from ruamel.yaml import YAML
 
 from conveyor_sim.presets import PRESETS
 from conveyor_sim.scene import Scene, load_scene, parse_scene
-from conveyor_sim.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_name("table.yaml")
