@@ -18,6 +18,7 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.stopped import keep_stopped
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,9 @@ def run_scene(
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             try:
                 simulation.advance(1)
-            except SimulationError:
+            except SimulationError as error:
                 outputs.after_failure()
-                raise
+                raise keep_stopped(simulation, bag, error) from error
             outputs.after_tick()
             peaks.after_tick()
             if progress is not None:

@@ -1,49 +1,17 @@
 """State: the only thing that changes. Slots for bottles, the lists between them, the belts' speeds."""
 
 import heapq
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import (
-    F8,
-    Blocks,
-    Bottles,
-    ContactLaw,
-    Footing,
-    Implicit,
-    Ledger,
-    Linear,
-    Load,
-    Near,
-    NearSprings,
-    Neighbourhood,
-    PairParts,
-    Pairs,
-    PairSprings,
-    PairTangent,
-    Peaks,
-    Ring,
-    Slopes,
-    Slots,
-    Spin,
-    Stage,
-    Surface,
-    Triple,
-    Watch,
-    World,
-)
-from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
-from conveyor_sim.engine.ledger import BELTS
+from conveyor_sim.empty_world import empty_near, empty_pairs, empty_slots, empty_world
+from conveyor_sim.engine.arrays import Near, NearSprings, PairSprings
 from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
-from conveyor_sim.engine.slots import WIDTH
-from conveyor_sim.engine.team import UNIT
 from conveyor_sim.model import Model
-from conveyor_sim.plant import belt_arrays, listed
 from conveyor_sim.world_arrays import Arrays, with_arrays
 
 FIRST_SLOTS = 16
@@ -56,7 +24,7 @@ class State:
         """Make an empty State with room for that many bottles at first."""
         self.model = model
         self.next_id = 0
-        self.world = self._empty_world(max(1, room))
+        self.world = empty_world(self.model, max(1, room))
         self._free = list(range(max(1, room)))
 
     def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
@@ -99,7 +67,7 @@ class State:
         start anew.
         """
         slots = other.world.bottles.id.size
-        self.world, self.next_id = self._empty_world(slots), other.next_id
+        self.world, self.next_id = empty_world(self.model, slots), other.next_id
         bottles, spin, before = self.world.bottles, self.world.spin, other.world.spin
         for name in ("x", "y", "vx", "vy", "type", "id"):
             getattr(bottles, name)[:] = getattr(other.world.bottles, name)
@@ -156,7 +124,7 @@ class State:
     def _resize(self, slots: int) -> None:
         """Room for more bottles; lists stay as they are, for tangential springs are remembered by them."""
         old = self.world
-        new = self._empty_world(slots)
+        new = empty_world(self.model, slots)
         used = old.bottles.id.size
         for source, target in [
             (old.bottles, new.bottles),
@@ -186,211 +154,19 @@ class State:
         """Room for twice the entries that are needed in lists that are too short; the others hold springs by now."""
         world, slots = self.world, self.world.bottles.id.size
         if world.pairs is not None and pairs > world.pairs.i.size:
-            longer = self._pairs(2 * pairs)
+            longer = empty_pairs(self.model, 2 * pairs)
             if longer is not None:
                 _carry(world.pairs.spring, longer.spring)
             world = world._replace(pairs=longer)
         if world.slots is not None and more > world.slots.more_entry.size:
-            world = world._replace(slots=_slots(slots, 2 * more))
+            world = world._replace(slots=empty_slots(slots, 2 * more))
         if world.near_segments is not None and segments > world.near_segments.piece.size:
-            world = world._replace(near_segments=self._near(slots, 2 * segments, world.near_segments))
+            world = world._replace(near_segments=_longer(self.model, world.near_segments, slots, 2 * segments))
         if world.near_arcs is not None and arcs > world.near_arcs.piece.size:
-            world = world._replace(near_arcs=self._near(slots, 2 * arcs, world.near_arcs))
+            world = world._replace(near_arcs=_longer(self.model, world.near_arcs, slots, 2 * arcs))
         if world.belts is not None and belts > world.belts.candidate.size:
             world = world._replace(belts=world.belts._replace(candidate=np.zeros(2 * belts, np.uint32)))
         self.world = world
-
-    def _pairs(self, entries: int) -> Pairs | None:
-        law, model = self.model.pair_law, self.model
-        if law is None:
-            return None
-        unequal = model.has("unequal_radii")
-
-        def forces(wanted: bool) -> F8 | None:
-            return np.zeros(2 * entries + 1) if wanted else None
-
-        return Pairs(
-            i=np.zeros(entries, np.uint32),
-            j=np.zeros(entries, np.uint32),
-            reach=np.zeros(entries) if unequal else None,
-            radius_i=np.zeros(entries) if unequal else None,
-            law=ContactLaw(*(None if table is None else np.zeros(entries, table.dtype) for table in law)),
-            used=np.zeros(1, np.int64),
-            fx=np.zeros(2 * entries + 1),
-            fy=np.zeros(2 * entries + 1),
-            moment=forces(model.has("rotation")),
-            normal=forces(model.has("peaks")),
-            touch=forces(model.has("implicit_friction")),
-            spring=_pair_springs(entries) if law.tangential_stiffness is not None else None,
-            tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
-            parts=PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1)) if model.has("energy_ledger") else None,
-        )
-
-    def _near(self, slots: int, entries: int, before: Near | None = None) -> Near:
-        law = self.model.rail_law
-        springs = _near_springs(entries) if law is not None and law.tangential_stiffness is not None else None
-        if before is not None:
-            _carry(before.springs, springs)
-        return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs)
-
-    def _empty_world(self, slots: int) -> World:
-        model, entries = self.model, 4 * slots
-        buckets = 1 << max(4, (2 * slots - 1).bit_length())
-        peaks = model.has("peaks")
-
-        def reals() -> F8:
-            return np.zeros(slots)
-
-        return World(
-            settings=model.settings,
-            bottles=Bottles(
-                x=reals(),
-                y=reals(),
-                vx=reals(),
-                vy=reals(),
-                radius=reals(),
-                inverse_mass=reals(),
-                weight=reals(),
-                type=np.zeros(slots, np.uint32),
-                id=np.full(slots, -1, dtype=np.int64),
-                packed=np.zeros(4 * slots),
-            ),
-            spin=Spin(reals(), reals(), reals(), reals()) if model.has("rotation") else None,
-            load=Load(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
-            peaks=Peaks(reals(), reals()) if peaks else None,
-            stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
-            slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
-            linear=_linear(slots) if model.integrator in LINEAR else None,
-            implicit=Implicit(reals(), reals(), reals()) if model.has("implicit_friction") else None,
-            neighbourhood=Neighbourhood(
-                x=reals(),
-                y=reals(),
-                stale=np.ones(1, np.int64),
-                cell=np.zeros((slots, 2), np.int64),
-                bucket=np.zeros(buckets + 1, np.uint32),
-                order=np.zeros(slots, np.uint32),
-            ),
-            watch=Watch(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
-            pairs=self._pairs(entries),
-            slots=_slots(slots, entries) if model.pair_law is not None else None,
-            pair_law=model.pair_law,
-            curves=model.curves,
-            grid=model.grid,
-            segments=model.segments,
-            near_segments=self._near(slots, entries) if model.segments is not None else None,
-            arcs=model.arcs,
-            near_arcs=self._near(slots, entries) if model.arcs is not None else None,
-            railed=listed(slots) if model.rail_law is not None else None,
-            rail_law=model.rail_law,
-            belts=belt_arrays(model.belt_shapes, slots, entries) if model.has("belts") else None,
-            surface=self._surface(),
-            footing=self._footing(slots),
-            ring=Ring(reals()) if model.has("ring_base") else None,
-            ledger=_ledger(slots, model) if model.has("energy_ledger") else None,
-        )
-
-    def _surface(self) -> Surface | None:
-        if self.model.base_friction is None:
-            return None
-        surfaces = len(self.model.belts) + 1
-        return Surface(
-            ux=np.zeros(surfaces),
-            uy=np.zeros(surfaces),
-            turn=np.zeros(surfaces) if self.model.has("curved_belts") else None,
-            friction=self.model.base_friction,
-        )
-
-    def _footing(self, slots: int) -> Footing | None:
-        if self.model.base_friction is None:
-            return None
-        return Footing(
-            carrier=np.full(slots, len(self.model.belts), dtype=np.int32),
-            ux=np.zeros(slots),
-            uy=np.zeros(slots),
-            turn=np.zeros(slots) if self.model.has("curved_belts") else None,
-            pull=np.zeros(slots),
-        )
-
-
-def _slopes(stages: int, slots: int, peaks: bool) -> Slopes:
-    def of_stages() -> F8:
-        return np.zeros((stages, slots))
-
-    return Slopes(
-        x=np.zeros(slots),
-        y=np.zeros(slots),
-        vx=np.zeros(slots),
-        vy=np.zeros(slots),
-        omega=np.zeros(slots),
-        ax=of_stages(),
-        ay=of_stages(),
-        alpha=of_stages(),
-        normal=of_stages() if peaks else None,
-        error=np.zeros(slots),
-        progress=np.zeros(3),
-    )
-
-
-def _linear(slots: int) -> Linear:
-    units = slots // UNIT + 1
-
-    def columns(count: int) -> Iterator[F8]:
-        return (np.zeros(slots) for _ in range(count))
-
-    return Linear(
-        x=np.zeros(slots),
-        y=np.zeros(slots),
-        own=Blocks(*columns(6)),
-        inverse=Blocks(*columns(6)),
-        change=Triple(*columns(3)),
-        left=Triple(*columns(3)),
-        way=Triple(*columns(3)),
-        product=Triple(*columns(3)),
-        left_sum=np.zeros(units),
-        way_sum=np.zeros(units),
-        most=np.zeros(units),
-    )
-
-
-def _ledger(slots: int, model: Model) -> Ledger:
-    units, surfaces = slots // UNIT + 1, len(model.belts) + 1
-    return Ledger(
-        damping=_triple(slots),
-        friction=_triple(slots),
-        base=_triple(slots),
-        belt_power=np.zeros((units, surfaces)),
-        power=np.zeros((SLOPES.get(model.integrator, 1), units, BELTS + surfaces)),
-        work=np.zeros((units, BELTS + surfaces)),
-    )
-
-
-def _triple(entries: int) -> Triple:
-    return Triple(np.zeros(entries), np.zeros(entries), np.zeros(entries))
-
-
-def _pair_tangent(entries: int) -> PairTangent:
-    nx, ny, normal, tangential, arm_i, arm_j = (np.zeros(entries) for _ in range(6))
-    return PairTangent(nx, ny, normal, tangential, arm_i, arm_j, np.zeros(entries // UNIT + 1))
-
-
-def _slots(slots: int, entries: int) -> Slots:
-    return Slots(
-        entry=np.zeros(slots * WIDTH, np.uint32),
-        filled=np.zeros(slots, np.uint32),
-        more_start=np.zeros(slots + 1, np.uint32),
-        more_bottle=np.zeros(entries, np.uint32),
-        more_entry=np.zeros(entries, np.uint32),
-    )
-
-
-def _pair_springs(entries: int) -> PairSprings:
-    i, j = np.zeros((2, entries), np.uint32)
-    return PairSprings(np.zeros(entries), i, j, np.zeros(entries), np.full(1, -1, np.int64))
-
-
-def _near_springs(entries: int) -> NearSprings:
-    bottle, piece = np.zeros((2, entries), np.uint32)
-    return NearSprings(np.zeros(entries), bottle, piece, np.zeros(entries), np.full(1, -1, np.int64))
 
 
 def _carry(before: PairSprings | NearSprings | None, after: PairSprings | NearSprings | None) -> None:
@@ -398,6 +174,13 @@ def _carry(before: PairSprings | NearSprings | None, after: PairSprings | NearSp
     for name in before._fields if before is not None else ():
         if name.startswith("kept"):
             getattr(after, name)[: getattr(before, name).size] = getattr(before, name)
+
+
+def _longer(model: Model, before: Near, slots: int, entries: int) -> Near:
+    """Room for more entries, with what is kept of springs."""
+    near = empty_near(model, slots, entries)
+    _carry(before.springs, near.springs)
+    return near
 
 
 def _for_slots(near: Near | None, slots: int) -> Near | None:

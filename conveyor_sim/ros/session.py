@@ -12,6 +12,7 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.stopped import keep_stopped
 
 
 class Session:
@@ -47,9 +48,9 @@ class Session:
             self._first_tick_at = time.monotonic()
         try:
             self.simulation.advance(1)
-        except SimulationError:
+        except SimulationError as error:
             self.outputs.after_failure()
-            raise
+            raise keep_stopped(self.simulation, self.bag, error) from error
         outcomes = self.outputs.after_tick()
         self._peaks.after_tick()
         self.wall = time.monotonic() - self._first_tick_at

@@ -19,6 +19,7 @@ import click
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test"), str(Path(__file__).parent)]
 
+import stability_guard  # noqa: E402
 import stability_hour  # noqa: E402
 import stability_limits  # noqa: E402
 import stability_matrix  # noqa: E402
@@ -51,6 +52,7 @@ def _measure(rows: tuple[str, ...]) -> None:
     hour = partial(stability_hour.measure, FOLDER / "hour.csv")
     stability_matrix.measure(FOLDER / "matrix.csv", len(os.sched_getaffinity(0)), beside=hour)
     stability_limits.measure(FOLDER / "limits.csv")
+    stability_guard.measure(FOLDER / "guard.csv")
     stability_hour.denormals(FOLDER / "denormals.csv")
     picture(FOLDER / "worst.png")
 

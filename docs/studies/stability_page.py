@@ -56,6 +56,7 @@ def page(text: str, folder: Path) -> str:
         "rows": rows(matrix),
         "exceptions": exceptions(matrix),
         "limits": limits(read(folder / "limits.csv")),
+        "guard": guard(read(folder / "guard.csv")),
         "hour": hour(read(folder / "hour.csv"), read(folder / "denormals.csv")),
     }
     for name, part in parts.items():
@@ -65,6 +66,14 @@ def page(text: str, folder: Path) -> str:
             raise ValueError(f"stability.md: expected the markers <!-- study: {name} --> and <!-- end: {name} -->")
         text = f"{before}{start}\n{part.strip()}\n\n{end}{after}"
     return text
+
+
+def guard(lines: Sequence[Line]) -> str:
+    """What the guard costs."""
+    if not lines:
+        return "Not measured yet."
+    table = [f"| {' | '.join(lines[0])} |", f"| --- |{' ---: |' * (len(lines[0]) - 1)}"]
+    return "\n".join(table + [f"| {' | '.join(line.values())} |" for line in lines])
 
 
 def summary(matrix: Sequence[Line], folder: Path) -> str:

@@ -73,6 +73,16 @@ def test_collinear_pieces_push_as_one_segment() -> None:
     np.testing.assert_allclose(rail_forces(loose, points), whole, atol=ROUNDING)
 
 
+def test_a_rail_given_twice_pushes_once() -> None:
+    """In any direction: rounding makes the cosine between its normals a little less than 1, or not."""
+    points = around((-0.5, -0.5), (0.5, 0.5), 300)
+    for angle in np.linspace(0.0, 2.0 * math.pi, 40):
+        way = 0.4 * np.array([math.cos(angle), math.sin(angle)])
+        once = {"a": segment(tuple(-way), tuple(way))}
+        twice = rail_forces({**once, "b": segment(tuple(-way), tuple(way * (1.0 + 1e-15)))}, points)
+        np.testing.assert_allclose(twice, rail_forces(once, points), atol=ROUNDING)
+
+
 @pytest.mark.parametrize("turn", [0.02, 0.5, math.pi / 2, 2.5])
 def test_a_convex_corner_pushes_once(turn: float) -> None:
     """Outside of a corner the force is that of the nearest point of both pieces, through the fan at the corner too."""

@@ -19,6 +19,7 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.runner import run_scene
 from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
 from conveyor_sim.summary import render, summarize
 
 
@@ -51,13 +52,19 @@ def test_a_run_that_is_stopped_leaves_a_whole_bag_with_the_reason(tmp_path: Path
     assert recover(tmp_path / "run").healthy
     *_, event = decoded(tmp_path / "run")
     assert (event.kind, event.bottle, event.tick) == ("stopped", 0, 6)
-    assert event.text == str(stopped.value)
+    file = tmp_path / "run" / "stopped.npz"
+    assert str(stopped.value) == f"{event.text}; the state before that tick is in {file}"
     with open_bag(tmp_path / "run") as bag:
         assert [frame.tick for frame in bag.bottles()] == list(range(7))
     report = replay(tmp_path / "run")
     assert report.difference is None
     assert report.last_tick == 6
     assert summarize(tmp_path / "run").guard["stopped"] == 1
+    kept = Simulation.load(file)
+    assert (kept.tick, kept.bottles().x[0]) == (6, event.x)
+    with pytest.raises(SimulationError) as again:
+        kept.advance()
+    assert str(again.value) == event.text
 
 
 def test_a_tick_in_shorter_steps_is_told_and_replayed(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the guard costs: its share of the time that ticks take, on some scenes. Writes docs/stability/guard.csv.
+"""What the guard costs: its share of the time that ticks take, on some scenes.
 
 The parts are timed within one run, so the share hardly depends on what else the machine does.
 """
@@ -9,14 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.guard import guard
-from conveyor_sim.guard.memory import Memory
+from conveyor_sim.guard import Guard
 from conveyor_sim.integration import Integration
 from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
-TABLE = Path(__file__).parent.parent / "stability" / "guard.csv"
+COLUMNS = ("scene", "bottles", "steps a tick", "tick (ms)", "guard (us)", "share (%)")
 SCENES = {
     "two_bottles": (0, 400),
     "paper_plant": (3000, 1000),
@@ -32,8 +31,14 @@ class Stopwatch:
     def __init__(self, *methods: tuple[type, str]) -> None:
         self.seconds = 0.0
         self._inside = False
-        for owner, name in methods:
-            setattr(owner, name, self._timed(getattr(owner, name)))
+        self._methods = [(owner, name, getattr(owner, name)) for owner, name in methods]
+        for owner, name, method in self._methods:
+            setattr(owner, name, self._timed(method))
+
+    def stop(self) -> None:
+        """Leave the methods as they were."""
+        for owner, name, method in self._methods:
+            setattr(owner, name, method)
 
     def _timed(self, method: Callable[..., Any]) -> Callable[..., Any]:
         def timed(*arguments: Any) -> Any:
@@ -49,9 +54,9 @@ class Stopwatch:
         return timed
 
 
-def main() -> None:
-    """Measure and write."""
-    guarding = Stopwatch((guard.Guard, "begin"), (guard.Guard, "end"), (Integration, "_tell"), (Memory, "keep"))
+def measure(path: Path) -> None:
+    """Time the scenes; into a CSV file."""
+    guarding = Stopwatch((Guard, "begin"), (Guard, "end"), (Integration, "_tell"))
     whole = Stopwatch((Simulation, "advance"))
     rows = []
     for name, (before, ticks) in SCENES.items():
@@ -59,19 +64,13 @@ def main() -> None:
         simulation.advance(max(1, before))
         guarding.seconds = whole.seconds = 0.0
         simulation.advance(ticks)
-        share = guarding.seconds / whole.seconds
+        tick, guard = whole.seconds / ticks, guarding.seconds / ticks
         bottles, steps = simulation.counts.present, simulation.model.steps_per_tick
-        tick = whole.seconds / ticks
-        rows.append(
-            (name, bottles, steps, f"{1e3 * tick:.3g}", f"{1e6 * guarding.seconds / ticks:.3g}", f"{share:.4f}")
-        )
-        print(f"{name}: {bottles} bottles, {steps} steps a tick, {100.0 * share:.2f} % of {1e3 * tick:.3g} ms")
-    TABLE.parent.mkdir(exist_ok=True)
-    with TABLE.open("w", newline="") as file:
+        share = f"{100.0 * guard / tick:.2g}"
+        rows.append((name, bottles, steps, f"{1e3 * tick:.3g}", f"{1e6 * guard:.3g}", share))
+    guarding.stop()
+    whole.stop()
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("scene", "bottles", "steps a tick", "tick (ms)", "guard (us a tick)", "share"))
+        writer.writerow(COLUMNS)
         writer.writerows(rows)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,21 @@
+"""The state in which the guard stopped a run, kept beside its recording for inspection."""
+
+from pathlib import Path
+
+from conveyor_sim.errors import CheckpointError, SimulationError
+from conveyor_sim.simulation import Simulation
+
+FILE_NAME = "stopped.npz"
+"""A checkpoint (`Simulation.load`), in the folder of the recording."""
+
+
+def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationError) -> SimulationError:
+    """Write the state at the beginning of the tick that failed into a folder, if given; an error that tells where."""
+    if folder is None:
+        return error
+    path = folder / FILE_NAME
+    try:
+        simulation.save(path)
+    except CheckpointError as failed:
+        return SimulationError(f"{error}; the state before that tick was not kept: {failed}", error.kind)
+    return SimulationError(f"{error}; the state before that tick is in {path}", error.kind)
