@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, NO_FLOOR, RADIUS, base, belt, bottle, contact, segment, simulation, stiffness_for
+from scenes import MASS, NO_FLOOR, NO_OUTPUTS, RADIUS, base, belt, bottle, contact, segment, simulation, stiffness_for
 
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.guard import GuardEvent
@@ -84,6 +84,24 @@ def test_without_shorter_steps_the_same_is_told_and_the_tick_not_taken() -> None
             sim.advance()
     assert stopped.value.kind == "unstable"
     assert before[-1] == (sim.tick, sim.bottles().x[0], sim.bottles().vx[0])
+
+
+def test_a_tick_that_is_done_again_is_booked_once() -> None:
+    """Free flight is the same in steps of any length: a cured run is one whose steps were short from the beginning."""
+    stiffness = stiffness_for(1e-3, MASS)
+    damped = [contact(stiffness, "steel", ("normal", 0.1 * math.sqrt(stiffness * MASS)))]
+    ledgers = []
+    for per_tick, shortened in ((10, 1), (40, 0)):
+        sim = against_a_stop(1.0, stiffness, per_tick, contacts=damped, outputs={**NO_OUTPUTS, "ledger": 100})
+        sim.advance(10)
+        assert sim.shortened_ticks == shortened
+        ledgers.append(sim.ledger())
+    cured, short = ledgers
+    assert cured is not None
+    assert short is not None
+    assert cured.damping > 0.1 * short.fed
+    for name in ("kinetic", "damping", "fed", "residual"):
+        assert getattr(cured, name) == pytest.approx(getattr(short, name), rel=1e-9)
 
 
 def test_a_bottle_that_would_step_over_a_rail_is_caught() -> None:
