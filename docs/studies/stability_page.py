@@ -202,14 +202,20 @@ def hour(lines: Sequence[Line], denormals: Sequence[Line]) -> str:
 
 
 def picture(path: Path) -> None:
-    """The rows that overlap deepest and go on, each at its deepest tick, with the paper's integrator at `standard`."""
-    cases = [case for case in read_table() if not case.refused and not case.stops and case.name not in LONG]
+    """The rows that overlap deepest and go on, each at its deepest tick, with the paper's integrator at `standard`.
+
+    Without those that put bottles into each other from outside.
+    """
+    silent = (case for case in read_table() if not (case.refused or case.stops or case.put))
+    cases = [case for case in silent if case.name not in LONG]
     found = sorted((_deepest(case) for case in cases), key=lambda moment: -moment.depth)
     with style.look():
         figure = style.new_figure(12.0, 8.0)
         for axes, moment in zip(np.ravel(figure.subplots(2, WORST // 2)), found[:WORST], strict=True):
             if moment.bottles is not None:
                 _draw(axes, moment, moment.bottles)
+            axes.set_xlabel("x (m)", fontsize=8)
+            axes.set_ylabel("y (m)", fontsize=8)
             axes.set_title(f"{moment.case.name}, {moment.time:g} s\n{moment.depth:.2g} of a radius", fontsize=9)
         figure.savefig(path, dpi=100, metadata={"Software": None})
 
