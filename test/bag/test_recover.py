@@ -187,7 +187,7 @@ def test_whole_bag_is_left_alone(record_line: Make) -> None:
 
 def test_damaged_original_is_kept_unchanged(record_line: Make) -> None:
     folder = record_line("kept", TICKS)
-    file = cut(folder, 5000)
+    file = cut(folder, 7000)
     damaged = file.read_bytes()
     (kept,) = recover(folder).kept
     assert kept.read_bytes() == damaged
