@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8, ContactLaw
+from conveyor_sim.engine.arrays import F8, ContactLaw, RailContacts, World
+from conveyor_sim.engine.contact_list import BOTTLE_BOTTLE, closed_contacts
 from conveyor_sim.model import Model
 
 
@@ -23,6 +24,32 @@ def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int
         for index in np.flatnonzero(law.curve[entries] >= 0):
             stored[index] += _area(model, int(law.curve[entries[index]]), float(overlap[index]))
     return stored
+
+
+def energy_and_depth(model: Model, world: World, found: RailContacts) -> tuple[float, float]:
+    """Elastic energy of all contacts of the present state (J), and the deepest overlap over a radius.
+
+    Tangential springs are not counted. found: scratch.
+    """
+    kind, (a, b), values = closed_contacts(world, found)
+    if not kind.size:
+        return 0.0, 0.0
+    overlap, types = values[4], world.bottles.type.astype(np.int64)
+    pairs = kind == BOTTLE_BOTTLE
+    entries = types[a[pairs]] * len(model.bottle_types) + types[b[pairs]]
+    energy = elastic_energy(model, model.pair_law, entries, overlap[pairs]).sum()
+    entries = rail_entries(model, types[a[~pairs]], b[~pairs])
+    energy += elastic_energy(model, model.rail_law, entries, overlap[~pairs]).sum()
+    smaller = world.bottles.radius[a]
+    smaller[pairs] = np.minimum(smaller[pairs], world.bottles.radius[b[pairs]])
+    return float(energy), float((overlap / smaller).max())
+
+
+def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Entries in `Model.rail_law` of contacts of bottle types with rails, (n,)."""
+    materials = sorted({rail.material for rail in model.rail_shapes})
+    material_of = np.array([materials.index(rail.material) for rail in model.rail_shapes], dtype=np.int64)
+    return types * len(materials) + material_of[rails]
 
 
 def _area(model: Model, curve: int, overlap: float) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from conveyor_sim.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
 from conveyor_sim.energy_account import EnergyAccount
 from conveyor_sim.engine.arrays import F8
-from conveyor_sim.engine.contact_list import list_contacts
+from conveyor_sim.engine.contact_list import closed_contacts
 from conveyor_sim.engine.footing import find_carriers, refresh_footing
 from conveyor_sim.guard import GuardEvent
 from conveyor_sim.integration import Integration
@@ -247,15 +247,8 @@ class Simulation:
 
     def contacts(self) -> ContactColumns:
         """Every closed contact at this tick, with the forces that act now."""
-        room = 64
-        while True:
-            kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
-            count = list_contacts(self._state.world, self._integration.found, kind, ends[0], ends[1], values)
-            if count <= room:
-                break
-            room = count
+        kind, ends, values = closed_contacts(self._state.world, self._integration.found)
         ids = self._state.world.bottles.id
-        kind, ends, values = kind[:count], ends[:, :count], values[:, :count]
         b = np.where(kind == 0, ids[np.where(kind == 0, ends[1], 0)], ends[1])
         return ContactColumns(kind, ids[ends[0]].astype(np.uint64), b.astype(np.uint64), *values)
 

@@ -91,7 +91,7 @@ def test_the_little_line_is_busy(reference: Simulation) -> None:
     assert sim.counts.removed > 5
     off = {choice.name for choice in sim.model.effects if not choice.on}
     others = {"hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction"}
-    assert off == others | {"tangential_spring", "ring_base", "peaks", "contact_arrays"}
+    assert off == others | {"tangential_spring", "ring_base", "peaks", "contact_arrays", "energy_ledger"}
     assert [outcome.source for outcome in sim.take_outcomes()][-1] == "watchdog"
 
 
@@ -247,12 +247,12 @@ def test_a_time_step_that_blows_up_is_told() -> None:
         tick=0.1,
         accuracy={"per_tick": 1},
         bottle_types={"bottle": kind(mass=1e-9)},
-        contacts=[contact(1e308, "steel")],
+        contacts=[contact(1e20, "steel")],
         rails={"rail": segment((2.0 * RADIUS, -1.0), (2.0 * RADIUS, 1.0))},
         floor="none",
         bottles=[bottle(0.0, 0.0, 1.0)],
     )
-    with pytest.raises(SimulationError, match=r"bottle 0 has no finite position .* choose a finer accuracy"):
+    with pytest.raises(SimulationError, match=r"bottle 0 .* in the tick that began at 0 s .*, even in steps 64 times"):
         sim.advance(5)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conveyor_sim.elastic import elastic_energy
+from conveyor_sim.elastic import elastic_energy, rail_entries
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.model import Model
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
@@ -26,9 +26,7 @@ def energies(model: Model, bottles: BottleColumns, contacts: ContactColumns) -> 
     half = 0.5 * elastic_energy(model, model.pair_law, entries, contacts.overlap[pairs])
     np.add.at(energy, a, half)
     np.add.at(energy, b, half)
-    materials = sorted({rail.material for rail in model.rail_shapes})
-    material_of = np.array([materials.index(rail.material) for rail in model.rail_shapes], dtype=np.int64)
     a, rails = first[~pairs], contacts.b[~pairs].astype(np.int64)
-    entries = kinds[a].astype(np.int64) * len(materials) + material_of[rails]
+    entries = rail_entries(model, kinds[a].astype(np.int64), rails)
     np.add.at(energy, a, elastic_energy(model, model.rail_law, entries, contacts.overlap[~pairs]))
     return np.asarray(energy)

@@ -143,3 +143,14 @@ def _write(
     values[4, c] = overlap
     values[5, c] = normal
     values[6, c] = tangential
+
+
+def closed_contacts(world: World, found: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
+    """Every closed contact of the present state as `list_contacts` has it: kind (C,), ends (2, C), values (7, C)."""
+    room = 64
+    while True:
+        kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
+        count = list_contacts(world, found, kind, ends[0], ends[1], values)
+        if count <= room:
+            return kind[:count], ends[:, :count], values[:, :count]
+        room = count

@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from conveyor_sim.engine.arrays import RailContacts
+from conveyor_sim.elastic import energy_and_depth
+from conveyor_sim.engine.arrays import Bottles, RailContacts, Spin
 from conveyor_sim.engine.compile import entry
 from conveyor_sim.engine.watch import look
 from conveyor_sim.guard.memory import Memory
@@ -21,7 +22,7 @@ SOFT = 0.2
 """Overlap over the radius from which it is told: places and gaps are wrong by as much."""
 
 CLOSELY = 128
-"""Steps after which overlaps and energy are looked at again at the latest; a close look costs about half a step."""
+"""Steps after which overlaps are looked at again at the latest; that costs about half a step."""
 
 
 class Guard:
@@ -34,7 +35,6 @@ class Guard:
         self._found = found
         self._memory = Memory()
         self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
-        self._closely = False
         sprung = any(
             law is not None and law.tangential_stiffness is not None
             for law in (self._model.pair_law, self._model.rail_law)
@@ -44,9 +44,10 @@ class Guard:
         self._friction = 0.0 if self._model.base_friction is None else tick * float(self._model.base_friction.max())
         # Bottles that move within the slip limit have no energy worth the name.
         self._noise = 0.5 * slip**2 / self._model.gravity if self._model.gravity > 0.0 else 0.0
+        self._something_there = self._model.pair_law is not None or self._model.rail_law is not None
         self._kinetic = 0.0
         self._work = 0.0
-        self._entry: Any = entry(look, state.world, found, True)
+        self._look: Any = self._compile
         self._soft: Violation | None = None
         self.deepest = 0.0
 
@@ -57,15 +58,16 @@ class Guard:
         """
         model, world = self._model, self._state.world
         self._memory.keep(world)
-        self._closely = tick % self._every == 0
-        bad, _, _, weight, self._kinetic, _ = self._entry(world, self._found, False)
+        if tick % self._every == 0:
+            world.watch.due[0] = 1
+        bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
         self._work = weight * (self._friction * surface_speed + self._noise)
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
         """What is wrong with the state at the end of a tick, reached in steps of dt (s); it is put back then."""
         world, model = self._state.world, self._model
-        bad, fastest, square, _, kinetic, _ = self._entry(world, self._found, self._closely)
+        bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
         deep = float(world.watch.depth[0]), float(world.watch.depth[1])
         self._forget()
         if bad >= 0:
@@ -73,7 +75,7 @@ class Guard:
         if fastest < 0:
             return None
         speed = math.sqrt(square)
-        if speed * dt > model.settings.skin:
+        if self._something_there and speed * dt > model.settings.skin:
             return self._put_back().far(fastest, speed, dt)
         if kinetic > self._growth * self._kinetic + self._work and (energies := self._grown()):
             return self._put_back().energy(fastest, *energies, self._work)
@@ -124,17 +126,21 @@ class Guard:
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.keep(self._state.world)
         self._put_back()
-        self._entry(self._state.world, self._found, True)
-        deep = float(self._state.world.watch.depth.max()) > DEEPEST
+        _, deep = energy_and_depth(self._model, self._state.world, self._found)
         after.put_back(self._state)
-        self._forget()
         watch.bottle[:], watch.other[:] = bottle, other
-        return deep
+        return deep > DEEPEST
 
     def _energy(self) -> float:
-        *_, kinetic, elastic = self._entry(self._state.world, self._found, True)
-        self._forget()
+        world = self._state.world
+        *_, kinetic = self._look(world.bottles, world.spin)
+        elastic, _ = energy_and_depth(self._model, world, self._found)
         return float(kinetic + elastic)
+
+    def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
+        """Look for the first time."""
+        self._look = entry(look, bottles, spin)
+        return self._look(bottles, spin)
 
     def _put_back(self) -> Words:
         """Have the state as it was at the beginning of the tick, to find words for."""

@@ -24,7 +24,7 @@ def absent(of: Any) -> set[str]:
 def test_an_absent_effect_has_no_arrays() -> None:
     """One bottle, frictionless, alone: nothing to search, nothing to turn, nothing under it."""
     world = simulation(bottles=TWO[:1], **NO_FLOOR)._state.world
-    present = {"settings", "bottles", "load", "neighbourhood"}
+    present = {"settings", "bottles", "load", "neighbourhood", "watch"}
     assert set(world._fields) - absent(world) == present
     assert absent(world.load) == {"normal_max", "normal_sum"}
     two = simulation(bottles=TWO, contacts=GLASS, belts={"one": belt(0.1)}, base=base(0.4))._state.world

@@ -78,7 +78,7 @@ def test_the_number_may_change_from_tick_to_tick() -> None:
     given = crowd()
     one, other = Simulation(given, threads=1), Simulation(given, threads=3)
     one.advance(9)
-    crew, sizes = other._crew, [1, 3, 2, 2, 1, 3, 1, 2, 3]
+    crew, sizes = other._integration._crew, [1, 3, 2, 2, 1, 3, 1, 2, 3]
     for size in sizes:
         steps = other.model.steps_per_tick
         other._apply_commands()
@@ -103,7 +103,7 @@ def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
         return 0
 
     sim = Simulation(crowd(), threads=2)
-    crew, world = sim._crew, sim._state.world
+    crew, world = sim._integration._crew, sim._state.world
     crew._entries[failing] = failing
     with pytest.raises(ArithmeticError, match="rank 1"):
         crew.advance(2, failing, world, 1, 1e-5, 0)
@@ -117,9 +117,9 @@ def test_a_process_of_another_number_has_threads_of_its_own() -> None:
     """A fork copies queues, not threads: a crew that finds itself in a child must not wait for those of the parent."""
     sim, other = Simulation(crowd(), threads=2), Simulation(crowd(), threads=1)
     sim.advance(2)
-    tasks = list(sim._crew._tasks)
-    sim._crew._process = -1  # as a child sees it
+    tasks = list(sim._integration._crew._tasks)
+    sim._integration._crew._process = -1  # as a child sees it
     sim.advance(1)
-    assert sim._crew._tasks[0] is not tasks[0]
+    assert sim._integration._crew._tasks[0] is not tasks[0]
     other.advance(3)
     assert sim.state_hash() == other.state_hash()
