@@ -73,6 +73,10 @@ class Integration:
         self._chatters, self.shortened_ticks = memory["chatters"], memory["shortened_ticks"]
         self._guard.deepest = memory["deepest"]
 
+    def put_in(self) -> None:
+        """Bottles were put somewhere from outside."""
+        self._guard.put_in()
+
     def take_tick(self, tick: int, surface_speed: float) -> None:
         """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
         seconds = tick * self._model.tick_ns * 1e-9

@@ -195,6 +195,7 @@ class Simulation:
         self._actual[:] = other._actual
         self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
         self._state.take(other._state)
+        self._integration.put_in()
         self._set_surfaces()
         if self._account is not None:
             self._account.restart()
@@ -213,6 +214,7 @@ class Simulation:
                     column[slots] += change
             self._state.world.neighbourhood.stale[0] = 1
         self._state.make_lists()
+        self._integration.put_in()
 
     def due(self, output: str) -> bool:
         """Whether this tick is one at which an output (`Scene.TOPICS`) is made."""

@@ -49,6 +49,7 @@ class Guard:
         self._work = 0.0
         self._look: Any = self._compile
         self._soft: Violation | None = None
+        self._put_in = False
         self.deepest = 0.0
 
     def begin(self, tick: int, surface_speed: float) -> Violation | None:
@@ -80,8 +81,9 @@ class Guard:
         if kinetic > self._growth * self._kinetic + self._work and (energies := self._grown()):
             return self._put_back().energy(fastest, *energies, self._work)
         depth = max(deep)
-        if depth > DEEPEST and self._was_deep():
+        if self._put_in and depth > DEEPEST and self._was_deep():
             return None
+        self._put_in = self._put_in and depth == 0.0
         if depth > SOFT >= self.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.watch.bottle[worst]), int(world.watch.other[worst])
@@ -92,6 +94,10 @@ class Guard:
             self._soft = found
         self.deepest = max(self.deepest, depth)
         return None
+
+    def put_in(self) -> None:
+        """Bottles were put somewhere from outside: what is deep by that may part."""
+        self._put_in = True
 
     def soft(self, tick: int) -> GuardEvent | None:
         """A contact that is too soft for what it bears, told once, at a tick."""
