@@ -82,7 +82,7 @@ def test_the_number_may_change_from_tick_to_tick() -> None:
     for size in sizes:
         steps = other.model.steps_per_tick
         other._apply_commands()
-        assert crew.advance(size, other._advance, other._state.world, steps, other.model.dt, 0) == steps
+        assert crew.advance(size, other._integration._advance, other._state.world, steps, other.model.dt, 0) == steps
         other.tick += 1
     assert other.state_hash() == one.state_hash()
 

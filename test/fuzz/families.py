@@ -96,7 +96,6 @@ CI_FAMILIES = (
         infeeds=True,
         outfeeds=True,
     ),
-    Family(integrator="velocity_verlet", elastic=("hertz",), damping=("tsuji",), rails=("segment",), infeeds=True),
     Family(
         elastic=("linear",),
         damping=("normal",),
