@@ -1,4 +1,4 @@
-"""Energy that contacts have taken up by their elastic laws."""
+"""Energy that contacts have taken up by their elastic laws, and how deep they are."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,23 +26,13 @@ def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int
     return stored
 
 
-def energy_and_depth(model: Model, world: World, found: RailContacts) -> tuple[float, float]:
-    """Elastic energy of all contacts of the present state (J), and the deepest overlap over a radius.
-
-    Tangential springs are not counted. found: scratch.
-    """
+def deepest_overlap(world: World, found: RailContacts) -> float:
+    """The deepest overlap of all contacts of the present state over the (smaller) radius. found: scratch."""
     kind, (a, b), values = closed_contacts(world, found)
-    if not kind.size:
-        return 0.0, 0.0
-    overlap, types = values[4], world.bottles.type.astype(np.int64)
     pairs = kind == BOTTLE_BOTTLE
-    entries = types[a[pairs]] * len(model.bottle_types) + types[b[pairs]]
-    energy = elastic_energy(model, model.pair_law, entries, overlap[pairs]).sum()
-    entries = rail_entries(model, types[a[~pairs]], b[~pairs])
-    energy += elastic_energy(model, model.rail_law, entries, overlap[~pairs]).sum()
     smaller = world.bottles.radius[a]
     smaller[pairs] = np.minimum(smaller[pairs], world.bottles.radius[b[pairs]])
-    return float(energy), float((overlap / smaller).max())
+    return float((values[4] / smaller).max(initial=0.0))
 
 
 def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64]) -> NDArray[np.int64]:

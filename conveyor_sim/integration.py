@@ -65,17 +65,18 @@ class Integration:
             "chatters": self._chatters,
             "shortened_ticks": self.shortened_ticks,
             "deepest": self._guard.deepest,
+            "put_in": self._guard.has_put_in,
         }
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Take over what another one of the same Model remembered."""
         self._events = [GuardEvent(*event) for event in memory["events"]]
         self._chatters, self.shortened_ticks = memory["chatters"], memory["shortened_ticks"]
-        self._guard.deepest = memory["deepest"]
+        self._guard.deepest, self._guard.has_put_in = memory["deepest"], memory["put_in"]
 
     def put_in(self) -> None:
         """Bottles were put somewhere from outside."""
-        self._guard.put_in()
+        self._guard.has_put_in = True
 
     def take_tick(self, tick: int, surface_speed: float) -> None:
         """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
@@ -149,6 +150,7 @@ class Integration:
             state.make_lists()
             velocities.append(chatter.velocities_of(state.world))
         memory.put_back(state)
+        self._guard.forget()
         amplitude = chatter.chatter_of(np.array(velocities))
         amplitude[state.world.bottles.id < 0] = 0.0
         worst = int(np.argmax(amplitude))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import base, belt, contact, kind, line, polyline, scene
+from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, kind, line, polyline, scene
 
 from conveyor_sim.checkpoint import FORMAT, versions
 from conveyor_sim.engine.arrays import World
@@ -164,6 +164,26 @@ def test_saving_leaves_no_trace(tmp_path: Path) -> None:
     assert run(sim, 60, after_tick=lambda: sim.save(tmp_path / "checkpoint")) == run(reference, 60)
     assert everything(sim) == everything(reference)
     assert [file.name for file in tmp_path.iterdir()] == ["checkpoint"]
+
+
+def test_bottles_put_into_each_other_may_part_after_a_checkpoint_too(tmp_path: Path) -> None:
+    """The guard stops a run whose bottles come so deep by themselves."""
+    sim = Simulation(
+        scene(
+            accuracy={"per_tick": 200},
+            contacts=[contact(1e3, damping=("normal", 5.0))],
+            bottles=[bottle(0.0, 0.0), bottle(2.2 * RADIUS, 0.0)],
+            **NO_FLOOR,
+        )
+    )
+    sim.displace(np.array([0.0, -1.1 * RADIUS]), np.zeros(2))
+    sim.save(tmp_path / "checkpoint")
+    loaded = Simulation.load(tmp_path / "checkpoint")
+    for each in (sim, loaded):
+        each.advance(30)
+        assert each.deepest_overlap < 0.75
+        assert np.diff(each.bottles().x)[0] > 2.0 * RADIUS
+    assert loaded.state_hash() == sim.state_hash()
 
 
 BUILT_ANEW = {"scene", "model", "_state", "_every", "_centre_radius"}

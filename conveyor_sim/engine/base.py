@@ -12,7 +12,7 @@ from numba import uint64
 from .arrays import Bottles, Load, Settings
 from .compile import part
 from .friction import implicit_regularisation, regularisation
-from .ring import ring_means, ring_share, sum_over_ring
+from .ring import ring_means, ring_share, straddling_ring
 from .team import units
 
 
@@ -147,7 +147,7 @@ def _straddling(
         i = belts.uncertain.bottle[entry]
         if ring.radius[i] == 0.0:
             continue
-        fx, fy, moment = sum_over_ring(
+        fx, fy, moment = straddling_ring(
             i,
             belts,
             surface,

@@ -88,33 +88,13 @@ def straddling_ring(
     weight: float,
     kind: int,
     slip_limit: float,
+    powers: Any,
 ) -> tuple[float, float, float]:
     """Force (N, x and y) and moment about the axis (N m) on a ring whose points may stand on different belts.
 
     i: the bottle, whose candidate belts are listed; kind: its type. x, y: m, vx, vy: m/s, omega: rad/s, of its axis.
-    radius: R_b, m. weight: m g, N.
+    radius: R_b, m. weight: m g, N. powers: (units, H + 1), W, the power of each belt is added to it; or None.
     """
-    return sum_over_ring(i, belts, surface, floor, x, y, vx, vy, omega, radius, weight, kind, slip_limit, None)
-
-
-@part
-def sum_over_ring(
-    i: int,
-    belts: Any,
-    surface: Any,
-    floor: int,
-    x: float,
-    y: float,
-    vx: float,
-    vy: float,
-    omega: float,
-    radius: float,
-    weight: float,
-    kind: int,
-    slip_limit: float,
-    powers: Any,
-) -> tuple[float, float, float]:
-    """As `straddling_ring`; adds the power (W) of each belt to powers, (units, H + 1), if it is not None."""
     squared = 0.25 * slip_limit * slip_limit
     fx = fy = moment = 0.0
     last_x, last_y = x + radius * _COS[POINTS - 1], y + radius * _SIN[POINTS - 1]

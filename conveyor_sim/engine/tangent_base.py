@@ -185,4 +185,5 @@ def _straddled(
         bottles.weight[i],
         bottles.type[i],
         settings.slip_limit,
+        None,
     )

@@ -3,9 +3,12 @@
 import math
 from typing import Any
 
-from conveyor_sim.elastic import energy_and_depth
+import numpy as np
+
+from conveyor_sim.elastic import deepest_overlap
 from conveyor_sim.engine.arrays import Bottles, RailContacts, Spin
 from conveyor_sim.engine.compile import entry
+from conveyor_sim.engine.stored_energy import find_stored_energy
 from conveyor_sim.engine.watch import look
 from conveyor_sim.guard.memory import Memory
 from conveyor_sim.guard.violation import GuardEvent, Violation, Words
@@ -14,9 +17,8 @@ from conveyor_sim.state import State
 DEEPEST = 0.75
 """Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""
 
-GROWTH, GROWTH_WITH_SPRINGS = 2.0, 4.0
-"""Of kinetic and elastic energy in a tick, what belts do apart: explicit methods swing by less in a contact that they
-can follow. Tangential springs are not counted, and may give back as much again."""
+GROWTH = 2.0
+"""Of all energy in a tick, what belts do apart: explicit methods swing by less in a contact that they can follow."""
 
 SOFT = 0.2
 """Overlap over the radius from which it is told: places and gaps are wrong by as much."""
@@ -26,7 +28,11 @@ CLOSELY = 128
 
 
 class Guard:
-    """Looks at a State before and after every tick. `deepest`: the largest overlap over a radius so far."""
+    """Looks at a State before and after every tick.
+
+    has_put_in: bottles were put somewhere from outside, and what is deep by that may part. deepest: the largest overlap
+    over a radius so far.
+    """
 
     def __init__(self, state: State, found: RailContacts) -> None:
         """found: scratch of the thread that calls."""
@@ -35,11 +41,6 @@ class Guard:
         self._found = found
         self._memory = Memory()
         self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
-        sprung = any(
-            law is not None and law.tangential_stiffness is not None
-            for law in (self._model.pair_law, self._model.rail_law)
-        )
-        self._growth = GROWTH_WITH_SPRINGS if sprung else GROWTH
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
         self._friction = 0.0 if self._model.base_friction is None else tick * float(self._model.base_friction.max())
         # Bottles that move within the slip limit have no energy worth the name.
@@ -49,7 +50,7 @@ class Guard:
         self._work = 0.0
         self._look: Any = self._compile
         self._soft: Violation | None = None
-        self._put_in = False
+        self.has_put_in = False
         self.deepest = 0.0
 
     def begin(self, tick: int, surface_speed: float) -> Violation | None:
@@ -70,7 +71,7 @@ class Guard:
         world, model = self._state.world, self._model
         bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
         deep = float(world.watch.depth[0]), float(world.watch.depth[1])
-        self._forget()
+        self.forget()
         if bad >= 0:
             return self._put_back().not_finite(bad)
         if fastest < 0:
@@ -78,12 +79,13 @@ class Guard:
         speed = math.sqrt(square)
         if self._something_there and speed * dt > model.settings.skin:
             return self._put_back().far(fastest, speed, dt)
-        if kinetic > self._growth * self._kinetic + self._work and (energies := self._grown()):
+        if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
             return self._put_back().energy(fastest, *energies, self._work)
         depth = max(deep)
-        if self._put_in and depth > DEEPEST and self._was_deep():
+        if self.has_put_in and depth > DEEPEST and self._was_deep():
             return None
-        self._put_in = self._put_in and depth == 0.0
+        # Until overlaps are seen that are not too deep.
+        self.has_put_in = self.has_put_in and depth == 0.0
         if depth > SOFT >= self.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.watch.bottle[worst]), int(world.watch.other[worst])
@@ -95,9 +97,10 @@ class Guard:
         self.deepest = max(self.deepest, depth)
         return None
 
-    def put_in(self) -> None:
-        """Bottles were put somewhere from outside: what is deep by that may part."""
-        self._put_in = True
+    def forget(self) -> None:
+        """What was seen of overlaps since the last tick."""
+        self._state.world.watch.depth[:] = 0.0
+        self._state.world.watch.due[0] = 0
 
     def soft(self, tick: int) -> GuardEvent | None:
         """A contact that is too soft for what it bears, told once, at a tick."""
@@ -124,7 +127,7 @@ class Guard:
         self._put_back()
         before = self._energy()
         after.put_back(self._state)
-        return (before, total) if total > self._growth * before + self._work else None
+        return (before, total) if total > GROWTH * before + self._work else None
 
     def _was_deep(self) -> bool:
         """Whether bottles were put in so deep before the tick: they may part."""
@@ -132,16 +135,15 @@ class Guard:
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.keep(self._state.world)
         self._put_back()
-        _, deep = energy_and_depth(self._model, self._state.world, self._found)
+        deep = deepest_overlap(self._state.world, self._found)
         after.put_back(self._state)
         watch.bottle[:], watch.other[:] = bottle, other
         return deep > DEEPEST
 
     def _energy(self) -> float:
-        world = self._state.world
-        *_, kinetic = self._look(world.bottles, world.spin)
-        elastic, _ = energy_and_depth(self._model, world, self._found)
-        return float(kinetic + elastic)
+        energy = np.zeros(3)
+        find_stored_energy(self._state.world, self._found, energy)
+        return float(energy.sum())
 
     def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
         """Look for the first time."""
@@ -151,9 +153,5 @@ class Guard:
     def _put_back(self) -> Words:
         """Have the state as it was at the beginning of the tick, to find words for."""
         self._memory.put_back(self._state)
-        self._forget()
+        self.forget()
         return Words(self._model, self._state.world)
-
-    def _forget(self) -> None:
-        self._state.world.watch.depth[:] = 0.0
-        self._state.world.watch.due[0] = 0

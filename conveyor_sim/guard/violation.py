@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from conveyor_sim.elastic import elastic_energy
+from conveyor_sim.elastic import elastic_energy, rail_entries
 from conveyor_sim.engine.arrays import ContactLaw, World
 from conveyor_sim.model import Model
 
@@ -101,8 +101,7 @@ class Words:
         """A bottle that has sunk too deep into a rail; depth: over the radius."""
         model, bottles, kind = self._model, self._bottles, int(self._bottles.type[slot])
         shape = model.rail_shapes[rail]
-        materials = sorted({other.material for other in model.rail_shapes})
-        entry = kind * len(materials) + materials.index(shape.material)
+        entry = int(rail_entries(model, np.array([kind]), np.array([rail]))[0])
         speed = float(np.hypot(bottles.vx[slot], bottles.vy[slot]))
         what = f"bottle {self._id(slot)} sinks {depth:.2g} of its radius into rail {shape.name}"
         radius, mass = float(model.type_radius[kind]), float(model.type_mass[kind])

@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
+from page_parts import with_parts
 
 from conveyor_sim.accuracy.candidates import preset_setting
 from conveyor_sim.accuracy.files import STUDY, read_study
@@ -68,13 +69,7 @@ def page(text: str) -> str:
     }
     parts = {"presets": table(), "answers": answers(studies), "promises": promises(studies)}
     parts |= {name: section(name, study) for name, study in studies.items()}
-    for name, part in parts.items():
-        before, start, rest = text.partition(f"<!-- study: {name} -->\n")
-        _, end, after = rest.partition(f"<!-- end: {name} -->")
-        if not end:
-            raise ValueError(f"{PAGE}: expected the markers <!-- study: {name} --> and <!-- end: {name} -->")
-        text = f"{before}{start}\n{part.strip()}\n\n{end}{after}"
-    return text
+    return with_parts(PAGE, text, parts)
 
 
 def section(name: str, study: Study) -> str:

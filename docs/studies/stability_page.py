@@ -15,6 +15,7 @@ from hard_cases.measures import run
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.patches import Circle
+from page_parts import with_parts
 from stability_limits import LEAST, MOST
 
 from conveyor_sim.model import Model, build_model
@@ -59,13 +60,7 @@ def page(text: str, folder: Path) -> str:
         "guard": guard(read(folder / "guard.csv")),
         "hour": hour(read(folder / "hour.csv"), read(folder / "denormals.csv")),
     }
-    for name, part in parts.items():
-        before, start, rest = text.partition(f"<!-- study: {name} -->\n")
-        _, end, after = rest.partition(f"<!-- end: {name} -->")
-        if not end:
-            raise ValueError(f"stability.md: expected the markers <!-- study: {name} --> and <!-- end: {name} -->")
-        text = f"{before}{start}\n{part.strip()}\n\n{end}{after}"
-    return text
+    return with_parts(Path("docs/stability.md"), text, parts)
 
 
 def guard(lines: Sequence[Line]) -> str:

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
 from types import ModuleType
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from study_page import load_study
 
 
 @pytest.fixture(scope="module")
 def studies() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("page", ROOT / "docs" / "studies" / "accuracy.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return load_study("accuracy")
 
 
 def test_the_page_is_that_of_its_studies(studies: ModuleType) -> None:
@@ -29,5 +21,5 @@ def test_the_page_is_that_of_its_studies(studies: ModuleType) -> None:
 
 
 def test_a_page_without_a_marker_is_refused(studies: ModuleType) -> None:
-    with pytest.raises(ValueError, match="expected the markers <!-- study: presets -->"):
+    with pytest.raises(ValueError, match=r"accuracy\.md: expected the markers <!-- study: presets -->"):
         studies.page("# Nothing\n")

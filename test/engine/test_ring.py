@@ -99,7 +99,7 @@ def field(speeds: list[float], friction: list[float], turn: Any = None) -> Surfa
 def drag(belts: Belts, surface: Surface, x: float, y: float, vx: float, vy: float, omega: float) -> NDArray[np.float64]:
     """Force over mu m g, and moment over mu m g R_b."""
     floor = len(surface.ux) - 1
-    force = straddling_ring(0, belts, surface, floor, x, y, vx, vy, omega, RADIUS, WEIGHT, 0, LIMIT)
+    force = straddling_ring(0, belts, surface, floor, x, y, vx, vy, omega, RADIUS, WEIGHT, 0, LIMIT, None)
     return np.array(force) / (MU * WEIGHT) / [1.0, 1.0, RADIUS]
 
 

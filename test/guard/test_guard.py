@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -194,6 +195,33 @@ def test_chatter_is_told_where_it_shakes_more_than_a_quarter_of_the_limit(of_bou
         share = float(re.search(r"shakes by (\S+) of slip_limit at every step", events[0].text)[1])  # type: ignore[index]
         assert share == pytest.approx(2.0 * (1.0 - 1.0 / of_bound), abs=0.01)
         assert (events[0].kind, events[0].bottle) == ("chatter", 0)
+
+
+def test_listening_for_chatter_leaves_no_trace() -> None:
+    """Steps on a trial, springs stretched and the ledger open, are taken back whole."""
+    sprung = {"friction": 0.5, "tangential": {"stiffness": 3000.0, "damping": 0.2}}
+    runs = []
+    for every in (0, 3):
+        sim = simulation(
+            contacts=[contact(5e3, **sprung), contact(2e4, "steel", **sprung)],
+            base=base(0.4),
+            belts={"belt": belt(0.3)},
+            rails={**STOP, "side": segment((-2.0, 1.04 * RADIUS), (0.6, 1.04 * RADIUS))},
+            bottles=[bottle(0.6 - (2 * i + 1.05) * RADIUS, 0.002 * (i % 2)) for i in range(5)],
+            outputs={**NO_OUTPUTS, "ledger": 100},
+        )
+        assert sim._integration._listening > 0
+        sim._integration._listening = every
+        hashes = []
+        for _ in range(30):
+            sim.advance()
+            hashes.append(sim.state_hash())
+        ledger = sim.ledger()
+        assert ledger is not None
+        books = [np.asarray(value).tobytes() for value in astuple(ledger)]
+        runs.append((sim._state.springs(), hashes, books, sim.deepest_overlap))
+    assert runs[0] == runs[1]
+    assert len(runs[0][0]) > 4 * 16  # a spring takes 16 bytes
 
 
 def test_a_driven_line_has_nothing_to_tell() -> None:

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from study_page import load_study
 
 
 @pytest.fixture(scope="module")
 def studies() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("stability", ROOT / "docs" / "studies" / "stability.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    before = list(sys.path)
-    specification.loader.exec_module(module)
-    sys.path[:] = before
-    return module
+    return load_study("stability")
 
 
 def test_the_page_is_that_of_its_studies(studies: ModuleType) -> None:
@@ -31,5 +20,5 @@ def test_the_page_is_that_of_its_studies(studies: ModuleType) -> None:
 
 
 def test_a_page_without_a_marker_is_refused(studies: ModuleType) -> None:
-    with pytest.raises(ValueError, match="expected the markers <!-- study: summary -->"):
+    with pytest.raises(ValueError, match=r"stability\.md: expected the markers <!-- study: summary -->"):
         studies.page("# Nothing\n", studies.FOLDER)
