@@ -6,13 +6,11 @@ import numpy as np
 
 from conveyor_sim.engine.arrays import (
     F8,
-    Blocks,
     Bottles,
     ContactLaw,
     Footing,
     Implicit,
     Ledger,
-    Linear,
     Load,
     Near,
     NearSprings,
@@ -20,18 +18,15 @@ from conveyor_sim.engine.arrays import (
     PairParts,
     Pairs,
     PairSprings,
-    PairTangent,
     Peaks,
     Ring,
-    Slopes,
     Slots,
     Spin,
-    Stage,
     Surface,
-    Triple,
     Watch,
     World,
 )
+from conveyor_sim.engine.integrator_arrays import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
 from conveyor_sim.engine.ledger import BELTS
 from conveyor_sim.engine.slots import WIDTH

@@ -12,8 +12,9 @@ from typing import Any
 
 from numba import uint64
 
-from .arrays import Blocks, Bottles, Linear, Load, Member, Triple, World
+from .arrays import Bottles, Load, Member, World
 from .compile import part
+from .integrator_arrays import Blocks, Linear, Triple
 from .slots import sum_slots
 from .tangent_pairs import resist_pairs
 from .team import UNIT, share, wait_for_all

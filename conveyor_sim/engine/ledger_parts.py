@@ -9,9 +9,10 @@ from typing import Any
 
 from numba import uint64
 
-from .arrays import Bottles, ContactLaw, Ledger, Load, Member, Settings, Triple
+from .arrays import Bottles, ContactLaw, Ledger, Load, Member, Settings
 from .compile import part
 from .contact import drag_force, elastic_force
+from .integrator_arrays import Triple
 from .pairs import normal_and_overlap
 from .slots import sum_slots
 from .team import UNIT, share, units

@@ -3,10 +3,11 @@
 import math
 from typing import Any
 
-from .arrays import Blocks, Bottles, Settings
+from .arrays import Bottles, Settings
 from .base import relative_velocity
 from .compile import part
 from .friction import regularisation
+from .integrator_arrays import Blocks
 from .ring import ring_means, ring_share, straddling_ring
 from .tangent import DIFFERENCE, firmness, resistance
 from .team import units

@@ -5,8 +5,9 @@ from typing import Any
 
 from numba import uint64
 
-from .arrays import Blocks, Bottles, Linear, Member, Settings
+from .arrays import Bottles, Member, Settings
 from .compile import part
+from .integrator_arrays import Blocks, Linear
 from .pairs import normal_and_overlap
 from .slots import WIDTH
 from .tangent import contact_stiffness, linear_contact

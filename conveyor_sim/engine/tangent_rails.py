@@ -3,8 +3,9 @@
 from typing import Any
 
 from .arc import arc_contact
-from .arrays import Bottles, Linear, Load, RailContacts, Settings
+from .arrays import Bottles, Load, RailContacts, Settings
 from .compile import part
+from .integrator_arrays import Linear
 from .rails import find_rail_contacts, law_entry, rail_arm
 from .segment import segment_contact
 from .tangent import contact_stiffness, linear_contact

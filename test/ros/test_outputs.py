@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from conveyor_msgs.msg import Belts, Bottles, Contacts, Line, Signals
+from conveyor_msgs.msg import Belts, Bottles, Contacts, Ledger, Line, Signals
 from geometry_msgs.msg import PoseArray
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from ros.conftest import SMALL_LINE
@@ -18,6 +19,7 @@ from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.qos import QOS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.publishers import check_type
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -134,3 +136,26 @@ def test_a_type_built_from_another_definition_is_told(line: LineClient) -> None:
     check_type(line.node, publisher.topic_name, "std_msgs/msg/Float64", default_distro())
     with pytest.raises(ConveyorError, match="conveyor_msgs/msg/Bottles: the installed message package was built from"):
         check_type(line.node, publisher.topic_name, "conveyor_msgs/msg/Bottles", default_distro())
+
+
+def test_the_ledger_is_the_engines_where_it_is_asked_for(
+    start_node: Callable[..., Child], shared_node: Child, client: LineClient
+) -> None:
+    """The last test of the shared node, which keeps no ledger."""
+    with client.listen(Ledger, "ledger") as heard:
+        client.step(100)
+        client.step(100)
+        assert heard.messages == []
+        shared_node.stop()
+        node = start_node(**{"duration": 1000.0, "rates.ledger": 10.0})
+        message = at_tick_300(client, Ledger, "ledger")
+        assert {message.tick for message in heard.messages} >= {290, 300}
+        node.stop()
+    sim = Simulation(load_scene(SMALL_LINE, {"outputs": {"ledger": 10.0}}))
+    sim.command([FEEDER], [0.75])
+    sim.advance(300)
+    books = sim.ledger()
+    assert books is not None
+    for name, expected in vars(books).items():
+        assert np.array_equal(np.asarray(getattr(message, name)), expected), name
+    assert books.base_friction > 10.0 * abs(books.residual) > 0.0

@@ -16,12 +16,13 @@ from typing import Any
 
 from numba import uint64
 
-from ..arrays import Blocks, Bottles, Linear, Member, World
+from ..arrays import Bottles, Member, World
 from ..base import add_base_friction
 from ..compile import kernel, part
 from ..conjugate_gradients import LEAST, RELATIVE, begin_search, factor, kick_with_rest, largest_kick, search
 from ..footing import check_footing
 from ..forces import bottle_forces, pack_all, pair_phase
+from ..integrator_arrays import Blocks, Linear
 from ..ledger import book, note_powers
 from ..motion import accumulate_peaks, lists_hold, settle, watch_rebuilt
 from ..rebuild import moved_too_far
