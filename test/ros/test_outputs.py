@@ -142,6 +142,9 @@ def test_the_ledger_is_the_engines_where_it_is_asked_for(
     start_node: Callable[..., Child], shared_node: Child, client: LineClient
 ) -> None:
     """The last test of the shared node, which keeps no ledger."""
+    sim = Simulation(load_scene(SMALL_LINE, {"outputs": {"ledger": 10.0}}))  # compiles what the node is to read
+    sim.command([FEEDER], [0.75])
+    sim.advance(300)
     with client.listen(Ledger, "ledger") as heard:
         client.step(100)
         client.step(100)
@@ -151,9 +154,6 @@ def test_the_ledger_is_the_engines_where_it_is_asked_for(
         message = at_tick_300(client, Ledger, "ledger")
         assert {message.tick for message in heard.messages} >= {290, 300}
         node.stop()
-    sim = Simulation(load_scene(SMALL_LINE, {"outputs": {"ledger": 10.0}}))
-    sim.command([FEEDER], [0.75])
-    sim.advance(300)
     books = sim.ledger()
     assert books is not None
     for name, expected in vars(books).items():
