@@ -167,7 +167,7 @@ def _slopes(stages: int, slots: int, peaks: bool) -> Slopes:
         alpha=of_stages(),
         normal=of_stages() if peaks else None,
         error=np.zeros(slots),
-        progress=np.zeros(3),
+        progress=np.zeros(4),
     )
 
 

@@ -45,7 +45,7 @@ class Slopes(NamedTuple):
     error: F8
     """(S,), m/s, of a substep."""
     progress: F8
-    """(3,), what a call that is interrupted leaves for the next one."""
+    """(4,), what a call that is interrupted leaves for the next one."""
 
 
 class Blocks(NamedTuple):

@@ -11,7 +11,7 @@ from conveyor_sim.engine.arrays import F8, World
 EXPLICIT = frozenset({"semi_implicit_euler", "velocity_verlet", "rk4"})
 """The integrators that chatter; the others solve for friction, or look at their errors."""
 
-EVERY = 32768
+EVERY = 262144
 """Steps between two times that are listened to; each costs as much as about a hundred steps of a hundred bottles."""
 
 STEPS = 8

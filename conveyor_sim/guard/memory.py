@@ -1,6 +1,7 @@
 """A copy of all that moves, to go back to."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +15,48 @@ class Memory:
 
     def __init__(self) -> None:
         self._world: World | None = None
-        self._columns: list[NDArray[np.generic]] = []
-        self._kept: list[NDArray[np.generic]] = []
+        self._groups: list[_Group] = []
 
     def keep(self, world: World) -> None:
         """Take a copy, in place of the one before."""
         if world is not self._world:
-            self._world, self._columns = world, list(_moving(world))
-            self._kept = [column.copy() for column in self._columns]
-            return
-        for column, kept in zip(self._columns, self._kept, strict=True):
-            np.copyto(kept, column)
+            self._world, self._groups = world, _groups(list(_moving(world)))
+        for group in self._groups:
+            # One call for all of them: each would cost as much by itself.
+            np.concatenate(group.columns, out=group.kept)
 
     def put_back(self, state: State) -> None:
         """Have a State as it was kept; no bottle may have come or gone since."""
-        # Lists may have been lengthened since, never shortened.
-        for column, kept in zip(_moving(state.world), self._kept, strict=True):
-            column[: kept.size] = kept
+        now = list(_moving(state.world))
+        for group in self._groups:
+            for place, kept in zip(group.places, np.split(group.kept, group.ends), strict=True):
+                # Lists may have been lengthened since, never shortened.
+                now[place].reshape(-1)[: kept.size] = kept
         state.world.neighbourhood.stale[0] = 1
         state.make_lists()
+
+
+@dataclass
+class _Group:
+    """Columns of one type, one behind the other."""
+
+    places: list[int]
+    """Among all that move."""
+    columns: list[NDArray[np.generic]]
+    """Flat."""
+    ends: NDArray[np.int64]
+    """Where each but the last ends."""
+    kept: NDArray[np.generic]
+
+
+def _groups(columns: list[NDArray[np.generic]]) -> list[_Group]:
+    groups = []
+    for kind in dict.fromkeys(column.dtype for column in columns):
+        places = [place for place, column in enumerate(columns) if column.dtype == kind]
+        flat = [columns[place].reshape(-1) for place in places]
+        ends = np.cumsum([column.size for column in flat])
+        groups.append(_Group(places, flat, ends[:-1], np.empty(int(ends[-1]), kind)))
+    return groups
 
 
 def _moving(world: World) -> Iterator[NDArray[np.generic]]:

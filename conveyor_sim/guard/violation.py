@@ -7,6 +7,7 @@ import numpy as np
 
 from conveyor_sim.elastic import elastic_energy, rail_entries
 from conveyor_sim.engine.arrays import ContactLaw, World
+from conveyor_sim.engine.integrators.dormand_prince import MOST
 from conveyor_sim.model import Model
 
 CAME_FAST = 0.5
@@ -69,7 +70,14 @@ class Words:
 
     def not_finite(self, slot: int) -> Violation:
         """A bottle that is not finite any more."""
-        return self._unstable(slot, f"bottle {self._id(slot)} has no finite position or velocity", self._too_long())
+        what = f"bottle {self._id(slot)} has no finite position or velocity"
+        if self._model.integrator != "dormand_prince":
+            return self._unstable(slot, what, self._too_long())
+        why = (
+            f"dormand_prince does not keep an error of {self._model.settings.error:g} m/s within {MOST:,} substeps "
+            "of a tick; allow a larger error or choose another integrator"
+        )
+        return self._unstable(slot, what, why, curable=False)
 
     def far(self, slot: int, speed: float, dt: float) -> Violation:
         """A bottle that moves too far in one step. speed: m/s."""

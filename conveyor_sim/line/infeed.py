@@ -69,7 +69,7 @@ class InfeedState:
                 self.blocked = self._late(time, pitch)
                 return False
             # Past one tick's travel the last bottle no longer pulls the in-line behind it.
-            ahead = min(ahead, advance)
+            ahead = self._way_to_rails(state, min(ahead, advance))
         if not self._enter(state, ahead):
             self.blocked = self._late(time, pitch)
             return False
@@ -84,6 +84,25 @@ class InfeedState:
         dx = float(state.world.bottles.x[slot[0]]) - self.infeed.position[0]
         dy = float(state.world.bottles.y[slot[0]]) - self.infeed.position[1]
         return dx * self.direction[0] + dy * self.direction[1]
+
+    def _way_to_rails(self, state: State, most: float) -> float:
+        """How far ahead of its place a bottle can be, up to `most` (m), before it meets a rail that stands there."""
+        radius, way = float(state.model.type_radius[self.kind]), 0.0
+        while way < most:
+            at = np.array([self._place(way)])
+            apart = [float(piece.distance(at)[0]) for rail in state.model.rail_shapes for piece in rail.pieces]
+            free = min(apart, default=math.inf) - radius
+            if free < CLEAR:
+                return way
+            way += free
+        return most
+
+    def _place(self, ahead: float) -> tuple[float, float]:
+        """Where the next bottle is, that far along the in-line, m."""
+        along, across = self.direction, (-self.direction[1], self.direction[0])
+        x = self.infeed.position[0] + ahead * along[0] + self.offset * across[0]
+        y = self.infeed.position[1] + ahead * along[1] + self.offset * across[1]
+        return x, y
 
     def _late(self, time: float, pitch: float) -> bool:
         if self.infeed.speed == 0.0:
@@ -103,16 +122,14 @@ class InfeedState:
         return True
 
     def _enter(self, state: State, ahead: float) -> bool:
-        along, across = self.direction, (-self.direction[1], self.direction[0])
-        x = self.infeed.position[0] + ahead * along[0] + self.offset * across[0]
-        y = self.infeed.position[1] + ahead * along[1] + self.offset * across[1]
+        x, y = self._place(ahead)
         bottles = state.world.bottles
         reach = bottles.radius + float(state.model.type_radius[self.kind]) - CLEAR
         near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < reach**2
         if bool((near & (bottles.id >= 0)).any()):
             return False
-        speed = self.infeed.speed
-        self.last = state.add(self.kind, x, y, 0.0, speed * along[0], speed * along[1], 0.0)
+        vx, vy = (self.infeed.speed * component for component in self.direction)
+        self.last = state.add(self.kind, x, y, 0.0, vx, vy, 0.0)
         self.fed += 1
         self._draw()
         return True

@@ -9,7 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, NO_FLOOR, NO_OUTPUTS, RADIUS, base, belt, bottle, contact, segment, simulation, stiffness_for
+from scenes import (
+    MASS,
+    NO_FLOOR,
+    NO_OUTPUTS,
+    RADIUS,
+    base,
+    belt,
+    bottle,
+    contact,
+    kind,
+    segment,
+    simulation,
+    stiffness_for,
+)
 
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.guard import GuardEvent
@@ -195,6 +208,26 @@ def test_chatter_is_told_where_it_shakes_more_than_a_quarter_of_the_limit(of_bou
         share = float(re.search(r"shakes by (\S+) of slip_limit at every step", events[0].text)[1])  # type: ignore[index]
         assert share == pytest.approx(2.0 * (1.0 - 1.0 / of_bound), abs=0.01)
         assert (events[0].kind, events[0].bottle) == ("chatter", 0)
+
+
+def test_a_scene_too_stiff_for_an_error_control_is_told_in_time() -> None:
+    """Friction of a press of 2 kN on 1 g within 0.1 um/s allows steps of some 1e-13 s: it would take for ever."""
+    sim = simulation(
+        accuracy={"integrator": "dormand_prince", "per_tick": 1, "error": 1e-9},
+        slip_limit=1e-7,
+        bottle_types={"bottle": kind(mass=1e-3)},
+        contacts=[contact(1e6, "steel", friction=1.0)],
+        rails={
+            "one": segment((-1.0, -RADIUS + 2e-3), (1.0, -RADIUS + 2e-3)),
+            "other": segment((-1.0, RADIUS - 2e-3), (1.0, RADIUS - 2e-3)),
+        },
+        bottles=[bottle(0.0, 0.5, 0.3, 0.0)],
+        **NO_FLOOR,
+    )
+    sim.displace(np.zeros(1), np.full(1, -0.5))
+    with pytest.raises(SimulationError, match="dormand_prince does not keep an error of 1e-09 m/s within 1,000,000"):
+        sim.advance()
+    assert sim.tick == 0
 
 
 def test_listening_for_chatter_leaves_no_trace() -> None:

@@ -76,6 +76,21 @@ def test_several_bottles_may_enter_in_one_tick() -> None:
     np.testing.assert_allclose(-np.diff(sim.bottles().x), 2.0 * RADIUS + 0.003, rtol=1e-9)
 
 
+def test_a_fast_in_line_does_not_put_a_bottle_into_a_rail_ahead() -> None:
+    """It moves 50 mm a tick, 45 mm beyond the place of the fifth one, and the stop leaves 35 mm."""
+    sim = infeed(
+        gap=0.025,
+        speed=5.0,
+        rails={"stop": segment((RADIUS + 0.035, -1.0), (RADIUS + 0.035, 1.0))},
+        outfeeds={"out": {"region": [[0.001, -0.1], [0.2, -0.1], [0.2, 0.1], [0.001, 0.1]]}},
+    )
+    sim.advance(3)
+    assert (sim.counts.fed, sim.counts.removed) == (1, 1)
+    sim.advance(1)
+    assert sim.bottles().id.tolist() == [1]
+    assert sim.bottles().x[0] == pytest.approx(0.035, abs=1e-8)
+
+
 def test_the_count_ends_it() -> None:
     sim = infeed(gap=0.001, count=4)
     sim.advance(400)

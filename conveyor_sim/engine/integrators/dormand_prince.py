@@ -70,18 +70,23 @@ FLOOR = 1e-9
 impact by then, and what is not a number must end."""
 
 
+MOST = 1_000_000
+"""Substeps of a call, those not taken among them: where it takes more, forces are too stiff for an explicit method."""
+
+
 @kernel
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds, each in substeps; return how many were finished (see the package's docstring).
 
-    What is not a number even in the shortest substep ends the call as if all were: the state is not finite then.
+    What is not a number even in the shortest substep, or takes more than MOST of them, ends the call as if all were
+    finished: the state is not finite then.
     """
     bottles, allowed = world.bottles, max(world.settings.error, LEAST)
     slopes: Any = world.slopes
     begin, stop = share(member, bottles.x.size)
-    stage, h, left = 0, dt, dt
+    stage, h, left, tried = 0, dt, dt, 0
     if phase == RESUME:
-        stage, h, left = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2]
+        stage, h, left, tried = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2], int(slopes.progress[3])
     taken = 0
     pack_all(world, member)
     while taken < steps:
@@ -99,12 +104,15 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
         if stage == LAST:
             wait_for_all(member)
             worst = _largest(slopes.error)
+            tried += 1
+            if tried > MOST:
+                worst, h = math.inf, 0.0
             if worst <= allowed or h <= FLOOR * dt:
                 for first in range(begin, stop, BLOCK):
                     end = min(first + BLOCK, stop)
                     _accept(world, slopes, h, first, end)
                     if worst == math.inf:
-                        _spoil(bottles, slopes.error, first, end)
+                        _spoil(bottles, slopes.error, first, end, tried > MOST)
                 left -= h
                 watch_rebuilt(world, member)
                 if left == 0.0:
@@ -126,7 +134,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             note_moved(world, member, first, end)
         if not lists_hold(world, member):
             if member.rank == 0:
-                slopes.progress[0], slopes.progress[1], slopes.progress[2] = stage, h, left
+                slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = stage, h, left, tried
             return taken
     return taken
 
@@ -194,8 +202,8 @@ def _accept(world: World, slopes: Any, h: float, first: int, end: int) -> None:
 
 
 @part
-def _spoil(bottles: Bottles, errors: Any, first: int, end: int) -> None:
-    """Leave no number as the speed of bottles whose forces were not finite, so that they are found."""
+def _spoil(bottles: Bottles, errors: Any, first: int, end: int, every: bool) -> None:
+    """Leave no number as the speed of bottles whose forces were not finite, or of every one, so that they are found."""
     for i in range(first, end):
-        if errors[i] == math.inf:
+        if every or errors[i] == math.inf:
             bottles.vx[i] = math.nan
