@@ -4,7 +4,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
+from conveyor_sim.engine.arrays import F8
 from conveyor_sim.scene.schema import Infeed
 from conveyor_sim.state import State
 
@@ -87,15 +89,30 @@ class InfeedState:
 
     def _way_to_rails(self, state: State, most: float) -> float:
         """How far ahead of its place a bottle can be, up to `most` (m), before it meets a rail that stands there."""
-        radius, way = float(state.model.type_radius[self.kind]), 0.0
-        while way < most:
-            at = np.array([self._place(way)])
-            apart = [float(piece.distance(at)[0]) for rail in state.model.rail_shapes for piece in rail.pieces]
-            free = min(apart, default=math.inf) - radius
-            if free < CLEAR:
-                return way
-            way += free
-        return most
+        radius = float(state.model.type_radius[self.kind])
+        ways = np.linspace(0.0, most, 2 + int(2.0 * most / radius))
+        clear = self._clear_of_rails(state, ways, radius)
+        if clear.all():
+            return most
+        # Rails that it only slides along do not hold it up.
+        first = int(np.argmin(clear))
+        low, high = float(ways[max(0, first - 1)]), float(ways[first])
+        while high - low > CLEAR:
+            middle = 0.5 * (low + high)
+            if self._clear_of_rails(state, np.array([middle]), radius)[0]:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _clear_of_rails(self, state: State, ways: F8, radius: float) -> NDArray[np.bool_]:
+        """Whether a bottle (of a radius, m) that far ahead of its place is in no rail; ways: (n,), m."""
+        places = np.array([self._place(float(way)) for way in ways])
+        clear = np.ones(ways.size, dtype=bool)
+        for rail in state.model.rail_shapes:
+            for piece in rail.pieces:
+                clear &= piece.distance(places) >= radius - CLEAR
+        return clear
 
     def _place(self, ahead: float) -> tuple[float, float]:
         """Where the next bottle is, that far along the in-line, m."""

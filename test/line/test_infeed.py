@@ -91,6 +91,15 @@ def test_a_fast_in_line_does_not_put_a_bottle_into_a_rail_ahead() -> None:
     assert sim.bottles().x[0] == pytest.approx(0.035, abs=1e-8)
 
 
+def test_rails_that_touch_an_in_line_do_not_change_its_gap() -> None:
+    """A lane as wide as a bottle: one enters as far ahead as the one before has pulled the in-line on."""
+    sides = {"left": segment((-1.0, RADIUS), (4.0, RADIUS)), "right": segment((-1.0, -RADIUS), (4.0, -RADIUS))}
+    sim = infeed(gap=0.003, rails=sides)
+    sim.advance(200)
+    np.testing.assert_allclose(-np.diff(sim.bottles().x), 2.0 * RADIUS + 0.003, rtol=1e-9)
+    assert sim.counts.fed > 4
+
+
 def test_the_count_ends_it() -> None:
     sim = infeed(gap=0.001, count=4)
     sim.advance(400)
