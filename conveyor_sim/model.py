@@ -12,7 +12,6 @@ from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, S
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws import build_laws
-from conveyor_sim.line.process_image import ProcessImage, process_image
 from conveyor_sim.plant import plant_grid, rail_arrays
 from conveyor_sim.prediction import Impact, Prediction
 from conveyor_sim.presets import target
@@ -60,7 +59,6 @@ class Model:
     """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
     belt_shapes: tuple[BeltShape, ...]
     rail_shapes: tuple[RailShape, ...]
-    process_image: ProcessImage
     settings: Settings
     pair_law: ContactLaw | None
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
@@ -129,9 +127,6 @@ def build_model(scene: Scene) -> Model:
         type_base_radius=laws.base_radius,
         belt_shapes=tuple(belts),
         rail_shapes=tuple(rails),
-        process_image=process_image(
-            [(name, *belt.speed_limits) for name, belt in scene.belts.items()], scene.infeeds, scene.outfeeds
-        ),
         settings=Settings(
             slip_limit=scene.slip_limit,
             lever=1.0 if scene.lever_arm == "overlap" else 0.0,

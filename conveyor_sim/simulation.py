@@ -1,11 +1,10 @@
 """`Simulation`: the one class that the node, the command line and the tests drive."""
 
-import copy
 import hashlib
 import math
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,18 +15,16 @@ from conveyor_sim.checkpoint import Checkpoint, damaged, read_checkpoint, write_
 from conveyor_sim.energy_account import EnergyAccount
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import closed_contacts
-from conveyor_sim.engine.footing import find_carriers, refresh_footing
+from conveyor_sim.engine.footing import refresh_footing
 from conveyor_sim.guard import GuardEvent
 from conveyor_sim.integration import Integration
-from conveyor_sim.line.commands import CommandOutcome, refusal
-from conveyor_sim.line.infeed import infeed_states
-from conveyor_sim.line.outfeed import outfeed_states
-from conveyor_sim.line.process_image import ProcessImage, speed_command
-from conveyor_sim.line.watchdog import Watchdog
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.line import FAULT, Line
+from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.part_memory import as_tuples, recall, remembered
+from conveyor_sim.part_memory import recall, remembered
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import FIRST_SLOTS, State
@@ -69,26 +66,16 @@ class Simulation:
         self._state = State(self.model, len(bottles) or FIRST_SLOTS)
         self._integration = Integration(self._state, threads, shorten)
         self._every = {output: scene.every(output) for output in scene.TOPICS}
-        self._pending: list[tuple[tuple[str, ...], tuple[float, ...], str]] = []
-        self._outcomes: list[CommandOutcome] = []
-        belts = list(scene.belts.values())
-        self._commanded = np.array([belt.speed for belt in belts])
-        self._actual = self._commanded.copy()
+        self._line = Line(scene, self._state)
         self._centre_radius = np.array(
             [shape.centre_radius if shape.kind == "curved" else math.inf for shape in self.model.belt_shapes]
         )
         self._outermost = np.array([shape.outermost for shape in self.model.belt_shapes])
-        self._watchdogs = {
-            index: Watchdog(max(1, math.ceil(belt.watchdog / scene.tick - 1e-9)))
-            for index, belt in enumerate(belts)
-            if belt.watchdog is not None
-        }
-        self._infeeds = infeed_states(scene.infeeds, self.model.bottle_types, scene.seed)
-        self._outfeeds = outfeed_states(scene.outfeeds)
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
         self._account: EnergyAccount | None = None
         self._feed()
+        self._line.end(self.tick)
         self._state.make_lists()
         self._set_surfaces()
         if self.model.has("energy_ledger"):
@@ -126,16 +113,16 @@ class Simulation:
     @property
     def process_image(self) -> ProcessImage:
         """Names, units and limits of signals and commands."""
-        return self.model.process_image
+        return self._line.image
 
     @property
     def counts(self) -> Counts:
         """Bottles fed, removed and present."""
         return Counts(
-            fed=sum(infeed.fed for infeed in self._infeeds.values()),
-            removed=sum(outfeed.removed for outfeed in self._outfeeds.values()),
+            fed=self._line.fed,
+            removed=self._line.removed,
             present=int((self._state.world.bottles.id >= 0).sum()),
-            blocked_ticks=sum(infeed.blocked_ticks for infeed in self._infeeds.values()),
+            blocked_ticks=self._line.blocked_ticks,
         )
 
     def advance(self, ticks: int = 1) -> None:
@@ -143,13 +130,15 @@ class Simulation:
         the state is that at its beginning then.
         """
         for _ in range(ticks):
-            self._apply_commands()
+            if self._line.begin(self.tick):
+                self._set_surfaces()
             peaks = self._state.world.peaks
             if peaks is not None and self.due("bottles"):
                 peaks.force[:] = 0.0
                 peaks.impulse[:] = 0.0
             self._integration.take_tick(self.tick, self._fastest_surface())
             self.tick += 1
+            self._line.end(self.tick)
             self._remove()
             self._feed()
             self._state.make_lists()
@@ -157,14 +146,23 @@ class Simulation:
     def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
         """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together.
 
-        What became of them is told by `take_outcomes`.
+        What became of them is told by `take_outcomes`. Raises ValueError for the source that faults have.
         """
-        self._pending.append((tuple(names), tuple(float(value) for value in values), source))
+        if source == FAULT:
+            raise ValueError(f"source: {source} given, expected another: faults are injected")
+        self._line.queue(names, values, source)
+
+    def inject(self, name: str, value: float) -> None:
+        """Queue a fault by name (`process_image.fault_names`), as `command` does; its source is "fault"."""
+        self._line.queue((name,), (value,), FAULT)
+
+    def refusal(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> str:
+        """Why the next tick would refuse inputs, "" if it would not. source: "fault" for faults."""
+        return self._line.refusal(names, values, source)
 
     def take_outcomes(self) -> list[CommandOutcome]:
         """What became of commands since the last call, in order."""
-        outcomes, self._outcomes = self._outcomes, []
-        return outcomes
+        return self._line.take_outcomes()
 
     def take_guard_events(self) -> list[GuardEvent]:
         """What the guard has to tell since the last call, in order."""
@@ -188,12 +186,10 @@ class Simulation:
     def take_state_of(self, other: "Simulation") -> None:
         """Take over the bottles, the time and the belts' speeds of another Simulation of the same line.
 
-        The scenes may differ in their effects and steps. Tangential springs start anew; watchdogs stay as they are.
+        The scenes may differ in their effects and steps. Tangential springs start anew.
         """
         self.tick = other.tick
-        self._commanded[:] = other._commanded
-        self._actual[:] = other._actual
-        self._infeeds, self._outfeeds = copy.deepcopy((other._infeeds, other._outfeeds))
+        self._line.take_over(other._line)
         self._state.take(other._state)
         self._integration.put_in()
         self._set_surfaces()
@@ -236,7 +232,7 @@ class Simulation:
             vx=world.bottles.vx[slots],
             vy=world.bottles.vy[slots],
             omega=spin.omega[slots] if spin is not None else rest,
-            belt=self._carriers()[slots],
+            belt=self._line.carriers()[slots],
             peak_force=world.peaks.force[slots] if world.peaks is not None else unknown,
             impulse=world.peaks.impulse[slots] if world.peaks is not None else unknown,
         )
@@ -256,7 +252,7 @@ class Simulation:
 
     def belts(self) -> BeltColumns:
         """Commanded and actual speeds, m/s."""
-        return BeltColumns(self._commanded.copy(), self._actual.copy())
+        return BeltColumns(self._line.now.setpoints.copy(), self._line.now.speeds.copy())
 
     def ledger(self) -> Ledger | None:
         """Where energy came from and went since the start; None without the effect `energy_ledger`."""
@@ -264,11 +260,7 @@ class Simulation:
 
     def signals(self) -> np.ndarray:
         """The process image's values, in the order of `process_image.signal_names`; float64."""
-        belts = len(self.model.belts)
-        on_belts = np.bincount(self._carriers()[self._slots()] + 1, minlength=belts + 1)[1:]
-        supply = [value for infeed in self._infeeds.values() for value in (infeed.fed, infeed.blocked)]
-        removed = [outfeed.removed for outfeed in self._outfeeds.values()]
-        return np.concatenate([self._actual, on_belts, supply, removed]).astype(np.float64)
+        return self._line.signals()
 
     def state_hash(self) -> int:
         """64 bits over tick, bottles and belts: equal if and (all but surely) only if the states are."""
@@ -276,29 +268,16 @@ class Simulation:
         digest = hashlib.blake2b(np.int64(self.tick).tobytes(), digest_size=8)
         for name in ("id", "type", "x", "y", "theta", "vx", "vy", "omega"):
             digest.update(getattr(bottles, name).tobytes())
-        digest.update(self._commanded.tobytes() + self._actual.tobytes() + self._state.springs())
+        digest.update(self._line.now.setpoints.tobytes() + self._line.now.speeds.tobytes() + self._state.springs())
         return int.from_bytes(digest.digest(), "little")
-
-    @property
-    def _parts(self) -> dict[str, Any]:
-        """What remembers something from tick to tick beside the State."""
-        return {
-            "watchdogs": self._watchdogs,
-            "infeeds": self._infeeds,
-            "outfeeds": self._outfeeds,
-            "account": self._account,
-        }
 
     def _memory(self) -> dict[str, Any]:
         """All that changes as it runs but the arrays of the World, as plain data."""
         return {
             "tick": self.tick,
             "next_id": self._state.next_id,
-            "pending": self._pending,
-            "outcomes": [astuple(outcome) for outcome in self._outcomes],
-            "commanded": self._commanded.tolist(),
-            "actual": self._actual.tolist(),
-            "parts": remembered(self._parts),
+            "line": self._line.memory(),
+            "account": None if self._account is None else remembered(self._account),
             "integration": self._integration.memory(),
         }
 
@@ -306,10 +285,9 @@ class Simulation:
         memory = checkpoint.memory
         try:
             self.tick = memory["tick"]
-            self._pending = list(as_tuples(memory["pending"]))
-            self._outcomes = [CommandOutcome(*told) for told in as_tuples(memory["outcomes"])]
-            self._commanded[:], self._actual[:] = memory["commanded"], memory["actual"]
-            recall(self._parts, memory["parts"])
+            self._line.go_on_from(self.tick, memory["line"])
+            if self._account is not None:
+                recall(self._account, memory["account"])
             self._integration.recall(memory["integration"])
             self._state.go_on_from(checkpoint.arrays, memory["next_id"])
         except (KeyError, AttributeError, TypeError, ValueError) as error:
@@ -320,59 +298,28 @@ class Simulation:
         slots = np.flatnonzero(ids >= 0)
         return slots[np.argsort(ids[slots], kind="stable")]
 
-    def _carriers(self) -> np.ndarray:
-        """Belt under each slot now, -1 for the floor."""
-        world = self._state.world
-        carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
-        if world.surface is not None:
-            find_carriers(world.bottles, world.belts, world.surface, carriers)
-        return np.where(carriers == len(self.model.belts), -1, carriers).astype(np.int32)
-
     def _remove(self) -> None:
-        if self.model.has("outfeed"):
+        if self._line.takes:
             with nullcontext() if self._account is None else self._account.removing():
-                for outfeed in self._outfeeds.values():
-                    outfeed.take(self._state)
+                self._line.take()
 
     def _feed(self) -> None:
-        if not self.model.has("infeed"):
-            return
-        with nullcontext() if self._account is None else self._account.feeding():
-            for infeed in self._infeeds.values():
-                infeed.feed(self._state, self.time, self.scene.tick)
-
-    def _apply_commands(self) -> None:
-        pending, self._pending = self._pending, []
-        for names, values, source in pending:
-            reason = refusal(self.process_image, names, values)
-            if not reason:
-                for name, value in zip(names, values, strict=True):
-                    index = self.process_image.command_names.index(name)
-                    self._commanded[index] = value
-                    if index in self._watchdogs:
-                        self._watchdogs[index].command(self.tick)
-            self._outcomes.append(CommandOutcome(self.tick, source, names, values, not reason, reason))
-        for index, watchdog in self._watchdogs.items():
-            if watchdog.trips(self.tick):
-                self._commanded[index] = 0.0
-                name = speed_command(self.model.belts[index])
-                self._outcomes.append(CommandOutcome(self.tick, "watchdog", (name,), (0.0,), True, ""))
-        if not np.array_equal(self._actual, self._commanded):
-            self._actual[:] = self._commanded
-            self._set_surfaces()
+        if self._line.feeds:
+            with nullcontext() if self._account is None else self._account.feeding():
+                self._line.feed()
 
     def _fastest_surface(self) -> float:
         """Speed of the fastest point of any belt, m/s."""
         if not self.model.belts:
             return 0.0
-        return float(np.max(np.abs(self._actual) * self._outermost))
+        return float(np.max(np.abs(self._line.now.speeds) * self._outermost))
 
     def _set_surfaces(self) -> None:
         world, surface = self._state.world, self._state.world.surface
         if surface is None or not self.model.belts:
             return
         for index, shape in enumerate(self.model.belt_shapes):
-            speed = self._actual[index]
+            speed = self._line.now.speeds[index]
             if shape.kind == "straight":
                 surface.ux[index] = speed * math.cos(shape.angle)
                 surface.uy[index] = speed * math.sin(shape.angle)

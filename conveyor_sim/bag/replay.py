@@ -12,11 +12,9 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.outputs import SERIALIZERS, Snapshot
 from conveyor_sim.bag.reader import Bag, Outcome, open_bag, to_outcome
 from conveyor_sim.errors import BagError, SceneError
+from conveyor_sim.line.line import FAULT, WATCHDOG
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
-
-WATCHDOG = "watchdog"
-"""Source of outcomes that the line itself brings about; they are compared, not commanded."""
 
 SENSITIVE = frozenset({"contacts", "ledger"})
 """Topics that are compared bit for bit or not at all."""
@@ -115,7 +113,9 @@ class _Replay:
         while difference is None and any(state.next_tick is not None for state in self._states):
             commands = self._recorded_outcomes()
             for outcome in commands:
-                if outcome.source != WATCHDOG:
+                if outcome.source == FAULT:
+                    self._sim.inject(outcome.names[0], outcome.values[0])
+                elif outcome.source != WATCHDOG:  # those it brings about itself
                     self._sim.command(outcome.names, outcome.values, outcome.source)
             self._sim.advance(1)
             difference = self._compare_outcomes(commands) or self._compare_states()

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.line.process_image import Command
 
 
 @dataclass(frozen=True)
@@ -20,19 +20,24 @@ class CommandOutcome:
     reason: str
 
 
-def refusal(image: ProcessImage, names: Sequence[str], values: Sequence[float]) -> str:
-    """Why a set of commands can't be applied, "" if it can."""
+def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: Sequence[float]) -> str:
+    """Why a set of inputs can't be applied, "" if it can. table: those there are; what: the word for one of them."""
     if len(names) != len(values):
         return f"{len(names)} names and {len(values)} values given, expected as many of both"
+    known = {command.name: command for command in table}
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
-        if name not in image.command_names:
-            return f"{name}: no such command, expected one of {', '.join(image.command_names) or 'none: no belts'}"
+        if name not in known:
+            return f"{name}: no such {what}, expected one of {', '.join(known) or 'none: there are none'}"
         if name in seen:
             return f"{name}: given twice"
         seen.add(name)
-        index = image.command_names.index(name)
-        low, high = image.command_min[index], image.command_max[index]
-        if not math.isfinite(value) or not low <= value <= high:
-            return f"{name}: {value:g} given, expected {low:g} to {high:g} {image.command_units[index]}"
+        command = known[name]
+        if command.type == "bool" and value not in (0.0, 1.0):
+            return f"{name}: {value:g} given, expected 0 or 1"
+        if command.type == "count" and not float(value).is_integer():
+            return f"{name}: {value:g} given, expected a whole number from {command.low:g} to {command.high:g}"
+        unit = "" if command.unit == "1" else f" {command.unit}"
+        if not math.isfinite(value) or not command.low <= value <= command.high:
+            return f"{name}: {value:g} given, expected {command.low:g} to {command.high:g}{unit}"
     return ""

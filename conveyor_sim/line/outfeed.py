@@ -1,34 +1,39 @@
 """Outfeeds: regions that remove the bottles whose axis is inside."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.scene.schema import Outfeed
-from conveyor_sim.state import State
+from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.process_image import Signal
+from conveyor_sim.scene.schema import Outfeed, Scene
 
 
-@dataclass
-class OutfeedState:
+class OutfeedDevice(Device):
     """One outfeed while it runs."""
 
-    corners: NDArray[np.float64]
-    """(n, 2), m"""
-    removed: int = 0
+    def __init__(self, name: str, outfeed: Outfeed) -> None:
+        super().__init__(f"outfeeds/{name}", [Signal(f"outfeeds/{name}/removed", "1", "count")])
+        self._corners = np.array(outfeed.region)
+        self.removed = 0
 
-    def take(self, state: State) -> None:
+    def take(self, now: Now) -> None:
         """Remove the bottles that are inside now."""
-        bottles = state.world.bottles
-        inside = in_polygon(self.corners, bottles.x, bottles.y) & (bottles.id >= 0)
+        bottles = now.state.world.bottles
+        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
         for slot in np.flatnonzero(inside):
-            state.remove(int(slot))
+            now.state.remove(int(slot))
             self.removed += 1
 
+    def values(self, now: Now) -> Sequence[float]:
+        """Bottles removed so far."""
+        return (self.removed,)
 
-def outfeed_states(outfeeds: dict[str, Outfeed]) -> dict[str, OutfeedState]:
-    """One state an outfeed."""
-    return {name: OutfeedState(np.array(outfeed.region)) for name, outfeed in outfeeds.items()}
+
+def outfeed_devices(scene: Scene) -> list[OutfeedDevice]:
+    """One device an outfeed."""
+    return [OutfeedDevice(name, outfeed) for name, outfeed in scene.outfeeds.items()]
 
 
 def in_polygon(corners: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:

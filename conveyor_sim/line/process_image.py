@@ -1,41 +1,57 @@
-"""The process image: the names, units and limits of what a controller may read and write, once a tick."""
+"""The process image: all that a controller may read and write, once a tick, by name, with units, types and limits."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
+
+Kind = Literal["bool", "count", "number"]
+"""bool: 0 or 1; count: a whole number."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What a controller reads: an output of the line."""
+
+    name: str
+    unit: str
+    """ "1" where it has no dimension."""
+    type: Kind
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a controller writes, or a fault that a test injects: an input of the line."""
+
+    name: str
+    unit: str
+    type: Kind
+    low: float
+    high: float
+
+
+def switch(name: str) -> Command:
+    """An input that is off (0) or on (1)."""
+    return Command(name, "1", "bool", 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class ProcessImage:
-    """Two tables by name: signals (read) and commands (write). Values travel in the order of these tuples."""
+    """Three tables by name. Values travel in the order of these tuples."""
 
-    signal_names: tuple[str, ...]
-    signal_units: tuple[str, ...]
-    command_names: tuple[str, ...]
-    command_units: tuple[str, ...]
-    command_min: tuple[float, ...]
-    command_max: tuple[float, ...]
+    signals: tuple[Signal, ...]
+    commands: tuple[Command, ...]
+    faults: tuple[Command, ...]
+    """Not for controllers: a test injects them."""
+    signal_names: tuple[str, ...] = field(init=False)
+    command_names: tuple[str, ...] = field(init=False)
+    fault_names: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        for table in ("signal", "command", "fault"):
+            entries: Iterable[Signal | Command] = getattr(self, f"{table}s")
+            object.__setattr__(self, f"{table}_names", tuple(entry.name for entry in entries))
 
 
 def speed_command(belt: str) -> str:
     """Name of a belt's speed setpoint; also the topic that takes it."""
     return f"belts/{belt}/cmd_speed"
-
-
-def process_image(
-    belts: Iterable[tuple[str, float, float]], infeeds: Iterable[str], outfeeds: Iterable[str]
-) -> ProcessImage:
-    """Build the tables from the line's parts; belts as (name, lowest speed, highest speed) in m/s."""
-    belts = tuple(belts)
-    signals = [(f"belts/{name}/speed", "m/s") for name, _, _ in belts]
-    signals += [(f"belts/{name}/bottles", "1") for name, _, _ in belts]
-    for infeed in infeeds:
-        signals += [(f"infeeds/{infeed}/fed", "1"), (f"infeeds/{infeed}/blocked", "1")]
-    signals += [(f"outfeeds/{outfeed}/removed", "1") for outfeed in outfeeds]
-    return ProcessImage(
-        signal_names=tuple(name for name, _ in signals),
-        signal_units=tuple(unit for _, unit in signals),
-        command_names=tuple(speed_command(name) for name, _, _ in belts),
-        command_units=("m/s",) * len(belts),
-        command_min=tuple(low for _, low, _ in belts),
-        command_max=tuple(high for _, _, high in belts),
-    )

@@ -17,6 +17,7 @@ from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.commands import subscribe_commands
 from conveyor_sim.ros.diagnostics import Diagnostics
+from conveyor_sim.ros.fault_service import FaultService
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import RosSink
@@ -88,6 +89,7 @@ class SimNode:
         subscribe_commands(node, stepper)
         Services(node, executor, stepper, quit_soon=quit_soon)
         CheckpointServices(node, executor, stepper)
+        FaultService(node, executor, stepper)
         LockstepService(node, executor, stepper, given.frame_id)
         Diagnostics(node, stepper, sink)
 

@@ -130,8 +130,7 @@ class Stepper:
         """Hand a command to the simulation, which applies or refuses it at the start of the next tick."""
 
         def hand_over() -> None:
-            if self.failure or self._ended:  # there is no next tick to refuse it
-                reason = f"{self._standstill()}; expected a reset"
+            if reason := self.standstill:  # there is no next tick to refuse it
                 self._refused(source, f"since {reason}")
                 self.session.refuse(names, values, source, reason)
             else:
@@ -258,13 +257,15 @@ class Stepper:
             raise Refused(f"the simulation is {self.state.name}, expected PAUSED")
 
     def _require_able(self) -> None:
-        if self.failure or self._ended:
-            raise Refused(f"{self._standstill()}; expected a reset")
+        if reason := self.standstill:
+            raise Refused(reason)
 
-    def _standstill(self) -> str:
+    @property
+    def standstill(self) -> str:
+        """Why there is no next tick, "" if there is one."""
         if self.failure:
-            return f"the simulation has stopped: {self.failure}"
-        return f"the run has ended at tick {self.session.last_tick}"
+            return f"the simulation has stopped: {self.failure}; expected a reset"
+        return f"the run has ended at tick {self.session.last_tick}; expected a reset" if self._ended else ""
 
     def _require_free(self) -> None:
         self._require_able()

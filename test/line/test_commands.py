@@ -7,11 +7,14 @@ import pytest
 from scenes import base, belt, bottle, simulation
 
 from conveyor_sim.line.commands import refusal
-from conveyor_sim.line.process_image import process_image
+from conveyor_sim.line.process_image import Command, Signal, switch
 from conveyor_sim.simulation import Simulation
 
-IMAGE = process_image([("one", -1.0, 1.0), ("two", 0.0, 2.0)], ["feed"], ["out"])
-
+COMMANDS = (
+    Command("belts/one/cmd_speed", "m/s", "number", -1.0, 1.0),
+    Command("belts/two/cmd_speed", "m/s", "number", 0.0, 2.0),
+)
+OTHERS = (switch("gate/open"), Command("zone/offset", "1", "count", -9.0, 9.0))
 
 UNKNOWN = "no such command, expected one of belts/one/cmd_speed, belts/two/cmd_speed"
 
@@ -30,14 +33,30 @@ def two_belts() -> Simulation:
 
 
 def test_the_tables_of_the_process_image() -> None:
-    assert IMAGE.command_names == ("belts/one/cmd_speed", "belts/two/cmd_speed")
-    assert (IMAGE.command_min, IMAGE.command_max) == ((-1.0, 0.0), (1.0, 2.0))
-    assert IMAGE.command_units == ("m/s", "m/s")
-    assert IMAGE.signal_names == (
-        "belts/one/speed", "belts/two/speed", "belts/one/bottles", "belts/two/bottles", "infeeds/feed/fed",
-        "infeeds/feed/blocked", "outfeeds/out/removed",
-    )  # fmt: skip
-    assert len(IMAGE.signal_units) == len(IMAGE.signal_names)
+    image = two_belts().process_image
+    assert image.commands == COMMANDS
+    assert image.command_names == ("belts/one/cmd_speed", "belts/two/cmd_speed")
+    assert image.signals == (
+        Signal("belts/one/speed", "m/s", "number"),
+        Signal("belts/one/bottles", "1", "count"),
+        Signal("belts/two/speed", "m/s", "number"),
+        Signal("belts/two/bottles", "1", "count"),
+    )
+    assert image.faults == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("gate/open", 0.5, "gate/open: 0.5 given, expected 0 or 1"),
+        ("gate/open", math.nan, "gate/open: nan given, expected 0 or 1"),
+        ("zone/offset", 0.5, "zone/offset: 0.5 given, expected a whole number from -9 to 9"),
+        ("zone/offset", 10.0, "zone/offset: 10 given, expected -9 to 9"),
+        ("zone/offset", -9.0, ""),
+    ],
+)  # fmt: skip
+def test_switches_and_counts(name: str, value: float, reason: str) -> None:
+    assert refusal(OTHERS, "fault", [name], [value]) == reason
 
 
 @pytest.mark.parametrize(
@@ -57,7 +76,7 @@ def test_the_tables_of_the_process_image() -> None:
 )  # fmt: skip
 def test_what_is_refused_and_why(names: list[str], values: list[float], reason: str) -> None:
     """And the belts keep their speeds, also the one whose own value was good."""
-    assert refusal(IMAGE, names, values) == reason
+    assert refusal(COMMANDS, "command", names, values) == reason
     sim = two_belts()
     if names != ["belts/two/cmd_speed"]:
         names, values = ["belts/two/cmd_speed", *names], [0.7, *values]
@@ -73,9 +92,10 @@ def test_what_is_refused_and_why(names: list[str], values: list[float], reason: 
 
 
 def test_the_limits_themselves_are_accepted() -> None:
-    assert refusal(IMAGE, IMAGE.command_names, IMAGE.command_min) == ""
-    assert refusal(IMAGE, IMAGE.command_names, IMAGE.command_max) == ""
-    assert refusal(IMAGE, [], []) == ""
+    names = [command.name for command in COMMANDS]
+    assert refusal(COMMANDS, "command", names, [command.low for command in COMMANDS]) == ""
+    assert refusal(COMMANDS, "command", names, [command.high for command in COMMANDS]) == ""
+    assert refusal(COMMANDS, "command", [], []) == ""
 
 
 def test_a_command_takes_effect_at_the_next_tick_and_says_at_which() -> None:
@@ -111,4 +131,4 @@ def test_without_belts_there_is_nothing_to_command() -> None:
     sim = simulation(bottles=[bottle(0.0, 0.0)])
     sim.command(["belts/one/cmd_speed"], [0.1])
     sim.advance()
-    assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected one of none: no belts"
+    assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected one of none: there are none"

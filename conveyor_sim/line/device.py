@@ -1,0 +1,111 @@
+"""`Device`: what a controller sees and moves on a line, once a tick. Each kind is a class in a file of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.footing import find_carriers
+from conveyor_sim.line.process_image import Command, Signal
+from conveyor_sim.state import State
+
+
+@dataclass
+class Now:
+    """What devices are shown of the line at a tick."""
+
+    state: State
+    length: float
+    """s, of a tick."""
+    setpoints: F8
+    """(belts,), m/s, as commanded."""
+    speeds: F8
+    """(belts,), m/s, of the belts through a tick; those that drive them set it as the tick begins."""
+    tick: int = 0
+    _carriers: NDArray[np.int32] | None = None
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.tick * self.state.model.tick_ns * 1e-9
+
+    def begin_scan(self) -> None:
+        """Forget what was found out about the bottles before."""
+        self._carriers = None
+
+    def carriers(self) -> NDArray[np.int32]:
+        """Index of the belt that each slot stands on, (slots,); -1 for the floor and for free slots."""
+        if self._carriers is None:
+            world = self.state.world
+            carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
+            if world.surface is not None:
+                find_carriers(world.bottles, world.belts, world.surface, carriers)
+            nowhere = (carriers == len(self.state.model.belts)) | (world.bottles.id < 0)
+            self._carriers = np.where(nowhere, -1, carriers).astype(np.int32)
+        return self._carriers
+
+
+class Device:
+    """One device while it runs. Its public attributes are what it remembers from tick to tick (checkpoints)."""
+
+    fed = 0
+    """Bottles that it has put onto the line."""
+    removed = 0
+    """Bottles that it has taken off the line."""
+    blocked_ticks = 0
+    """Ticks at which it had a bottle to put onto the line and no room."""
+
+    def __init__(
+        self,
+        name: str,
+        signals: Sequence[Signal] = (),
+        commands: Sequence[Command] = (),
+        faults: Sequence[Command] = (),
+    ) -> None:
+        """name: as its signals begin, "photo_eyes/exit"."""
+        self._name = name
+        self._signals, self._commands, self._faults = tuple(signals), tuple(commands), tuple(faults)
+
+    @property
+    def name(self) -> str:
+        """As its signals begin."""
+        return self._name
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """What it shows to controllers."""
+        return self._signals
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """What controllers may tell it."""
+        return self._commands
+
+    @property
+    def faults(self) -> tuple[Command, ...]:
+        """What can be made to go wrong with it."""
+        return self._faults
+
+    def command(self, name: str, value: float, now: Now) -> None:
+        """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
+        raise NotImplementedError(f"{self.name} takes no commands")
+
+    def begin(self, now: Now) -> None:
+        """Act before the steps of a tick; `now` is the tick that they start from."""
+
+    def end(self, now: Now) -> None:
+        """Look at what the steps came to, before bottles are taken and fed. Also once at the start, after `feed`."""
+
+    def take(self, now: Now) -> None:
+        """Take bottles off the line."""
+
+    def feed(self, now: Now) -> None:
+        """Put bottles onto the line. Also once at the start."""
+
+    def values(self, now: Now) -> Sequence[float]:
+        """The signals' values, in their order."""
+        return ()

@@ -1,0 +1,165 @@
+"""`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
+
+from collections.abc import Sequence
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays import F8
+from conveyor_sim.line.belt import BeltDevice
+from conveyor_sim.line.commands import CommandOutcome, refusal
+from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.part_memory import as_tuples, recall, remembered
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.state import State
+
+FAULT = "fault"
+"""Source of outcomes of faults."""
+
+WATCHDOG = "watchdog"
+"""Source of outcomes that the line itself brings about."""
+
+
+class Line:
+    """Everything about a line but its bottles' motion: what acts at ticks."""
+
+    def __init__(self, scene: Scene, state: State) -> None:
+        """The line of a scene with its devices as they are at first."""
+        speeds = np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64)
+        self.now = Now(state, scene.tick, speeds, speeds.copy())
+        devices = build_devices(scene, state.model)
+        self._devices = devices
+        self._belts = [device for device in devices if isinstance(device, BeltDevice)]
+        # Nothing is called that does nothing.
+        self._beginning = [device for device in devices if type(device).begin is not Device.begin]
+        self._ending = [device for device in devices if type(device).end is not Device.end]
+        self._taking = [device for device in devices if type(device).take is not Device.take]
+        self._feeding = [device for device in devices if type(device).feed is not Device.feed]
+        self.image = ProcessImage(
+            tuple(signal for device in devices for signal in device.signals),
+            tuple(command for device in devices for command in device.commands),
+            tuple(fault for device in devices for fault in device.faults),
+        )
+        self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
+        self._pending: list[tuple[tuple[str, ...], tuple[float, ...], str]] = []
+        self._outcomes: list[CommandOutcome] = []
+
+    @property
+    def fed(self) -> int:
+        """Bottles put onto the line so far."""
+        return sum(device.fed for device in self._devices)
+
+    @property
+    def removed(self) -> int:
+        """Bottles taken off the line so far."""
+        return sum(device.removed for device in self._devices)
+
+    @property
+    def blocked_ticks(self) -> int:
+        """Ticks so far at which a device had a bottle to feed and no room."""
+        return sum(device.blocked_ticks for device in self._devices)
+
+    @property
+    def takes(self) -> bool:
+        """Whether any device takes bottles off the line."""
+        return bool(self._taking)
+
+    @property
+    def feeds(self) -> bool:
+        """Whether any device puts bottles onto the line."""
+        return bool(self._feeding)
+
+    def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
+        """Have inputs applied, or refused, together as the next tick begins."""
+        self._pending.append((tuple(names), tuple(float(value) for value in values), source))
+
+    def refusal(self, names: Sequence[str], values: Sequence[float], source: str) -> str:
+        """Why a set of inputs can't be applied, "" if it can."""
+        table = self.image.faults if source == FAULT else self.image.commands
+        return refusal(table, FAULT if source == FAULT else "command", names, values)
+
+    def take_outcomes(self) -> list[CommandOutcome]:
+        """What became of inputs since the last call, in order."""
+        outcomes, self._outcomes = self._outcomes, []
+        return outcomes
+
+    def begin(self, tick: int) -> bool:
+        """Apply what was queued and let the devices act before the steps from a tick; whether belts change speed."""
+        self._at(tick)
+        pending, self._pending = self._pending, []
+        for names, values, source in pending:
+            reason = self.refusal(names, values, source)
+            if not reason:
+                for name, value in zip(names, values, strict=True):
+                    self._owner[name].command(name, value, self.now)
+            self._outcomes.append(CommandOutcome(tick, source, names, values, not reason, reason))
+        for belt in self._belts:
+            if name := belt.watch(self.now):
+                self._outcomes.append(CommandOutcome(tick, WATCHDOG, (name,), (0.0,), True, ""))
+        before = self.now.speeds.copy()
+        for device in self._beginning:
+            device.begin(self.now)
+        return not np.array_equal(before, self.now.speeds)
+
+    def end(self, tick: int) -> None:
+        """Let the devices see what the steps up to a tick came to."""
+        self._at(tick)
+        for device in self._ending:
+            device.end(self.now)
+
+    def take(self) -> None:
+        """Let the devices take bottles off the line."""
+        for device in self._taking:
+            device.take(self.now)
+        self.now.begin_scan()
+
+    def feed(self) -> None:
+        """Let the devices put bottles onto the line."""
+        for device in self._feeding:
+            device.feed(self.now)
+        self.now.begin_scan()
+
+    def signals(self) -> F8:
+        """Values of all signals, in the order of the process image."""
+        self.now.begin_scan()
+        return np.array([value for device in self._devices for value in device.values(self.now)], dtype=np.float64)
+
+    def carriers(self) -> NDArray[np.int32]:
+        """Index of the belt that each slot stands on now, (slots,); -1 for the floor and for free slots."""
+        self.now.begin_scan()
+        return self.now.carriers()
+
+    def take_over(self, other: "Line") -> None:
+        """Stand as another line of the same scene does; watchdogs too."""
+        self.now.tick = other.now.tick
+        self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
+        recall(self._by_name(), remembered(other._by_name()))
+
+    def memory(self) -> dict[str, Any]:
+        """All that it remembers from tick to tick, as plain data."""
+        return {
+            "pending": self._pending,
+            "outcomes": [astuple(outcome) for outcome in self._outcomes],
+            "setpoints": self.now.setpoints.tolist(),
+            "speeds": self.now.speeds.tolist(),
+            "devices": remembered(self._by_name()),
+        }
+
+    def go_on_from(self, tick: int, memory: dict[str, Any]) -> None:
+        """Stand as one of the same scene did at a tick. Raises KeyError, AttributeError, TypeError or ValueError."""
+        self.now.tick = tick
+        self._pending = list(as_tuples(memory["pending"]))
+        self._outcomes = [CommandOutcome(*told) for told in as_tuples(memory["outcomes"])]
+        self.now.setpoints[:], self.now.speeds[:] = memory["setpoints"], memory["speeds"]
+        recall(self._by_name(), memory["devices"])
+
+    def _by_name(self) -> dict[str, Device]:
+        return {device.name: device for device in self._devices}
+
+    def _at(self, tick: int) -> None:
+        self.now.tick = tick
+        self.now.begin_scan()
