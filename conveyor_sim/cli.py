@@ -17,6 +17,8 @@ from conveyor_sim.version import __version__
 if TYPE_CHECKING:
     from conveyor_sim.model import Model
     from conveyor_sim.scene import Scene
+    from conveyor_sim.scene.machines import Source, Spill
+    from conveyor_sim.scene.schema import Infeed
 
 # Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
 
@@ -238,13 +240,18 @@ def _print(content: RenderableType) -> None:
     Console(markup=False, highlight=False).print(content)
 
 
+def _supply(entry: Infeed | Source | Spill) -> str:
+    count = getattr(entry, "count", None)
+    return "without end" if count is None else str(count)
+
+
 def _account(scene: Scene, model: Model) -> Table:
     """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
     from conveyor_sim.explain import accuracy_rows
     from conveyor_sim.scene import initial_bottles
 
     table = Table.grid(padding=(0, 2))
-    fed = ["without end" if infeed.count is None else str(infeed.count) for infeed in scene.infeeds.values()]
+    fed = [_supply(entry) for _, entry in scene.entries()]
     table.add_row("scene", f"{model.name}: {scene.description}" if scene.description else model.name)
     table.add_row("bottles", f"{len(initial_bottles(scene))} at the start; fed: {', '.join(fed) or 'none'}")
     table.add_row("belts", ", ".join(model.belts) or "none")

@@ -20,6 +20,7 @@ from conveyor_sim.effects.terms import (
 from conveyor_sim.methods import Share
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.geometry import rail_shapes
+from conveyor_sim.scene.machines import Source
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, lattice_bound, wedge_bound
 
@@ -37,9 +38,9 @@ def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Co
 
 
 def _pairs(scene: Scene, on: Collection[str]) -> Cause | None:
-    for name, infeed in scene.infeeds.items():
-        if infeed.count is None:
-            return Cause(("infeeds", name), "without end")
+    for path, entry in scene.entries():
+        if isinstance(entry, Source) or entry.count is None:
+            return Cause(path, "without end")
     most = most_bottles(scene) or 0
     return Cause(("bottles" if scene.bottles else "infeeds",), f"{most} bottles in all") if most > 1 else None
 

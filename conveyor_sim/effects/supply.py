@@ -7,11 +7,11 @@ from conveyor_sim.scene.schema import Scene
 
 
 def _infeed(scene: Scene, on: Collection[str]) -> Cause | None:
-    return Cause(("infeeds", next(iter(scene.infeeds)))) if scene.infeeds else None
+    return next((Cause(path) for path, _ in scene.entries()), None)
 
 
 def _outfeed(scene: Scene, on: Collection[str]) -> Cause | None:
-    return Cause(("outfeeds", next(iter(scene.outfeeds)))) if scene.outfeeds else None
+    return next((Cause(path) for path, _ in scene.exits()), None)
 
 
 INFEED = Effect(
@@ -19,14 +19,14 @@ INFEED = Effect(
     law="bottles enter one behind the other, by gap or rate",
     source="added",
     called_for=_infeed,
-    absent="no infeed",
-    needs="counters and draws of each infeed; room for more bottles as they come",
+    absent="no infeed, source or spill",
+    needs="counters and draws of each entry; room for more bottles as they come",
 )
 OUTFEED = Effect(
     name="outfeed",
-    law="bottles whose axis is in a region are removed",
+    law="bottles whose axis is in a region are removed: at once, at a rate, or when a reject is fired",
     source="added",
     called_for=_outfeed,
-    absent="no outfeed",
-    needs="corners and counter of each outfeed",
+    absent="no outfeed, sink or reject",
+    needs="corners and counters of each",
 )

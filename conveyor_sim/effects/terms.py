@@ -10,6 +10,7 @@ from conveyor_sim.engine.arrays import F8, ContactLaw
 from conveyor_sim.laws import Laws
 from conveyor_sim.methods import METHODS, STEP_ERROR, Method
 from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.machines import Source, Spill
 from conveyor_sim.scene.schema import BottleType, Scene, Single
 from conveyor_sim.timestep import Bound, contact_time, hertz_contact_time, least_steps
 
@@ -99,10 +100,10 @@ def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool
 def most_bottles(scene: Scene) -> int | None:
     """Bottles that a run can hold at most, None if an infeed has no end."""
     fed = 0
-    for infeed in scene.infeeds.values():
-        if infeed.count is None:
+    for _, entry in scene.entries():
+        if isinstance(entry, Source) or entry.count is None:
             return None
-        fed += infeed.count
+        fed += entry.count
     return fed + len(initial_bottles(scene))
 
 
@@ -124,10 +125,10 @@ def queue_force(terms: Terms) -> float:
 def impact_speed(scene: Scene) -> float:
     """The speed of the hardest impact expected, m/s; SPEED_AT_REST if all rest.
 
-    The fastest belt or infeed against something at rest, or the most by which bottles differ at the start.
+    The fastest belt or bottle that enters against something at rest, or the most by which bottles differ at the start.
     """
     speeds = [abs(belt.speed) for belt in scene.belts.values()]
-    speeds += [infeed.speed for infeed in scene.infeeds.values()]
+    speeds += [entry.speed for _, entry in scene.entries() if not isinstance(entry, Spill)]
     given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
     speeds.append(math.hypot(*np.ptp(given, axis=0)))
     return max(speeds) or SPEED_AT_REST

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ class Now:
     speeds: F8
     """(belts,), m/s, of the belts through a tick; those that drive them set it as the tick begins."""
     tick: int = 0
+    bad: set[int] = field(default_factory=set)
+    """Ids of the bottles that an inspection would object to."""
     _carriers: NDArray[np.int32] | None = None
 
     @property

@@ -8,13 +8,10 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.entry import CLEAR, Entry, Quality
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.model import Model
-from conveyor_sim.scene.schema import Infeed, Scene
+from conveyor_sim.scene.schema import Infeed
 from conveyor_sim.state import State
-
-CLEAR = 1e-9
-"""m; bottles one gap of 0 apart touch, and rounding must not block them."""
 
 ROUNDING = 1e-9
 """s; sums of 1 / rate must not miss the tick they fall on."""
@@ -26,13 +23,14 @@ LATE = 2.0
 class InfeedDevice(Device):
     """One infeed while it runs."""
 
-    def __init__(self, name: str, infeed: Infeed, kind: int, radius: float, random: np.random.Generator) -> None:
-        """kind: index of the bottle type; radius: m, of it."""
+    def __init__(self, name: str, infeed: Infeed, entry: Entry, quality: Quality, random: np.random.Generator) -> None:
+        """random: for the jitter."""
         place = f"infeeds/{name}"
         super().__init__(place, [Signal(f"{place}/fed", "1", "count"), Signal(f"{place}/blocked", "1", "bool")])
-        self._infeed, self._kind, self._radius = infeed, kind, radius
+        self._infeed, self._entry, self._radius = infeed, entry, entry.radius
         self._direction = (math.cos(infeed.direction), math.sin(infeed.direction))
         self.random = random
+        self.quality = quality
         self.fed = 0
         self.blocked = False
         self.blocked_ticks = 0
@@ -48,23 +46,23 @@ class InfeedDevice(Device):
 
     def feed(self, now: Now) -> None:
         """Let in what is due."""
-        state, time, tick = now.state, now.time, now.length
-        if time < self._infeed.start:
+        if now.time < self._infeed.start:
             return
         entered = True
         self.blocked = False
         while entered and not self._empty():
             packed = self._infeed.gap is not None
-            entered = self._feed_packed(state, time, tick) if packed else self._feed_rate(state, time)
+            entered = self._feed_packed(now) if packed else self._feed_rate(now)
         self.blocked_ticks += self.blocked
 
     def _empty(self) -> bool:
         return self._infeed.count is not None and self.fed >= self._infeed.count
 
-    def _feed_packed(self, state: State, time: float, tick: float) -> bool:
+    def _feed_packed(self, now: Now) -> bool:
         """The in-line moves with its last bottle: the next one enters a pitch behind it."""
+        state, time = now.state, now.time
         pitch = 2.0 * self._radius + (self._infeed.gap or 0.0)
-        advance = self._infeed.speed * tick
+        advance = self._infeed.speed * now.length
         ahead = 0.0
         if self.fed:
             ahead = self._progress(state, time) - pitch - self.extra * self._infeed.speed
@@ -73,7 +71,7 @@ class InfeedDevice(Device):
                 return False
             # Past one tick's travel the last bottle no longer pulls the in-line behind it.
             ahead = self._way_to_rails(state, min(ahead, advance))
-        if not self._enter(state, ahead):
+        if not self._enter(now, ahead):
             self.blocked = self._late(time, pitch)
             return False
         self.due = time
@@ -126,11 +124,11 @@ class InfeedDevice(Device):
             return self.fed > 0
         return time - self.due > LATE * (pitch / self._infeed.speed + self.extra)
 
-    def _feed_rate(self, state: State, time: float) -> bool:
-        rate = self._infeed.rate or 0.0
+    def _feed_rate(self, now: Now) -> bool:
+        rate, time = self._infeed.rate or 0.0, now.time
         if time < self.due + self.extra - ROUNDING:
             return False
-        if not self._enter(state, 0.0):
+        if not self._enter(now, 0.0):
             self.blocked = True
             # A bottle that has to wait shifts the ones behind it: a line does not catch up by itself.
             self.due = time - self.extra
@@ -138,15 +136,12 @@ class InfeedDevice(Device):
         self.due += 1.0 / rate
         return True
 
-    def _enter(self, state: State, ahead: float) -> bool:
+    def _enter(self, now: Now, ahead: float) -> bool:
         x, y = self._place(ahead)
-        bottles = state.world.bottles
-        reach = bottles.radius + self._radius - CLEAR
-        near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < reach**2
-        if bool((near & (bottles.id >= 0)).any()):
+        if not self._entry.has_room(now.state, x, y):
             return False
-        vx, vy = (self._infeed.speed * component for component in self._direction)
-        self.last = state.add(self._kind, x, y, 0.0, vx, vy, 0.0)
+        self.last = self._entry.enter(now.state, x, y)
+        self.quality.judge(self.last, now)
         self.fed += 1
         self._draw()
         return True
@@ -162,14 +157,3 @@ class InfeedDevice(Device):
     def values(self, now: Now) -> Sequence[float]:
         """Bottles fed so far, and whether one waits for room."""
         return self.fed, self.blocked
-
-
-def infeed_devices(scene: Scene, model: Model) -> list[InfeedDevice]:
-    """One device an infeed, each with a random stream of its own drawn from the scene's seed."""
-    streams = np.random.SeedSequence(scene.seed).spawn(len(scene.infeeds))
-    devices = []
-    for (name, infeed), stream in zip(scene.infeeds.items(), streams, strict=True):
-        kind = model.bottle_types.index(infeed.bottle)
-        random = np.random.Generator(np.random.PCG64(stream))
-        devices.append(InfeedDevice(name, infeed, kind, float(model.type_radius[kind]), random))
-    return devices

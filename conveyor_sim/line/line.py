@@ -66,12 +66,12 @@ class Line:
     @property
     def takes(self) -> bool:
         """Whether any device takes bottles off the line."""
-        return bool(self._taking)
+        return bool(self._taking) and self.now.state.model.has("outfeed")
 
     @property
     def feeds(self) -> bool:
         """Whether any device puts bottles onto the line."""
-        return bool(self._feeding)
+        return bool(self._feeding) and self.now.state.model.has("infeed")
 
     def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
         """Have inputs applied, or refused, together as the next tick begins."""
@@ -137,6 +137,7 @@ class Line:
         """Stand as another line of the same scene does; watchdogs too."""
         self.now.tick = other.now.tick
         self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
+        self.now.bad = set(other.now.bad)
         recall(self._by_name(), remembered(other._by_name()))
 
     def memory(self) -> dict[str, Any]:
@@ -146,6 +147,7 @@ class Line:
             "outcomes": [astuple(outcome) for outcome in self._outcomes],
             "setpoints": self.now.setpoints.tolist(),
             "speeds": self.now.speeds.tolist(),
+            "bad": sorted(self.now.bad),
             "devices": remembered(self._by_name()),
         }
 
@@ -155,6 +157,7 @@ class Line:
         self._pending = list(as_tuples(memory["pending"]))
         self._outcomes = [CommandOutcome(*told) for told in as_tuples(memory["outcomes"])]
         self.now.setpoints[:], self.now.speeds[:] = memory["setpoints"], memory["speeds"]
+        self.now.bad = set(memory["bad"])
         recall(self._by_name(), memory["devices"])
 
     def _by_name(self) -> dict[str, Device]:

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
+from conveyor_sim.scene.machines import Reject, Sink, Source, Spill
+from conveyor_sim.scene.schema import Infeed, Outfeed
 
 if TYPE_CHECKING:
     from conveyor_sim.scene import Scene
 
 Floats = NDArray[np.float64]
 _OUTLINE_POINTS = 96
+_KINDS = {Infeed: "infeed", Source: "source", Spill: "spill", Outfeed: "outfeed", Sink: "sink", Reject: "reject"}
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,7 @@ class InfeedMark:
     name: str
     position: Floats
     direction: float
+    kind: str = "infeed"
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class OutfeedMark:
 
     name: str
     region: Floats
+    kind: str = "outfeed"
 
 
 @dataclass(frozen=True)
@@ -53,12 +58,17 @@ class Plant:
             speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
             rails=tuple(rail_shapes(scene)),
             infeeds=tuple(
-                InfeedMark(name, np.asarray(infeed.position, dtype=np.float64), float(infeed.direction))
-                for name, infeed in scene.infeeds.items()
+                InfeedMark(
+                    path[1],
+                    np.asarray(entry.position, dtype=np.float64),
+                    0.0 if isinstance(entry, Spill) else float(entry.direction),
+                    _KINDS[type(entry)],
+                )
+                for path, entry in scene.entries()
             ),
             outfeeds=tuple(
-                OutfeedMark(name, np.asarray(outfeed.region, dtype=np.float64))
-                for name, outfeed in scene.outfeeds.items()
+                OutfeedMark(path[1], np.asarray(exit_.region, dtype=np.float64), _KINDS[type(exit_)])
+                for path, exit_ in scene.exits()
             ),
         )
 

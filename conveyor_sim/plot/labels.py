@@ -69,14 +69,20 @@ def rail_labels(plant: Plant) -> list[Label]:
 def mark_labels(plant: Plant) -> list[Label]:
     """Names of infeeds and outfeeds."""
     labels = [
-        Label(f"infeed {mark.name}", style.INFEED, 9.0, np.repeat(mark.position[None], 8, axis=0), _AROUND)
+        Label(f"{mark.kind} {mark.name}", style.INFEED, 9.0, np.repeat(mark.position[None], 8, axis=0), _AROUND)
         for mark in plant.infeeds
     ]
     for outfeed in plant.outfeeds:
         middles = 0.5 * (outfeed.region + np.roll(outfeed.region, -1, axis=0))
         away = middles - outfeed.region.mean(axis=0)
         labels.append(
-            Label(f"outfeed {outfeed.name}", style.OUTFEED, 9.0, middles, away / np.hypot(*away.T).clip(1e-12)[:, None])
+            Label(
+                f"{outfeed.kind} {outfeed.name}",
+                style.OUTFEED,
+                9.0,
+                middles,
+                away / np.hypot(*away.T).clip(1e-12)[:, None],
+            )
         )
     return labels
 

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Tag
 
+from conveyor_sim.scene.drives import Drive
 from conveyor_sim.scene.part import Part, one_of
 from conveyor_sim.scene.types import (
     Angle,
@@ -25,6 +26,9 @@ class _Belt(Part):
     material: Name = quantity("Material, as named in `base`.")
     watchdog: Positive | None = quantity(
         "Without a speed command for this long, the belt stops. Left out: it keeps its speed.", "s", default=None
+    )
+    drive: Drive | None = quantity(
+        "What moves it. Left out: it has the commanded speed from one tick to the next.", default=None
     )
 
 

@@ -19,6 +19,7 @@ from conveyor_sim.scene.geometry import (
     rail_pieces,
     rails_of_curved,
 )
+from conveyor_sim.scene.machines import Source, Spill
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.polygons import why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
@@ -205,14 +206,14 @@ def _in_rails(groups: list[_Group], rails: list[RailShape]) -> Iterator[Problem]
 
 
 def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]:
-    feeds = {name: feed for name, feed in scene.infeeds.items() if feed.bottle in scene.bottle_types}
+    feeds = {path: feed for path, feed in scene.entries() if feed.bottle in scene.bottle_types}
     groups = [
-        _Group(("infeeds", name, "position"), _births(feed), scene.bottle_types[feed.bottle].radius)
-        for name, feed in feeds.items()
+        _Group((*path, "position"), _births(feed), scene.bottle_types[feed.bottle].radius)
+        for path, feed in feeds.items()
     ]
     for index, rail, _, apart in _inside(_All.of(groups), rails):
-        group, feed = groups[index], scene.infeeds[str(groups[index].path[1])]
-        jitter = ", lateral_jitter included" if feed.lateral_jitter else ""
+        group, feed = groups[index], list(feeds.values())[index]
+        jitter = ", lateral_jitter included" if isinstance(feed, Infeed) and feed.lateral_jitter else ""
         yield Problem(
             group.path,
             f"{shown(feed.position)} given, expected at least {group.radius:g} m between a bottle's axis "
@@ -244,8 +245,10 @@ def _inside(every: _All, rails: list[RailShape]) -> Iterator[tuple[int, RailShap
         yield group, rails[rail[some[0]]], point[some] - every.start[group], distance[some]
 
 
-def _births(feed: Infeed) -> Array:
-    """The middle and both ends of where an infeed's bottles appear, (3, 2)."""
+def _births(feed: Infeed | Source | Spill) -> Array:
+    """The middle and both ends of where bottles appear, (n, 2)."""
+    if not isinstance(feed, Infeed):
+        return np.array([feed.position])
     sideways = np.array([-math.sin(feed.direction), math.cos(feed.direction)])
     births: Array = np.array(feed.position) + np.outer([-1.0, 0.0, 1.0], feed.lateral_jitter * sideways)
     return births

@@ -7,6 +7,7 @@ from itertools import combinations_with_replacement
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
+from conveyor_sim.scene.check_machines import machine_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
@@ -28,6 +29,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_belt_speeds(scene),
         *_infeeds(scene),
         *_rail_names(scene),
+        *machine_problems(scene),
         *shape_problems(scene),
     ]
 
@@ -105,11 +107,11 @@ def _bottle_materials(scene: Scene) -> list[str]:
 
 def _several_bottles(scene: Scene) -> bool:
     """Whether two bottles can ever meet."""
-    return bool(scene.infeeds) or len(scene.bottles) > 1 or any(isinstance(entry, Grid) for entry in scene.bottles)
+    return any(scene.entries()) or len(scene.bottles) > 1 or any(isinstance(entry, Grid) for entry in scene.bottles)
 
 
 def _unknown_types(scene: Scene) -> Iterator[Problem]:
-    used: list[tuple[Path, str]] = [(("infeeds", name, "bottle"), feed.bottle) for name, feed in scene.infeeds.items()]
+    used: list[tuple[Path, str]] = [((*path, "bottle"), entry.bottle) for path, entry in scene.entries()]
     for index, entry in enumerate(scene.bottles):
         if isinstance(entry, Grid):
             used.append((("bottles", index, "grid", "type"), entry.grid.type))
@@ -141,6 +143,8 @@ def _infeeds(scene: Scene) -> Iterator[Problem]:
         if (feed.gap is None) == (feed.rate is None):
             given = "neither" if feed.gap is None else "both"
             yield Problem(("infeeds", name), f"{given} of gap and rate given, expected one of them")
+        if feed.bad_share and feed.bad_every is not None:
+            yield Problem(("infeeds", name), "both of bad_share and bad_every given, expected at most one of them")
         if feed.rate is not None and feed.timing_jitter > 0.5 / feed.rate:
             yield Problem(
                 ("infeeds", name, "timing_jitter"),

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.checks import problems_of
 from conveyor_sim.scene.problems import Path, Problem, dotted
-from conveyor_sim.scene.schema import Scene, Source
+from conveyor_sim.scene.schema import Origin, Scene
 from conveyor_sim.scene.tables import with_tables
 from conveyor_sim.scene.yaml_lines import Document
 
@@ -64,7 +64,7 @@ def parse_scene(
         raise _refused(problems, document, name, changes)
     # A recording keeps the text and the overrides: with the tables among them, it needs no file.
     kept = changes if data is merged else {**changes, "contacts": data["contacts"]}
-    scene._source = Source(text, name, _yaml_text(changes), _yaml_text(kept))
+    scene._source = Origin(text, name, _yaml_text(changes), _yaml_text(kept))
     return scene
 
 

@@ -5,7 +5,7 @@ from inspect import getdoc
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import accuracy, belts, contacts, rails, schema
+from conveyor_sim.scene import accuracy, belts, contacts, drives, machines, rails, schema
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -41,12 +41,18 @@ SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
     ("An entry of `belts`: `kind: straight`", belts.StraightBelt),
     ("An entry of `belts`: `kind: curved`", belts.CurvedBelt),
     ("`rails` of a curved belt", belts.BeltRails),
+    ("`drive` of a belt", drives.Drive),
     ("An entry of `rails`: `kind: segment`", rails.SegmentRail),
     ("An entry of `rails`: `kind: polyline`", rails.PolylineRail),
     ("An entry of `rails`: `kind: arc`", rails.ArcRail),
     ("`floor`", schema.Floor),
     ("An entry of `infeeds`", schema.Infeed),
     ("An entry of `outfeeds`", schema.Outfeed),
+    ("An entry of `machines`: `kind: source`", machines.Source),
+    ("An entry of `machines`: `kind: sink`", machines.Sink),
+    ("An entry of `machines`: `kind: inspection`", machines.Inspection),
+    ("An entry of `machines`: `kind: reject`", machines.Reject),
+    ("An entry of `spills`", machines.Spill),
     ("An entry of `bottles`: one bottle", schema.Single),
     ("An entry of `bottles`: a grid", schema.Grid),
     ("`grid`", schema.GridOfBottles),

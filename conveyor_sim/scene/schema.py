@@ -3,7 +3,7 @@
 A scene is read with `load_scene`; `docs/scene.md` is generated from the fields below.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -14,6 +14,7 @@ from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.effect_names import EffectName, Forced
+from conveyor_sim.scene.machines import Machine, Reject, Share, Sink, Source, Spill
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.rails import Rail
 from conveyor_sim.scene.types import (
@@ -89,6 +90,8 @@ class Infeed(Part):
     lateral_jitter: NotNegative = quantity(
         "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
     )
+    bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
+    bad_every: Count | None = quantity("Every so many-th bottle is bad.", "1", default=None)
 
 
 class Outfeed(Part):
@@ -144,7 +147,7 @@ class Outputs(Part):
 
 
 @dataclass(frozen=True)
-class Source:
+class Origin:
     """Where a scene was read from; scenes of the same content are equal wherever they come from."""
 
     text: str = field(default="", compare=False)
@@ -227,6 +230,12 @@ class Scene(Part):
     )
     infeeds: Annotated[dict[Name, Infeed], _named("infeeds")] = quantity("Where bottles enter.", default={})
     outfeeds: Annotated[dict[Name, Outfeed], _named("outfeeds")] = quantity("Where bottles leave.", default={})
+    machines: Annotated[dict[Name, Machine], _named("machines")] = quantity(
+        "Machines at the line: sources and sinks of bottles, inspections, rejects.", default={}
+    )
+    spills: Annotated[dict[Name, Spill], _named("spills")] = quantity(
+        "Where a test can have bottles dropped.", default={}
+    )
     bottles: Annotated[
         tuple[
             Annotated[Annotated[Single, Tag("(single)")] | Annotated[Grid, Tag("(grid)")], Discriminator(_bottle_tag)],
@@ -239,7 +248,7 @@ class Scene(Part):
         "Effects forced on or off, whatever the scene calls for; docs/effects.md lists them.", default={}
     )
 
-    _source: Source = PrivateAttr(default=Source())
+    _source: Origin = PrivateAttr(default=Origin())
 
     @property
     def tick_ns(self) -> int:
@@ -250,6 +259,17 @@ class Scene(Part):
     def duration_ticks(self) -> int:
         """Duration (ticks)."""
         return nanoseconds(self.duration) // self.tick_ns
+
+    def entries(self) -> Iterator[tuple[tuple[str, ...], Infeed | Source | Spill]]:
+        """All that bottles come from while it runs, with its path."""
+        yield from ((("infeeds", name), infeed) for name, infeed in self.infeeds.items())
+        yield from ((("machines", name), one) for name, one in self.machines.items() if isinstance(one, Source))
+        yield from ((("spills", name), spill) for name, spill in self.spills.items())
+
+    def exits(self) -> Iterator[tuple[tuple[str, ...], Outfeed | Sink | Reject]]:
+        """All by which bottles leave, with its path."""
+        yield from ((("outfeeds", name), outfeed) for name, outfeed in self.outfeeds.items())
+        yield from ((("machines", name), one) for name, one in self.machines.items() if isinstance(one, Sink | Reject))
 
     def every(self, topic: str) -> int:
         """Ticks from one output of a topic to the next, 0 if there is none. KeyError if there is no such topic."""

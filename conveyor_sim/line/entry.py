@@ -1,0 +1,58 @@
+"""Where bottles enter a line: never onto another bottle, and whether they are bad."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from conveyor_sim.line.device import Now
+from conveyor_sim.state import State
+
+CLEAR = 1e-9
+"""m; bottles one gap of 0 apart touch, and rounding must not block them."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Bottles of one type that enter in one direction, at one speed."""
+
+    kind: int
+    """Index of the bottle type."""
+    radius: float
+    """m"""
+    direction: float
+    """rad"""
+    speed: float
+    """m/s"""
+
+    def has_room(self, state: State, x: float, y: float) -> bool:
+        """Whether a bottle at (x, y) m would touch no other."""
+        bottles = state.world.bottles
+        near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + self.radius - CLEAR) ** 2
+        return not bool((near & (bottles.id >= 0)).any())
+
+    def enter(self, state: State, x: float, y: float) -> int:
+        """Put a bottle at (x, y) m; return its id."""
+        vx, vy = self.speed * math.cos(self.direction), self.speed * math.sin(self.direction)
+        return state.add(self.kind, x, y, 0.0, vx, vy, 0.0)
+
+
+class Quality:
+    """Which of the bottles that come from one place are bad."""
+
+    def __init__(self, share: float, every: int | None, random: np.random.Generator) -> None:
+        """share: of them are bad at random; every: so many-th is bad."""
+        self._share, self._every = share, every
+        self.random = random
+        self.count = 0
+
+    def judge(self, bottle: int, now: Now) -> None:
+        """Decide on the next bottle, by its id."""
+        self.count += 1
+        # Nothing is drawn where it would decide nothing.
+        if self._every is not None:
+            bad = self.count % self._every == 0
+        else:
+            bad = self._share > 0.0 and float(self.random.uniform()) < self._share
+        if bad:
+            now.bad.add(bottle)

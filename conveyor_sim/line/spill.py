@@ -1,0 +1,37 @@
+"""Spills: bottles that a test has dropped onto the line."""
+
+from collections.abc import Sequence
+
+from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.edge import RisingEdge
+from conveyor_sim.line.entry import Entry
+from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.scene.machines import Spill
+
+
+class SpillDevice(Device):
+    """One place of spills: each rise of its fault drops a bottle, as soon as there is room."""
+
+    def __init__(self, name: str, spill: Spill, entry: Entry) -> None:
+        place = f"spills/{name}"
+        super().__init__(place, [Signal(f"{place}/dropped", "1", "count")], faults=[switch(f"{place}/drop")])
+        self._spill, self._entry = spill, entry
+        self.drop = RisingEdge()
+        self.due = 0
+        self.fed = 0
+
+    def command(self, name: str, value: float, now: Now) -> None:
+        """Take the fault drop."""
+        if self.drop.rises(value) and self.fed + self.due < self._spill.count:
+            self.due += 1
+
+    def feed(self, now: Now) -> None:
+        """Drop the bottles that are due."""
+        while self.due and self._entry.has_room(now.state, *self._spill.position):
+            self._entry.enter(now.state, *self._spill.position)
+            self.due -= 1
+            self.fed += 1
+
+    def values(self, now: Now) -> Sequence[float]:
+        """Bottles dropped so far."""
+        return (self.fed,)
