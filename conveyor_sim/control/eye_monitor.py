@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -63,6 +64,8 @@ class EyeMonitor:
     _stuck_on: bool = field(default=False, init=False, repr=False)
     _under_way: int = field(default=0, init=False, repr=False)
     """Bottles between the two eyes."""
+    _since_next: float = field(default=math.inf, init=False, repr=False)
+    """m that the belt moved since a bottle came by the next eye."""
     _unseen: int = field(default=0, init=False, repr=False)
     """Bottles that came by the next eye only, since this one saw one."""
 
@@ -103,7 +106,12 @@ class EyeMonitor:
         there = self._next.read(inputs)
         chatters = self._chatter_next(inputs.time, there.edges, travel)
         room = int(self.next_after / self.bottle) + 1
-        came, went = here.rises, 0 if chatters else there.rises
+        # Two bottles can't be closer than one is long: what chatters is not counted even before it is known to.
+        self._since_next += travel
+        went = int(there.rises > 0 and not chatters and self._since_next > 0.5 * self.bottle)
+        if went:
+            self._since_next = 0.0
+        came = here.rises
         unseen = max(0, went - self._under_way - came)
         self._under_way = min(max(0, self._under_way + came - went), room)
         if came or here.blocked or (chatters and self._unseen < self.missed):

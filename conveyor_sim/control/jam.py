@@ -97,7 +97,9 @@ class JamClearing:
     _timer: TON = field(default_factory=lambda: TON(0.0), init=False, repr=False)
 
     def __post_init__(self) -> None:
-        require(self.back_speed < 0.0 < self.jog_speed, "back_speed, jog_speed: expected below 0 and above 0")
+        given = f"{self.back_speed:g} and {self.jog_speed:g} given"
+        signs = self.back_speed < 0.0 < self.jog_speed
+        require(signs, f"back_speed, jog_speed: {given}, expected below 0 and above 0")
         require(self.tries >= 1, f"tries: {self.tries} given, expected 1 or more")
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
 
 from conveyor_sim.control.scan import Controller, Inputs
 
@@ -63,10 +64,9 @@ class Beam:
         return {f"photo_eyes/{self.name}/{what}": float(value) for what, value in values.items()}
 
     def pass_by(self, edges: Sequence[float], before: float, after: float, time: float, length: float) -> None:
-        """Travel goes from `before` to `after` (m) in the scan that ends at `time`; edges: m of travel, in order."""
-        for edge in edges:
-            if before < edge <= after:
-                self.toggle(time - length * (after - edge) / (after - before))
+        """The belt's travel goes from `before` to `after` (m) in the scan that ends at `time`; edges: m, in order."""
+        for edge in edges[bisect_right(edges, before) : bisect_right(edges, after)]:
+            self.toggle(time - length * (after - edge) / (after - before))
 
     def toggle(self, time: float) -> None:
         """An edge."""
@@ -81,7 +81,3 @@ class Beam:
 def edges_of(fronts: Iterable[float], diameter: float) -> list[float]:
     """Travel (m) at which bottles begin and end to block a beam, whose fronts arrive at those travels."""
     return [edge for front in fronts for edge in (front, front + diameter)]
-
-
-Speed = Callable[[float], float]
-"""m/s at a time in s."""
