@@ -37,3 +37,19 @@ def test_a_bottle_shorter_than_a_scan() -> None:
 @pytest.mark.parametrize(("times", "before"), [((0.021, 0.022, 0.023), 0.022), ((0.021, 0.022, 0.023, 0.024), None)])
 def test_more_edges_than_the_eye_can_tell_of(times: tuple[float, ...], before: float | None) -> None:
     assert seen((0.001,), (0.011,), times)[-1] == (len(times), 2, before)
+
+
+def test_an_eye_that_tells_late_is_counted_by_its_beam() -> None:
+    edges = EyeEdges("e")
+    rows = (
+        (0, 0.0, 0.0, 0, 0),
+        (0, 0.011, 0.0, 1, 1),
+        (1, 0.011, 0.0, 1, 0),
+        (1, 0.011, 0.035, 2, 0),
+        (1, 0.046, 0.035, 3, 1),
+    )
+    for tick, (blocked, rose, fell, count, rises) in enumerate(rows):
+        values = {"blocked": blocked, "rose": rose, "fell": fell, "edges": count}
+        signals = {f"photo_eyes/e/{what}": value for what, value in values.items()}
+        assert edges.read(Inputs(signals, tick * LENGTH, tick, LENGTH)).rises == rises
+    assert edges.fell_before == 0.035
