@@ -1,6 +1,7 @@
 """The house stands: imports point down only, and the heavy libraries stay in the rooms that are meant for them."""
 
 import ast
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +11,7 @@ PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
     ["errors", "version", "machine"],
-    ["engine", "scene", "timestep", "methods", "resources", "restitution"],
+    ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["plant", "presets", "effects", "world_arrays", "part_memory"],
     ["model"],
@@ -82,3 +83,11 @@ def test_engine_knows_nothing_of_the_project() -> None:
                 assert name.startswith("conveyor_sim.engine"), f"{source.name} imports {name}"
             elif top in {"scipy", "pydantic", "rosbags", "mcap", "rclpy", "matplotlib", "click", "rich", "ruamel"}:
                 assert top in allowed, f"{source.name} imports {name}"
+
+
+def test_control_knows_nothing_of_the_project() -> None:
+    """What a PLC programmer reads: the standard library, and no way to the simulation but the process image."""
+    for source in (PACKAGE / "control").rglob("*.py"):
+        for name in imports_of(source):
+            own = name.startswith("conveyor_sim.control")
+            assert own or name.split(".")[0] in sys.stdlib_module_names, f"{source.name} imports {name}"

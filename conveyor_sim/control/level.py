@@ -1,0 +1,98 @@
+"""Level control of an accumulation table: the feeder is held while the table is full.
+
+The level comes from a count of bottles, from counters at its entry and exit, or from photo-eyes across it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from conveyor_sim.control.blocks import COVERED, HYSTERESIS
+from conveyor_sim.control.scan import Inputs, eye_signal, require, speed_command
+
+
+class Level(Protocol):
+    """How full something is."""
+
+    def read(self, inputs: Inputs) -> float:
+        """The level at this scan; to be called once a scan."""
+
+
+@dataclass(frozen=True)
+class Count:
+    """The level is a signal: zones/<zone>/bottles or belts/<belt>/bottles."""
+
+    signal: str
+
+    def read(self, inputs: Inputs) -> float:
+        """Bottles."""
+        return inputs[self.signal]
+
+
+@dataclass(frozen=True)
+class Counters:
+    """The level is what was there at the start and came in, less what left: counters/<counter>/forward, for example."""
+
+    entered: tuple[str, ...]
+    left: tuple[str, ...]
+    at_start: float = 0.0
+
+    def read(self, inputs: Inputs) -> float:
+        """Bottles."""
+        return self.at_start + sum(inputs[name] for name in self.entered) - sum(inputs[name] for name in self.left)
+
+
+@dataclass
+class Eyes:
+    """The level is how many photo-eyes are covered: bottles stand at them.
+
+    eyes: names. on, off: s for which one must be blocked or free; `on` longer than a passing bottle takes.
+    """
+
+    eyes: tuple[str, ...]
+    on: float = 1.0
+    off: float = 1.0
+    _covered: tuple[COVERED, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        require(bool(self.eyes), "eyes: none given, expected the name of a photo-eye or more")
+        self._covered = tuple(COVERED(self.on, self.off) for _ in self.eyes)
+
+    def read(self, inputs: Inputs) -> float:
+        """Eyes."""
+        blocked = [inputs.on(eye_signal(eye)) for eye in self.eyes]
+        return sum(block(on, inputs.time) for block, on in zip(self._covered, blocked, strict=True))
+
+
+@dataclass
+class LevelControl:
+    """Holds the feeder from level `high` until the level is down to `low`; the table runs fast up to `low`, slow above.
+
+    level: bottles (Count, Counters), or covered eyes (Eyes: with one eye at the low mark and one at the high mark, low
+    is 0 and high is 2). feeder, table: belts. Speeds in m/s; slow keeps the pressure low while bottles stand.
+    """
+
+    level: Level
+    feeder: str
+    table: str
+    high: float
+    low: float
+    feeder_speed: float
+    table_slow: float
+    table_fast: float
+    held_speed: float = 0.0
+    _full: HYSTERESIS = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        require(self.low <= self.high, f"high: {self.high:g} given, expected low, {self.low:g}, or more")
+        self._full = HYSTERESIS(self.low, self.high)
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """Speeds of feeder and table."""
+        level = self.level.read(inputs)
+        return {
+            speed_command(self.feeder): self.held_speed if self._full(level) else self.feeder_speed,
+            speed_command(self.table): self.table_fast if level <= self.low else self.table_slow,
+        }

@@ -1,0 +1,91 @@
+"""V-curve: machines on both sides of the bottleneck run faster than it, the more so the further away they are.
+
+Plotted over the line, the rates make a V with the bottleneck at its tip. The surplus is used to win back what a stop
+has cost: upstream to refill the buffers before the bottleneck, downstream to empty those behind it. While a buffer is
+at its level, the machine beyond it follows the one nearer to the bottleneck. After a stop, a buffer is back at its
+level in surplus / rate difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from conveyor_sim.control.level import Level
+from conveyor_sim.control.scan import Inputs, require
+
+
+class _Buffer(Enum):
+    SHORT = -1
+    AT_LEVEL = 0
+    OVER = 1
+
+
+@dataclass
+class Neighbour:
+    """A machine beside the bottleneck, and the buffer between it and the next machine towards the bottleneck.
+
+    command: what sets its rate (machines/<m>/rate, 1/s). level: of the buffer, in bottles or in covered back-up eyes;
+    no two machines share one. From `high` up there is a surplus, from `low` down a lack, each until the level is back
+    at `target`. With two back-up eyes that is 0, 1 and 2.
+    """
+
+    command: str
+    level: Level
+    low: float
+    target: float
+    high: float
+    _buffer: _Buffer = field(default=_Buffer.AT_LEVEL, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given = f"{self.low:g}, {self.target:g} and {self.high:g}"
+        require(self.low <= self.target <= self.high, f"low, target, high: {given} given, expected a rising order")
+
+    def buffer(self, inputs: Inputs) -> _Buffer:
+        """How full the buffer is; once a scan."""
+        level = self.level.read(inputs)
+        if self._buffer is _Buffer.OVER and level > self.target:
+            return self._buffer
+        if self._buffer is _Buffer.SHORT and level < self.target:
+            return self._buffer
+        self._buffer = _Buffer.AT_LEVEL
+        if level > self.target and level >= self.high:
+            self._buffer = _Buffer.OVER
+        elif level < self.target and level <= self.low:
+            self._buffer = _Buffer.SHORT
+        return self._buffer
+
+
+@dataclass
+class VCurve:
+    """Rates of a line with a bottleneck.
+
+    bottleneck: the command that sets its rate. rate: 1/s. margin: of `rate`, by which a machine may be faster, or
+    must be slower, for each step that it is away. upstream, downstream: the machines on either side, the nearest
+    first.
+    """
+
+    bottleneck: str
+    rate: float
+    margin: float
+    upstream: tuple[Neighbour, ...] = ()
+    downstream: tuple[Neighbour, ...] = ()
+
+    def __post_init__(self) -> None:
+        furthest = max(len(self.upstream), len(self.downstream), 1)
+        fits = 0.0 < self.margin < 1.0 / furthest
+        require(fits, f"margin: {self.margin:g} given, expected more than 0 and less than {1.0 / furthest:g}")
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """A rate for each machine, 1/s."""
+        answer = {self.bottleneck: self.rate}
+        # Upstream a lack calls for more, downstream a surplus.
+        for machines, faster in ((self.upstream, _Buffer.SHORT), (self.downstream, _Buffer.OVER)):
+            rate = self.rate
+            for step, machine in enumerate(machines, 1):
+                buffer = machine.buffer(inputs)
+                if buffer is not _Buffer.AT_LEVEL:
+                    rate = self.rate * (1.0 + (step if buffer is faster else -step) * self.margin)
+                answer[machine.command] = rate
+        return answer

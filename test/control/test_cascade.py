@@ -1,0 +1,64 @@
+"""Cascade stop and start of three belts in a row."""
+
+from __future__ import annotations
+
+import pytest
+from control.scans import Scans
+
+from conveyor_sim.control.cascade import Cascade, Zone
+
+NAMES = ("a", "b", "c")  # downstream
+TAKES = "machines/packer/running"
+
+
+def eye(name: str) -> str:
+    return f"photo_eyes/{name}/blocked"
+
+
+def speed(name: str) -> str:
+    return f"belts/{name}/cmd_speed"
+
+
+@pytest.fixture
+def scans() -> Scans:
+    zones = tuple(Zone(name, name, 0.3) for name in NAMES)
+    controller = Cascade(zones, TAKES, full_delay=1.0, clear_delay=0.2, start_delay=0.7)
+    return Scans(controller, **{eye(name): 0.0 for name in NAMES}, **{TAKES: 1.0})
+
+
+def running(answer: dict[str, float]) -> str:
+    return "".join(name for name in NAMES if answer[speed(name)] == 0.3)
+
+
+def test_bottles_on_their_way_stop_nothing(scans: Scans) -> None:
+    moving = [(2.0, {eye(name): 1.0}) for name in NAMES]
+    assert [running(answer) for answer in scans.table(moving)] == ["abc"] * 3
+
+
+def test_zones_stop_as_they_fill_each_after_its_delay(scans: Scans) -> None:
+    assert running(scans.hold(5.0, {TAKES: 0.0})) == "abc"  # there is room yet
+    assert scans.until(speed("c"), 0.0, 2.0, {eye("c"): 1.0}) == pytest.approx(1.0)
+    assert running(scans.hold(5.0)) == "ab"
+    assert scans.until(speed("b"), 0.0, 2.0, {eye("b"): 1.0}) == pytest.approx(1.0)
+    assert scans.until(speed("a"), 0.0, 2.0, {eye("a"): 1.0}) == pytest.approx(1.0)
+    assert running(scans.hold(0.1)) == ""
+
+
+def test_they_start_from_the_front_one_after_the_other(scans: Scans) -> None:
+    scans.hold(2.0, {TAKES: 0.0, **{eye(name): 1.0 for name in NAMES}})
+    # A zone's eye may stay blocked by the bottles that come after: only the delays count.
+    started = [scans.until(speed(name), 0.3, 2.0, {TAKES: 1.0}) for name in reversed(NAMES)]
+    assert started == pytest.approx([0.7, 0.69, 0.69])  # the second is counted from the scan after the first
+
+
+def test_a_zone_that_got_room_runs_although_nothing_is_taken(scans: Scans) -> None:
+    scans.hold(2.0, {TAKES: 0.0, **{eye(name): 1.0 for name in NAMES}})
+    assert scans.until(speed("b"), 0.3, 1.0, {eye("b"): 0.0}) == pytest.approx(0.2)
+    assert running(scans.hold(0.6)) == "b"
+    assert running(scans.hold(0.2)) == "ab"  # b takes what a holds
+
+
+def test_a_short_release_does_not_start_the_row(scans: Scans) -> None:
+    scans.hold(2.0, {TAKES: 0.0, **{eye(name): 1.0 for name in NAMES}})
+    answers = scans.table([(0.6, {TAKES: 1.0}), (0.1, {TAKES: 0.0})] * 4)
+    assert [running(answer) for answer in answers] == [""] * 8
