@@ -51,6 +51,7 @@ setup(
             "conveyor-sim = conveyor_sim.cli:main",
             "sim_node = conveyor_sim.ros.sim_node:main",
             "plc_node = conveyor_sim.ros.plc_node:main",
+            "controller_node = conveyor_sim.ros.controller_node:main",
         ]
     },
 )

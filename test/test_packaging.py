@@ -105,6 +105,7 @@ def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
     assert built.returncode == 0, built.stdout + built.stderr
     prefix = tmp_path / "install" / "conveyor_sim"
     assert {file.name for file in (prefix / "lib" / "conveyor_sim").iterdir()} == {
+        "controller_node",
         "conveyor-sim",
         "plc_node",
         "sim_node",

@@ -38,6 +38,8 @@ LATCHED = Qos(depth=1, durability="transient_local")
 """What is published once: a subscriber that joins late still gets it."""
 COMMANDS = Qos(depth=100)
 """Commands, their outcomes, what the guard tells: each one counts."""
+ALARMS = Qos(depth=100, durability="transient_local")
+"""A controller's alarms: who joins late still gets what came and went before."""
 CLOCK = Qos(depth=1)
 """Reliable, because that also matches subscribers that ask for best effort."""
 
@@ -53,6 +55,7 @@ QOS = {
     "plant": LATCHED,
     "outcomes": COMMANDS,
     "guard": COMMANDS,
+    "alarms": ALARMS,
     "commands": COMMANDS,
     "cmd_speed": COMMANDS,
     "clock": CLOCK,

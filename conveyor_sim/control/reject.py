@@ -21,9 +21,9 @@ class TrackedReject:
     belt: with the encoder, belts/<belt>/pulses, of `pulses_per_metre`. inspection: the count of bottles found bad
     (machines/<m>/bad). seen: a signal that tells when the last of them was seen (machines/<m>/bad_time), or the last
     bottle at all (photo_eyes/<e>/rose), s. fire: the command (machines/<r>/fire). distance: m, from where a bottle is
-    when it is seen to where it is to be hit. stroke: m that `fire` stays on for; more than the belt moves in a scan, and
-    less than the way from one bottle to the next by two such, for a rejecter acts on what rises. response: s from the
-    end of the scan that fires until the bottle is hit, led by the belt's speed.
+    when it is seen to where it is to be hit. stroke: m that `fire` stays on for; more than the belt moves in a scan,
+    and less than the way from one bottle to the next by two such, for a rejecter acts on what rises. response: s from
+    the end of the scan that fires until the bottle is hit, led by the belt's speed.
     """
 
     belt: str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from rclpy.node import Node
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest
+from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
 
@@ -36,19 +37,29 @@ class LockstepService:
         asked = LockstepRequest(
             request.run_id, request.target_tick, tuple(request.names), tuple(request.values), request.release
         )
+
+        def advance() -> Future[LockstepAnswer]:
+            try:
+                return self._stepper.advance_lockstep(asked)
+            except Refused as error:  # answered with what is now, which only the stepping thread may look at
+                response.reason = str(error)
+                present: Future[LockstepAnswer] = Future()
+                present.set_result(self._stepper.present())
+                return present
+
         try:
-            coming = await settled(self._executor, self._stepper.call(lambda: self._stepper.advance_lockstep(asked)))
+            coming = await settled(self._executor, self._stepper.call(advance))
             answer = await settled(self._executor, coming)
         except ConveyorError as error:
             response.reason = str(error)
             response.tick = self._stepper.session.simulation.tick
             response.time = to_time(self._stepper.session.simulation.stamp_ns)
             return response
+        response.accepted = not response.reason
         self._fill(response, answer)
         return response
 
     def _fill(self, response: Any, answer: LockstepAnswer) -> None:
-        response.accepted = True
         response.tick = answer.tick
         response.time = to_time(answer.stamp_ns)
         response.signals.header.stamp = response.time

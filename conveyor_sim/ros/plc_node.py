@@ -1,35 +1,26 @@
-"""Executable `plc_node`: a PLC-like controller of the paper's plant, a ROS node of its own.
+"""Executable `plc_node`: a PLC-like controller of the paper's plant, a ROS node of its own, in lockstep.
 
-Once a scan it hands its setpoints to the node `conveyor_sim` through the service `lockstep` and gets the process image
-back. What it decides is in plc_logic.py.
+What it decides is the level control of conveyor_sim/control/level.py, from the count of bottles on the table.
 """
 
 from __future__ import annotations
 
 import sys
-import threading
-import time
+from collections.abc import Mapping
 from contextlib import closing, suppress
 from typing import Any
 
 import rclpy
-from conveyor_msgs.msg import Line
-from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.control.level import Count, LevelControl
+from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.ros.controller import ControllerRun, Stopped
 from conveyor_sim.ros.declared import Entry, declare_table
-from conveyor_sim.ros.plc_logic import PlcMemory, PlcSettings, count_signal, scan
-from conveyor_sim.ros.publishers import ros_qos
-from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stop_request import StopRequest
-from conveyor_sim.scene import parse_overrides, parse_scene
-
-LOOK = 0.01  # s of wall time between two looks for the simulation
-PATIENCE = 1.0  # s of wall time without an answer after which the same request is sent again
 
 SETTINGS = (
     Entry("feeder", "feeder", "Belt that brings bottles to the table."),
@@ -46,102 +37,28 @@ SCANNING = (
 )
 
 
-class Stopped(Exception):
-    """The controller was asked to end."""
+def run(stop: StopRequest) -> None:
+    """Control until the end of the run, or until asked to stop. Raises ConveyorError."""
+    node = Node("plc_node")
+    settings = declare_table(node, SETTINGS)
+    scanning = declare_table(node, SCANNING)
+    controller = ControllerRun(node, lambda line: level_control(line, settings), **scanning, stop=stop)
+    with closing(controller), suppress(Stopped):
+        controller.run_lockstep()
 
 
-class PlcNode:
-    """Scans until the end of the run, or until `stop` is requested."""
-
-    def __init__(self, stop: StopRequest) -> None:
-        """Raises ConveyorError for a parameter that can't be."""
-        self._stop = stop
-        self._node = Node("plc_node")
-        self._settings = PlcSettings(**declare_table(self._node, SETTINGS))
-        scanning = declare_table(self._node, SCANNING)
-        self._scan_ticks: int = scanning["scan_ticks"]
-        self._run_id: str = scanning["run_id"]
-        self._line: Any = None
-        self._has_line = threading.Event()
-        self._node.create_subscription(Line, "line", self._on_line, ros_qos(QOS["line"]))
-        self._lockstep = self._node.create_client(Lockstep, "lockstep")
-        self._spinner = Spinner()
-        self._spinner.start(self._node)
-
-    def close(self) -> None:
-        """Leave the domain."""
-        self._spinner.close()
-        self._node.destroy_node()
-
-    def run(self) -> None:
-        """Raises ConveyorError if the line has not the belts asked for, or a scan is refused; Stopped if asked to."""
-        log = self._node.get_logger()
-        log.info("waiting for the simulation")
-        while not (self._has_line.is_set() and self._lockstep.service_is_ready()):
-            self._require_going_on()
-            time.sleep(LOOK)
-        line, tick, last, signals, memory = None, 0, 0, dict[str, float](), PlcMemory()
-        while line is None or tick < last:
-            if self._line is not line:  # at the start, and after a reset
-                line, signals, memory = self._line, {}, PlcMemory()
-                self._require_belts(line)
-                last = _last_tick(line)
-                # Stale by intent: the refusal tells the present tick, which is not 0 if this controller was restarted.
-                tick = self._call(0, {}).tick
-                log.info(f"controls {line.scene_name} from tick {tick}")
-                continue
-            setpoints: dict[str, float] = {}
-            if signals:
-                setpoints, memory = scan(signals, self._settings, memory)
-            target = min(tick + self._scan_ticks, last)
-            response = self._call(target, setpoints, release=target == last)
-            if not response.accepted:
-                raise ConveyorError(f"lockstep to tick {target} refused: {response.reason}")
-            for outcome in response.outcomes:
-                if not outcome.accepted:
-                    log.warning(f"{', '.join(outcome.names)} refused: {outcome.reason}")
-            tick = response.tick
-            signals = dict(zip(line.signal_names, response.signals.values, strict=True))
-        log.info(f"ends at tick {tick}")
-
-    def _call(self, target: int, setpoints: dict[str, float], release: bool = False) -> Any:
-        """The answer to a request, sent again for as long as there is none: the same request is safe to repeat."""
-        request = Lockstep.Request(
-            run_id=self._run_id,
-            target_tick=target,
-            names=list(setpoints),
-            values=list(setpoints.values()),
-            release=release,
-        )
-        while True:
-            self._require_going_on()
-            try:
-                response = self._lockstep.call(request, timeout_sec=PATIENCE)
-            except TimeoutError:  # as newer distributions tell it; Jazzy returns None
-                response = None
-            if response is not None:
-                return response
-            self._node.get_logger().warning(f"no answer to the request for tick {target}; sent again")
-
-    def _require_going_on(self) -> None:
-        if self._stop.requested:
-            raise Stopped
-
-    def _require_belts(self, line: Any) -> None:
-        for belt in (self._settings.feeder, self._settings.table):
-            if speed_command(belt) not in line.command_names or count_signal(belt) not in line.signal_names:
-                belts = ", ".join(line.belts) or "no belts"
-                raise ConveyorError(f"belt {belt!r}: not on the line {line.scene_name}, which has {belts}")
-
-    def _on_line(self, line: Any) -> None:
-        self._line = line
-        self._has_line.set()
-
-
-def _last_tick(line: Any) -> int:
-    """The tick at which the run ends."""
-    scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
-    return scene.duration_ticks
+def level_control(line: Any, settings: Mapping[str, Any]) -> Controller:
+    """Level control of a line (conveyor_msgs/Line). Raises ConveyorError if it has not the belts asked for."""
+    for belt in (settings["feeder"], settings["table"]):
+        if speed_command(belt) not in line.command_names:
+            belts = ", ".join(line.belts) or "no belts"
+            raise ConveyorError(f"belt {belt!r}: not on the line {line.scene_name}, which has {belts}")
+    speeds = {name: settings[name] for name in ("feeder", "table", "feeder_speed", "table_slow", "table_fast")}
+    count = Count(f"belts/{settings['table']}/bottles")
+    try:
+        return LevelControl(count, high=settings["high_mark"], low=settings["low_mark"], **speeds)
+    except ControlError as error:
+        raise ConveyorError(f"marks: {error}") from error
 
 
 def main() -> None:
@@ -149,8 +66,7 @@ def main() -> None:
     with StopRequest() as stop:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         try:
-            with closing(PlcNode(stop)) as plc, suppress(Stopped):
-                plc.run()
+            run(stop)
         except ConveyorError as error:
             sys.exit(f"plc_node: {error}")
         finally:

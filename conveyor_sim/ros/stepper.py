@@ -12,7 +12,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -231,14 +231,17 @@ class Stepper:
 
         def done() -> None:
             outcomes, self._outcomes = tuple(self._outcomes), []
-            answer.set_result(
-                LockstepAnswer(
-                    simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes
-                )
-            )
+            answer.set_result(replace(self.present(), outcomes=outcomes))
 
         self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
+
+    def present(self) -> LockstepAnswer:
+        """What the simulation is now, without outcomes."""
+        simulation = self.session.simulation
+        return LockstepAnswer(
+            simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes=()
+        )
 
     def _leave(self, reason: str) -> None:
         """End this run, whatever is under way in it."""

@@ -31,7 +31,10 @@ def stop_and_go(time: float) -> float:
 
 
 def fired_at(fronts: list[float], bad: set[int], speed: Speed, late: int) -> list[tuple[float, float, float]]:
-    """From travel (m) to travel, and the speed (m/s) at first, of each time that it fires; `late`: scans from a bottle's rise to the inspection's verdict."""
+    """From travel (m) to travel, and the speed (m/s) at first, of each time that it fires.
+
+    late: scans from a bottle's rise to the inspection's verdict.
+    """
     controller = TrackedReject("belt", "machines/look/bad", SEEN, FIRE, DISTANCE, STROKE, PULSES)
     scans, beam, edges = Scans(controller), Beam("look"), edges_of(fronts, DIAMETER)
     travel, verdicts, rises, fired = 0.0, [0] * (late + 1), 0, list[tuple[float, float, float]]()

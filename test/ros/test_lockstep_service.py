@@ -50,10 +50,11 @@ def test_a_request_sent_twice_at_once_is_carried_out_once(line: LineClient) -> N
     assert answers[2] == answers[0]
 
 
-def test_a_stale_request_is_refused_and_tells_the_present_tick(line: LineClient) -> None:
-    line.lockstep(10)
+def test_a_stale_request_is_refused_and_tells_the_present_tick_and_signals(line: LineClient) -> None:
+    at_ten = line.lockstep(10)
     response = line.lockstep(9)
     assert not response.accepted
+    assert (response.signals, response.state_hash) == (at_ten.signals, at_ten.state_hash)
     assert "stale: target_tick 9 given, expected more than the present tick 10" in response.reason
     assert response.tick == 10
 

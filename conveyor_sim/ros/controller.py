@@ -1,0 +1,204 @@
+"""Runs a controller (conveyor_sim/control) beside a simulation, as a ROS node: in lockstep with it, or free.
+
+In lockstep every scan is one call of the service `lockstep`: commands in, process image out. The first scan is at the
+tick at which the controller comes in, 0 for a run that waits at its start, so that the run is the same as in one
+process. Free, it scans the `signals` that arrive and publishes `commands`, as a PLC would that nobody waits for.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from conveyor_msgs.msg import Commands, Line, Signals
+from conveyor_msgs.srv import Lockstep
+from rclpy.node import Node
+
+from conveyor_sim.bag.qos import QOS
+from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.alarms import Alarms
+from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.ros.stop_request import StopRequest
+from conveyor_sim.scene import parse_overrides, parse_scene
+
+LOOK = 0.01  # s of wall time between two looks for the simulation
+PATIENCE = 1.0  # s of wall time without an answer after which the same request is sent again
+
+Make = Callable[[Any], Controller]
+"""A new controller for the line of a message (conveyor_msgs/Line). Raises ConveyorError or ControlError."""
+
+
+class Stopped(Exception):
+    """The controller was asked to end."""
+
+
+class Scanner:
+    """A controller on the line of one run: values in the line's order in, commands out; alarms are published."""
+
+    def __init__(self, controller: Controller, line: Any, alarms: Alarms) -> None:
+        """line: conveyor_msgs/Line."""
+        self._controller = controller
+        self._names: Sequence[str] = line.signal_names
+        self._tick_ns: int = line.tick_ns
+        self._alarms = alarms
+
+    def scan(self, values: Sequence[float], tick: int, ticks: int) -> dict[str, float]:
+        """Commands by name, for the scan at a tick that is so many ticks long. Raises ConveyorError."""
+        signals = dict(zip(self._names, values, strict=True))
+        try:
+            answer = self._controller.scan(
+                Inputs(signals, tick * self._tick_ns * 1e-9, tick, ticks * self._tick_ns * 1e-9)
+            )
+        except ControlError as error:
+            raise ConveyorError(f"scan at tick {tick}: {error}") from error
+        self._alarms.tell(_alarms(answer), max(1, tick * self._tick_ns))
+        return {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+
+
+class ControllerRun:
+    """A node's part in a simulation: it finds the line, and has a controller scan until the end."""
+
+    def __init__(self, node: Node, make: Make, *, scan_ticks: int, run_id: str, stop: StopRequest) -> None:
+        """make: called at the start, and again after every reset of the simulation.
+
+        scan_ticks: ticks from one scan to the next. run_id: under which the simulation is owned in lockstep.
+        """
+        self._node = node
+        self._make = make
+        self._scan_ticks = scan_ticks
+        self._run_id = run_id
+        self._stop = stop
+        self._error: Exception | None = None
+        self._line: Any = None
+        self._has_line = threading.Event()
+        self._alarms = Alarms(node)
+        node.create_subscription(Line, "line", self._on_line, ros_qos(QOS["line"]))
+        self._lockstep = node.create_client(Lockstep, "lockstep")
+        self._spinner = Spinner(died=self._died)
+        self._spinner.start(node)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._spinner.close()
+        self._node.destroy_node()
+
+    def run_lockstep(self) -> None:
+        """Scan to the end of the run. Raises ConveyorError if a scan is refused; Stopped if asked to."""
+        log = self._node.get_logger()
+        self._find(self._lockstep.service_is_ready)
+        line, tick, last, values = None, 0, 0, list[float]()
+        while line is None or tick < last:
+            if self._line is not line:  # at the start, and after a reset
+                line = self._line
+                scanner = self._scanner(line)
+                last = _last_tick(line)
+                # Stale by intent: the refusal tells the present tick, which is not 0 if this controller was restarted.
+                present = self._call(0, {})
+                tick, values = present.tick, present.signals.values
+                log.info(f"controls {line.scene_name} from tick {tick}")
+                continue
+            target = min(tick + self._scan_ticks, last)
+            commands = scanner.scan(values, tick, target - tick)
+            response = self._call(target, commands, release=target == last)
+            if not response.accepted:
+                raise ConveyorError(f"lockstep to tick {target} refused: {response.reason}")
+            for outcome in response.outcomes:
+                if not outcome.accepted:
+                    log.warning(f"{', '.join(outcome.names)} refused: {outcome.reason}")
+            tick, values = response.tick, response.signals.values
+        log.info(f"ends at tick {tick}")
+
+    def run_free(self) -> None:
+        """Scan what arrives, until asked to stop. Raises ConveyorError if a scan fails."""
+        self._find(lambda: True)
+        free = _FreeScans(self._node, self._scan_ticks, self._scanner, lambda: self._line)
+        self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(QOS["signals"]))
+        self._node.get_logger().info(f"controls {self._line.scene_name} as its signals arrive")
+        self._stop.wait()
+        if self._error is not None:
+            raise self._error
+
+    def _find(self, ready: Callable[[], bool]) -> None:
+        self._node.get_logger().info("waiting for the simulation")
+        while not (self._has_line.is_set() and ready()):
+            self._require_going_on()
+            time.sleep(LOOK)
+
+    def _scanner(self, line: Any) -> Scanner:
+        return Scanner(self._make(line), line, self._alarms)
+
+    def _call(self, target: int, commands: Mapping[str, float], release: bool = False) -> Any:
+        """The answer to a request, sent again for as long as there is none: the same request is safe to repeat."""
+        request = Lockstep.Request(
+            run_id=self._run_id,
+            target_tick=target,
+            names=list(commands),
+            values=list(commands.values()),
+            release=release,
+        )
+        while True:
+            self._require_going_on()
+            try:
+                response = self._lockstep.call(request, timeout_sec=PATIENCE)
+            except TimeoutError:  # as newer distributions tell it; Jazzy returns None
+                response = None
+            if response is not None:
+                return response
+            self._node.get_logger().warning(f"no answer to the request for tick {target}; sent again")
+
+    def _require_going_on(self) -> None:
+        if self._error is not None:
+            raise self._error
+        if self._stop.requested:
+            raise Stopped
+
+    def _on_line(self, line: Any) -> None:
+        self._line = line
+        self._has_line.set()
+
+    def _died(self, error: Exception) -> None:
+        self._error = error
+        self._stop.request()
+
+
+class _FreeScans:
+    """Scans signals as they arrive, every `scan_ticks` ticks or as seldom as they come."""
+
+    def __init__(self, node: Node, scan_ticks: int, scanner: Callable[[Any], Scanner], line: Callable[[], Any]) -> None:
+        self._commands = node.create_publisher(Commands, "commands", ros_qos(QOS["commands"]))
+        self._scan_ticks = scan_ticks
+        self._make = scanner
+        self._present = line
+        self._line: Any = None
+        self._scanner: Scanner | None = None
+        self._last: int | None = None
+
+    def on_signals(self, message: Any) -> None:
+        """One process image."""
+        line = self._present()
+        if self._scanner is None or line is not self._line or (self._last is not None and message.tick < self._last):
+            self._line, self._last, self._scanner = line, None, self._make(line)
+        ticks = self._scan_ticks if self._last is None else message.tick - self._last
+        if ticks < self._scan_ticks or len(message.values) != len(line.signal_names):
+            return
+        self._last = message.tick
+        commands = self._scanner.scan(message.values, message.tick, ticks)
+        if commands:
+            answer = Commands(tick=message.tick, names=list(commands), values=list(commands.values()))
+            answer.header = message.header
+            self._commands.publish(answer)
+
+
+def _alarms(answer: Mapping[str, float]) -> dict[str, bool]:
+    """Alarms by their texts."""
+    return {name.removeprefix(ALARMS): value != 0.0 for name, value in answer.items() if name.startswith(ALARMS)}
+
+
+def _last_tick(line: Any) -> int:
+    """The tick at which the run ends."""
+    scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
+    return scene.duration_ticks

@@ -1,0 +1,83 @@
+"""Executable `controller_node`: runs any controller, by name, beside the node `conveyor_sim`.
+
+    controller_node --ros-args -p controller:=my_line.py:make -p parameters:="{table: accumulation}"
+
+The simulation must wait (start_paused:=true) for a controller in lockstep; for one that runs free (mode:=free) it
+must play and output `signals`.
+"""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing, suppress
+from typing import Any
+
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from conveyor_sim.control.load import load
+from conveyor_sim.control.scan import ControlError, Controller
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.controller import ControllerRun, Stopped
+from conveyor_sim.ros.declared import Entry, declare_table
+from conveyor_sim.ros.stop_request import StopRequest
+from conveyor_sim.scene.yaml_lines import Document
+
+NAME = "controller"
+MODES = ("lockstep", "free")
+
+PARAMETERS = (
+    Entry("controller", "", "module:factory or file.py:factory."),
+    Entry("parameters", "", "The factory's parameters by name, as a YAML mapping."),
+    Entry("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
+    Entry("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
+    Entry("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
+)
+
+
+def run(stop: StopRequest) -> None:
+    """Control until the end of the run, or until asked to stop. Raises ConveyorError."""
+    node = Node(NAME)
+    given = declare_table(node, PARAMETERS)
+    if given["mode"] not in MODES:
+        raise ConveyorError(f"parameter mode: {given['mode']!r} given, expected {' or '.join(MODES)}")
+    parameters = _mapping(given["parameters"])
+
+    def make(line: Any) -> Controller:
+        try:
+            return load(given["controller"], parameters)
+        except ControlError as error:
+            raise ConveyorError(str(error)) from error
+
+    make(None)  # what can't be made is told before there is a simulation
+    controller = ControllerRun(node, make, scan_ticks=given["scan_ticks"], run_id=given["run_id"], stop=stop)
+    with closing(controller), suppress(Stopped):
+        if given["mode"] == "free":
+            controller.run_free()
+        else:
+            controller.run_lockstep()
+
+
+def _mapping(text: str) -> dict[str, object]:
+    """What a YAML text says; "" is nothing. Raises ConveyorError."""
+    data = Document(text, "parameter parameters").data if text.strip() else {}
+    if not isinstance(data, dict):
+        raise ConveyorError(f"parameter parameters: {text!r} given, expected a mapping in YAML")
+    return data
+
+
+def main() -> None:
+    """Exits with 0 at the end or after Ctrl-C or SIGTERM, with 1 and one sentence if the controller can't go on."""
+    with StopRequest() as stop:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            run(stop)
+        except ConveyorError as error:
+            sys.exit(f"controller_node: {error}")
+        finally:
+            rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    main()

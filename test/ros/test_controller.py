@@ -1,0 +1,120 @@
+"""Any controller as a node beside the simulation: in lockstep with it, and free."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from conveyor_msgs.msg import CommandOutcome, Signals
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from ros.conftest import SMALL_LINE
+from ros.line_client import LineClient, until
+from std_srvs.srv import Trigger
+
+from conveyor_sim.control import Inputs
+from conveyor_sim.ros.child import Child
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
+
+FILE = Path(__file__).with_name("small_line_controller.py")
+HIGH, SCAN, LAST = 13, 5, 400  # bottles on the table, ticks, tick of the small line's end
+JAM = "{name: exit, belt: table, passages: [outfeeds/out/removed], waiting: belts/table/bottles}"
+StartController = Callable[..., Child]
+
+
+@pytest.fixture
+def start_controller(domain: int, tmp_path: Path) -> Iterator[StartController]:
+    """Starts `controller_node` with ROS parameters."""
+    children: list[Child] = []
+
+    def start(**parameters: object) -> Child:
+        given = {"controller": f"{FILE}:make", "parameters": f"{{high: {HIGH}}}", "scan_ticks": SCAN, **parameters}
+        environment = {**os.environ, "ROS_LOG_DIR": str(tmp_path / "ros")}
+        children.append(Child("controller_node", given, environment, tmp_path))
+        return children[-1]
+
+    yield start
+    for child in children:
+        child.stop()
+
+
+def in_process() -> tuple[int, list[tuple[int, bool]]]:
+    """The state hash at the end of the same run in this process, and at which ticks the alarm comes or goes."""
+    from ros.small_line_controller import make
+
+    engine, controller, alarms = Simulation(load_scene(SMALL_LINE)), make(HIGH), list[tuple[int, bool]]()
+    while engine.tick < LAST:
+        signals = dict(zip(engine.process_image.signal_names, engine.signals(), strict=True))
+        answer = dict(controller.scan(Inputs(signals, engine.time, engine.tick, SCAN * 0.01)))
+        alarm = answer.pop("alarms/table full") == 1.0
+        if not alarms or alarms[-1][1] != alarm:
+            alarms.append((engine.tick, alarm))
+        engine.command(tuple(answer), tuple(answer.values()))
+        engine.advance(SCAN)
+    return engine.state_hash(), alarms
+
+
+def heard_of(message: DiagnosticArray) -> tuple[int, bool]:
+    """Tick of an alarm message, and whether the one alarm stands."""
+    (status,) = message.status
+    assert (status.name, status.hardware_id) == ("table full", "controller")
+    tick = round((message.header.stamp.sec + message.header.stamp.nanosec * 1e-9) / 0.01)
+    return tick, status.level == DiagnosticStatus.ERROR
+
+
+def test_in_lockstep_it_gives_the_same_bits_as_in_one_process(
+    start_controller: StartController, start_node: Callable[..., Child], client: LineClient
+) -> None:
+    state_hash, alarms = in_process()
+    assert len(alarms) >= 2  # it comes, at least
+    controller = start_controller()  # waits for the simulation
+    with client.listen(DiagnosticArray, "alarms") as heard:
+        node = start_node()
+        until(lambda: controller.exit_code is not None, "the end of the controller")
+        assert controller.exit_code == 0, controller.obituary()
+        end = client.lockstep(LAST + 1)
+        assert (end.accepted, end.tick) == (False, LAST)
+        assert end.state_hash == state_hash
+        until(lambda: len(heard.messages) == len(alarms), "all alarms")
+        assert [heard_of(message) for message in heard.messages] == alarms
+    node.stop()
+
+
+def test_running_free_it_commands_as_signals_arrive(
+    start_controller: StartController, start_node: Callable[..., Child], client: LineClient
+) -> None:
+    node = start_node(duration=1000.0, real_time_factor=1.0)
+    start_controller(mode="free", scan_ticks=1)
+    with client.listen(CommandOutcome, "outcomes") as outcomes, client.listen(Signals, "signals") as signals:
+        client.call(Trigger, "resume")
+        outcome = until(lambda: outcomes.messages, "a command")[0]
+        assert (outcome.source, outcome.accepted) == ("commands", True)
+        assert dict(zip(outcome.names, outcome.values, strict=True))["belts/feeder/cmd_speed"] == 0.7
+        until(lambda: signals.messages[-1].values[0] == 0.7, "the feeder at its speed")
+    node.stop()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "says"),
+    [
+        ({"mode": "loose"}, "parameter mode: 'loose' given, expected lockstep or free"),
+        ({"controller": f"{FILE}:fake"}, "small_line_controller.py has no 'fake'"),
+        ({"parameters": "13"}, "parameter parameters: '13' given, expected a mapping"),
+    ],
+)
+def test_what_cannot_be_is_told_at_once(
+    start_controller: StartController, parameters: dict[str, str], says: str
+) -> None:
+    controller = start_controller(**parameters)
+    until(lambda: controller.exit_code is not None, "the end of the controller")
+    assert controller.exit_code == 1
+    log = controller.log.read_text()
+    assert log.startswith("controller_node: ") and says in log and log.count("\n") == 1
+
+
+def test_a_scan_that_fails_ends_it_with_a_sentence(start_controller: StartController, line: LineClient) -> None:
+    controller = start_controller(controller="conveyor_sim.control.jam:JamAlarm", parameters=JAM)
+    until(lambda: controller.exit_code is not None, "the end of the controller")
+    assert "controller_node: scan at tick 0: outfeeds/out/removed: no such signal" in controller.log.read_text()
