@@ -262,6 +262,10 @@ class Simulation:
         """The process image's values, in the order of `process_image.signal_names`; float64."""
         return self._line.signals()
 
+    def photo_eyes(self) -> dict[str, bool]:
+        """Whether each photo-eye tells that it is blocked, by name ("photo_eyes/exit")."""
+        return self._line.photo_eyes()
+
     def state_hash(self) -> int:
         """64 bits over tick, bottles and belts: equal if and (all but surely) only if the states are."""
         bottles = self.bottles()

@@ -27,6 +27,7 @@ LEDGER = "conveyor_msgs/msg/Ledger"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
 GUARD_EVENT = "conveyor_msgs/msg/GuardEvent"
 LINE = "conveyor_msgs/msg/Line"
+BOOL = "std_msgs/msg/Bool"
 POSES = "geometry_msgs/msg/PoseArray"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 
@@ -120,6 +121,13 @@ def poses_message(columns: BottleColumns, header: Header) -> bytes:
     writer = CdrWriter()
     writer.header(header.stamp_ns, header.frame_id)
     writer.double_rows(pose_rows(columns.x, columns.y, columns.theta))
+    return writer.finish()
+
+
+def bool_message(value: bool, header: Header) -> bytes:
+    """std_msgs/Bool, which has no header."""
+    writer = CdrWriter()
+    writer.pack("?", value)
     return writer.finish()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
@@ -11,6 +11,7 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.qos import QOS, Qos
+from conveyor_sim.scene.sensor_shapes import sensor_shapes
 
 if TYPE_CHECKING:
     from conveyor_sim.guard import GuardEvent
@@ -27,12 +28,12 @@ class Output:
     name: str
     type: str
     rate: str | None
-    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes, guard)."""
+    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes, guard, photo-eyes)."""
 
     @property
     def qos(self) -> Qos:
         """The quality of service offered for it."""
-        return QOS[self.name]
+        return QOS[self.name.partition("/")[0]]
 
 
 OUTPUTS: dict[str, Output] = {
@@ -51,7 +52,13 @@ OUTPUTS: dict[str, Output] = {
         Output("ledger", messages.LEDGER, "ledger"),
     )
 }
-"""By name; within a tick, messages are written in this order."""
+"""By name; within a tick, messages are written in this order. These are recorded."""
+
+
+def photo_eye_outputs(names: Iterable[str]) -> dict[str, Output]:
+    """A topic for each photo-eye, by name: latched, sent when it changes. Not recorded, for `signals` has them."""
+    outputs = (Output(f"photo_eyes/{name}", messages.BOOL, None) for name in names)
+    return {output.name: output for output in outputs}
 
 
 class Sink(Protocol):
@@ -104,12 +111,14 @@ class Outputs:
         self._run_id = run_id
         self._frame_id = frame_id
         self._noticed: list[GuardEvent] = []
+        self._eyes: dict[str, bool] = {}
 
     def start(self) -> None:
         """Writes what is latched (line, plant) and the state at the present tick."""
         model, header = self._sim.model, self._header(self._sim.tick)
+        sensors = sensor_shapes(self._sim.scene)
         self._hand_out("line", header, messages.line_message, self._sim, self._run_id)
-        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rail_shapes)
+        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rail_shapes, sensors)
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:
@@ -137,7 +146,15 @@ class Outputs:
         """Writes one outcome that belongs to no tick to come."""
         self._hand_out("outcomes", self._header(outcome.tick), messages.outcome_message, outcome)
 
+    def _write_eyes(self) -> None:
+        eyes = self._sim.photo_eyes()
+        for topic, blocked in eyes.items():
+            if self._eyes.get(topic) is not blocked:
+                self._hand_out(topic, self._header(self._sim.tick), messages.bool_message, blocked)
+        self._eyes = eyes
+
     def _write_state(self) -> None:
+        self._write_eyes()
         header, now = self._header(self._sim.tick), Snapshot(self._sim)
         for topic, serialize in SERIALIZERS.items():
             rate = OUTPUTS[topic].rate

@@ -58,7 +58,8 @@ QOS = {
     "alarms": ALARMS,
     "commands": COMMANDS,
     "cmd_speed": COMMANDS,
+    "photo_eyes": LATCHED,
     "clock": CLOCK,
     "diagnostics": DATA,
 }
-"""By topic; `cmd_speed` stands for every `belts/<belt>/cmd_speed`."""
+"""By topic; `cmd_speed` stands for every `belts/<belt>/cmd_speed`, `photo_eyes` for every `photo_eyes/<eye>`."""

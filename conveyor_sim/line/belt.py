@@ -55,6 +55,14 @@ class BeltDevice(Device):
         """Run as commanded."""
         now.speeds[self._index] = now.setpoints[self._index]
 
+    def speed(self, now: Now) -> float:
+        """The speed that it has, m/s."""
+        return float(now.speeds[self._index])
+
+    def wanted(self, now: Now) -> float:
+        """The speed that it is told to run at, m/s."""
+        return float(now.setpoints[self._index])
+
     def values(self, now: Now) -> Sequence[float]:
         """Speed, m/s, and bottles on it."""
         return now.speeds[self._index], float(np.count_nonzero(now.carriers() == self._index))

@@ -1,6 +1,7 @@
 """The devices of a line: the one place where they are put together. What a scene does not name is not there."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from conveyor_sim.line.infeed import InfeedDevice
 from conveyor_sim.line.inspection import InspectionDevice
 from conveyor_sim.line.outfeed import OutfeedDevice
 from conveyor_sim.line.reject import RejectDevice
+from conveyor_sim.line.sensors import sensor_devices
 from conveyor_sim.line.sink import SinkDevice
 from conveyor_sim.line.source import SourceDevice
 from conveyor_sim.line.spill import SpillDevice
@@ -19,18 +21,20 @@ from conveyor_sim.model import Model
 from conveyor_sim.scene.machines import Inspection, Machine, Sink, Source
 from conveyor_sim.scene.schema import Scene
 
-JITTER, QUALITY, MACHINES = (), (1,), (2,)
-"""Branches of random streams: what infeeds draw of places, what they draw of bad bottles, what machines draw."""
+JITTER, QUALITY, MACHINES, PHOTO_EYES = (), (1,), (2,), (3,)
+"""Branches of random streams: what infeeds draw of places and of bad bottles, what machines draw, chatter."""
 
 
 def build_devices(scene: Scene, model: Model) -> tuple[Device, ...]:
     """All devices of a scene, in the order in which they act and stand in the process image."""
+    belts = list(_belts(scene))
     return (
-        *_belts(scene),
+        *belts,
         *_infeeds(scene, model),
         *(OutfeedDevice(name, outfeed) for name, outfeed in scene.outfeeds.items()),
         *(_machine(name, machine, scene, model, index) for index, (name, machine) in enumerate(scene.machines.items())),
         *(SpillDevice(name, spill, _entry(model, spill.bottle, 0.0, 0.0)) for name, spill in scene.spills.items()),
+        *sensor_devices(scene, belts, partial(_random, scene, PHOTO_EYES)),
     )
 
 

@@ -57,7 +57,7 @@ class DriveDevice(BeltDevice):
     def begin(self, now: Now) -> None:
         """Ramp for a tick."""
         drive = self._drive
-        now.speeds[self._index] = self.ramp.approach(self._wanted(now), drive.acceleration, drive.jerk, now.length)
+        now.speeds[self._index] = self.ramp.approach(self.wanted(now), drive.acceleration, drive.jerk, now.length)
 
     def end(self, now: Now) -> None:
         """Count what was travelled in the tick."""
@@ -66,13 +66,14 @@ class DriveDevice(BeltDevice):
 
     def values(self, now: Now) -> Sequence[float]:
         """As a belt, then running, at_speed, fault, and pulses."""
-        at_speed = abs(self.ramp.value - self._wanted(now)) <= AT_SPEED
+        at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
         values = [*super().values(now), self.run and not self.tripped, at_speed, self.tripped]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
 
-    def _wanted(self, now: Now) -> float:
+    def wanted(self, now: Now) -> float:
+        """The speed that it is told to run at, m/s: none while it is stopped or tripped."""
         if not self.run or self.tripped:
             return 0.0
         setpoint = float(now.setpoints[self._index])

@@ -12,6 +12,7 @@ from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.commands import CommandOutcome, refusal
 from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.part_memory import as_tuples, recall, remembered
 from conveyor_sim.scene.schema import Scene
@@ -34,6 +35,7 @@ class Line:
         devices = build_devices(scene, state.model)
         self._devices = devices
         self._belts = [device for device in devices if isinstance(device, BeltDevice)]
+        self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
         # Nothing is called that does nothing.
         self._beginning = [device for device in devices if type(device).begin is not Device.begin]
         self._ending = [device for device in devices if type(device).end is not Device.end]
@@ -127,6 +129,10 @@ class Line:
         """Values of all signals, in the order of the process image."""
         self.now.begin_scan()
         return np.array([value for device in self._devices for value in device.values(self.now)], dtype=np.float64)
+
+    def photo_eyes(self) -> dict[str, bool]:
+        """Whether each photo-eye tells that it is blocked, by the device's name."""
+        return {eye.name: eye.blocked for eye in self._eyes}
 
     def carriers(self) -> NDArray[np.int32]:
         """Index of the belt that each slot stands on now, (slots,); -1 for the floor and for free slots."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
 from conveyor_sim.scene.machines import Reject, Sink, Source, Spill
 from conveyor_sim.scene.schema import Infeed, Outfeed
+from conveyor_sim.scene.sensor_shapes import SensorShape, sensor_shapes
 
 if TYPE_CHECKING:
     from conveyor_sim.scene import Scene
@@ -42,13 +43,16 @@ class OutfeedMark:
 
 @dataclass(frozen=True)
 class Plant:
-    """What stands still: belts with their speeds in the scene (m/s), rails, infeeds and outfeeds, in listing order."""
+    """What stands still: belts with their speeds in the scene (m/s), rails, infeeds, outfeeds and sensors, in listing
+    order.
+    """
 
     belts: tuple[BeltShape, ...]
     speeds: Floats
     rails: tuple[RailShape, ...]
     infeeds: tuple[InfeedMark, ...] = ()
     outfeeds: tuple[OutfeedMark, ...] = ()
+    sensors: tuple[SensorShape, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene) -> Plant:
@@ -70,6 +74,7 @@ class Plant:
                 OutfeedMark(path[1], np.asarray(exit_.region, dtype=np.float64), _KINDS[type(exit_)])
                 for path, exit_ in scene.exits()
             ),
+            sensors=tuple(sensor_shapes(scene)),
         )
 
     def belt_outline(self, index: int) -> Floats:
@@ -81,11 +86,12 @@ class Plant:
         return np.asarray(self.rails[index].outline(_OUTLINE_POINTS), dtype=np.float64)
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Smallest box (x0, y0, x1, y1) in m around belts, rails, infeeds and outfeeds."""
+        """Smallest box (x0, y0, x1, y1) in m around belts, rails, infeeds, outfeeds and sensors."""
         parts = [self.belt_outline(i) for i in range(len(self.belts))]
         parts += [self.rail_line(i) for i in range(len(self.rails))]
         parts += [mark.position.reshape(1, 2) for mark in self.infeeds]
         parts += [mark.region for mark in self.outfeeds]
+        parts += [sensor.points for sensor in self.sensors]
         return box_around(np.concatenate(parts)) if parts else (math.inf, math.inf, -math.inf, -math.inf)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Floats, Plant
+from conveyor_sim.plot.sensors import sensor_look
 from conveyor_sim.scene.geometry import BeltShape
 
 _Z: Final = 8.0
@@ -84,6 +85,22 @@ def mark_labels(plant: Plant) -> list[Label]:
                 away / np.hypot(*away.T).clip(1e-12)[:, None],
             )
         )
+    return labels
+
+
+def sensor_labels(plant: Plant) -> list[Label]:
+    """Names of photo-eyes, counters and zones: off the ends of a line, on the sides of a zone."""
+    labels = []
+    for sensor in plant.sensors:
+        word, colour = sensor_look(sensor.kind)
+        points = sensor.points
+        if sensor.kind == "zone":
+            anchors = 0.5 * (points + np.roll(points, -1, axis=0))
+            away = anchors - points.mean(axis=0)
+        else:
+            anchors, away = points[::-1], np.array([points[1] - points[0], points[0] - points[1]])
+        outward = away / np.hypot(*away.T).clip(1e-12)[:, None]
+        labels.append(Label(f"{word} {sensor.name}", colour, 8.0, anchors, outward, 0.3))
     return labels
 
 
@@ -164,6 +181,7 @@ def _taken(
     points = [mark.position[None] for mark in plant.infeeds]
     points += [_dense(plant.rail_line(i), ax) for i in range(len(plant.rails))]
     points += [_dense(np.concatenate([outline, outline[:1]]), ax) for outline in outlines]
+    points += [_dense(np.concatenate([sensor.points, sensor.points[:1]]), ax) for sensor in plant.sensors]
     if circles is not None:
         points.append(circles)
     lines = np.zeros((rows, columns))

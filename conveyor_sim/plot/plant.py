@@ -1,4 +1,4 @@
-"""What stands still: belts as areas with chevrons along their travel, rails as strong lines, infeeds and outfeeds."""
+"""What stands still: belts as areas with chevrons along their travel, rails as strong lines, the rest."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from matplotlib.path import Path as Outline
 
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Floats, Plant
+from conveyor_sim.plot.sensors import draw_sensors
 from conveyor_sim.scene.geometry import BeltShape
 
 Z_BELT: Final = 1.0
@@ -22,7 +23,7 @@ Z_INFEED: Final = 5.0
 
 
 def draw_plant(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize, size: float) -> None:
-    """Draw belts, travel, rails, infeeds and outfeeds of `plant` in m.
+    """Draw belts, travel, rails, infeeds, outfeeds and sensors of `plant` in m.
 
     `speeds` (belts,) in m/s at that instant; `norm` maps a speed in m/s to a colour of the speed scale; `size` in m
     is the height of the largest chevron.
@@ -31,6 +32,7 @@ def draw_plant(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize, size: fl
     draw_travel(ax, plant, speeds, size)
     draw_rails(ax, plant)
     draw_outfeeds(ax, plant)
+    draw_sensors(ax, plant, size)
     draw_infeeds(ax, plant, size)
     ax.set_aspect("equal")
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from conveyor_sim.plot import style
 from conveyor_sim.plot.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
 from conveyor_sim.plot.data import Frame, Plant, box_around
-from conveyor_sim.plot.labels import belt_labels, mark_labels, place, rail_labels
+from conveyor_sim.plot.labels import belt_labels, mark_labels, place, rail_labels, sensor_labels
 from conveyor_sim.plot.plant import draw_plant
 
 Box = tuple[float, float, float, float]
@@ -74,7 +74,8 @@ def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> F
     _colour_bar(figure, [ax], [frame], norm, "horizontal")
     if forces is not None:
         forces.legend(figure)
-    place(ax, mark_labels(plant) + belt_labels(plant, frame.belt_speeds), plant, np.stack([frame.x, frame.y], axis=1))
+    labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant)
+    place(ax, labels, plant, np.stack([frame.x, frame.y], axis=1))
     return figure
 
 
@@ -90,7 +91,7 @@ def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
     _draw(ax, plant, frame, norm, None, box, inches)
     _lighten([ax], [frame])
     _colour_bar(figure, [ax], [frame], norm, "horizontal")
-    labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + rail_labels(plant)
+    labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant) + rail_labels(plant)
     place(ax, labels, plant, np.stack([frame.x, frame.y], axis=1))
     return figure
 

@@ -9,6 +9,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from conveyor_sim.bag.outputs import OUTPUTS, photo_eye_outputs
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.explain import setting_line
 from conveyor_sim.resources import scene_path
@@ -65,7 +66,9 @@ class SimNode:
         distro = default_distro()
         scene = load_scene(scene_path(given.scene), given.overrides())
         compile_kernels(scene)  # before the run starts: its first tick would be a long overrun
-        sink = RosSink(node, distro, {"markers": RateCap(given.marker_rate)})
+        sink = RosSink(
+            node, distro, {"markers": RateCap(given.marker_rate)}, {**OUTPUTS, **photo_eye_outputs(scene.photo_eyes)}
+        )
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
         def open_session(runs: int, checkpoint: Path | None) -> Session:

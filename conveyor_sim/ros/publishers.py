@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from conveyor_sim.bag.outputs import OUTPUTS
+from conveyor_sim.bag.outputs import Output
 from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import ConveyorError
@@ -40,16 +40,16 @@ class RosSink:
     Written to by the stepping thread; `published` may be read by any.
     """
 
-    def __init__(self, node: Node, distro: str, caps: Mapping[str, RateCap]) -> None:
-        """Creates a publisher for each output.
+    def __init__(self, node: Node, distro: str, caps: Mapping[str, RateCap], outputs: Mapping[str, Output]) -> None:
+        """Creates a publisher for each output, by name.
 
         Raises ConveyorError if ROS knows a message type by another definition than the one serialized here.
         """
         self.published: Counter[str] = Counter()
         self._caps = caps
         self._publishers: dict[str, Publisher] = {}
-        self._latched = {name for name, output in OUTPUTS.items() if output.qos.durability == "transient_local"}
-        for name, output in OUTPUTS.items():
+        self._latched = {name for name, output in outputs.items() if output.qos.durability == "transient_local"}
+        for name, output in outputs.items():
             publisher = node.create_publisher(message_class(output.type), name, ros_qos(output.qos))
             check_type(node, publisher.topic_name, output.type, distro)
             self._publishers[name] = publisher

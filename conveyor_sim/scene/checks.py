@@ -8,6 +8,7 @@ from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_machines import machine_problems
+from conveyor_sim.scene.check_sensors import sensor_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
@@ -31,6 +32,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_rail_names(scene),
         *machine_problems(scene),
         *shape_problems(scene),
+        *sensor_problems(scene),
     ]
 
 

@@ -5,7 +5,7 @@ from inspect import getdoc
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import accuracy, belts, contacts, drives, machines, rails, schema
+from conveyor_sim.scene import accuracy, belts, contacts, drives, indicators, machines, rails, schema, sensors
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -53,6 +53,10 @@ SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
     ("An entry of `machines`: `kind: inspection`", machines.Inspection),
     ("An entry of `machines`: `kind: reject`", machines.Reject),
     ("An entry of `spills`", machines.Spill),
+    ("An entry of `photo_eyes`", sensors.PhotoEye),
+    ("An entry of `zones`", sensors.Zone),
+    ("An entry of `counters`", sensors.Counter),
+    ("An entry of `indicators`", indicators.Indicator),
     ("An entry of `bottles`: one bottle", schema.Single),
     ("An entry of `bottles`: a grid", schema.Grid),
     ("`grid`", schema.GridOfBottles),

@@ -14,9 +14,11 @@ from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.effect_names import EffectName, Forced
+from conveyor_sim.scene.indicators import Indicator
 from conveyor_sim.scene.machines import Machine, Reject, Share, Sink, Source, Spill
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.rails import Rail
+from conveyor_sim.scene.sensors import Counter, PhotoEye, Zone
 from conveyor_sim.scene.types import (
     Angle,
     Count,
@@ -235,6 +237,16 @@ class Scene(Part):
     )
     spills: Annotated[dict[Name, Spill], _named("spills")] = quantity(
         "Where a test can have bottles dropped.", default={}
+    )
+    photo_eyes: Annotated[dict[Name, PhotoEye], _named("photo-eyes")] = quantity(
+        "Beams that bottles block.", default={}
+    )
+    zones: Annotated[dict[Name, Zone], _named("zones")] = quantity("Regions in which bottles are counted.", default={})
+    counters: Annotated[dict[Name, Counter], _named("counters")] = quantity(
+        "Lines that count the bottles that pass.", default={}
+    )
+    indicators: Annotated[dict[Name, Indicator], _named("indicators")] = quantity(
+        "What is known of exits: flow, jam, starved, blocked.", default={}
     )
     bottles: Annotated[
         tuple[

@@ -11,6 +11,7 @@ from conveyor_sim.bag.markers import ADD, DELETE, TRIANGLE_LIST, bottles_markers
 from conveyor_sim.bag.messages import MARKERS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
+from conveyor_sim.scene.sensor_shapes import SensorShape
 
 RADII = np.array([0.03, 0.05, 0.04, 0.06])
 
@@ -38,7 +39,7 @@ def test_bottles_are_one_list_of_spheres_a_type(count: int) -> None:
 
 def test_plant_shows_every_belt_rail_and_name(scene: Scene) -> None:
     belts, rails = belt_shapes(scene), rail_shapes(scene)
-    markers = decode(plant_markers(belts, rails, HEADER))
+    markers = decode(plant_markers(belts, rails, (), HEADER))
     by_space: dict[str, list[Any]] = {}
     for marker in markers:
         by_space.setdefault(marker.ns, []).append(marker)
@@ -49,7 +50,7 @@ def test_plant_shows_every_belt_rail_and_name(scene: Scene) -> None:
 
 
 def test_belt_surface_has_the_belts_area(scene: Scene) -> None:
-    markers = decode(plant_markers(belt_shapes(scene), rail_shapes(scene), HEADER))
+    markers = decode(plant_markers(belt_shapes(scene), rail_shapes(scene), (), HEADER))
     surfaces = [marker for marker in markers if marker.type == TRIANGLE_LIST]
     quarter_ring = np.pi / 4 * (0.7**2 - 0.3**2)
     for surface, area in zip(surfaces, [0.4, quarter_ring], strict=True):
@@ -61,7 +62,7 @@ def test_belt_surface_has_the_belts_area(scene: Scene) -> None:
 
 
 def test_arrows_point_along_positive_speed(scene: Scene) -> None:
-    markers = decode(plant_markers(belt_shapes(scene), rail_shapes(scene), HEADER))
+    markers = decode(plant_markers(belt_shapes(scene), rail_shapes(scene), (), HEADER))
     arrows = [marker for marker in markers if marker.ns == "directions"]
     for arrow in arrows:
         tail, tip = arrow.points
@@ -70,3 +71,14 @@ def test_arrows_point_along_positive_speed(scene: Scene) -> None:
             assert tip.y == pytest.approx(tail.y)
         else:  # on the turn, which runs counter-clockwise from -90 to 0 degrees
             assert tip.y > tail.y
+
+
+def test_sensors_are_lines_with_names() -> None:
+    """A zone goes back to where it began."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    shapes = [SensorShape("photo_eye", "entry", corners[:2]), SensorShape("zone", "waiting", corners)]
+    markers = decode(plant_markers([], [], shapes, HEADER))
+    assert [marker.ns for marker in markers] == ["photo_eyes", "photo_eye_names", "zones", "zone_names"]
+    assert [marker.text for marker in markers] == ["", "entry", "", "waiting"]
+    lines = [[(point.x, point.y) for point in marker.points] for marker in markers[::2]]
+    assert lines == [[(0.0, 0.0), (1.0, 0.0)], [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)]]

@@ -34,6 +34,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "belts": (messages.BELTS, lambda: messages.belts_message(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
     "signals": (messages.SIGNALS, lambda: messages.signals_message(np.array([1.0, math.nan]), HEADER)),
     "ledger": (messages.LEDGER, lambda: messages.ledger_message(LEDGER, HEADER)),
+    "bool": (messages.BOOL, lambda: messages.bool_message(True, HEADER)),
     "poses": (messages.POSES, lambda: messages.poses_message(bottles(7), HEADER)),
     "no poses": (messages.POSES, lambda: messages.poses_message(bottles(0), HEADER)),
     "outcome": (

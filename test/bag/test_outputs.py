@@ -5,8 +5,10 @@ from pathlib import Path
 
 from bag.small_line import COMMANDS, SMALL_LINE, record
 
-from conveyor_sim.bag.outputs import OUTPUTS, Outputs
+from conveyor_sim.bag.messages import BOOL
+from conveyor_sim.bag.outputs import OUTPUTS, Outputs, photo_eye_outputs
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -111,3 +113,30 @@ def test_watching_changes_nothing(scene: Scene) -> None:
     watched = run(scene, [Collector(set(OUTPUTS))], 80)
     alone = run(scene, [], 80)
     assert watched.state_hash() == alone.state_hash()
+
+
+def test_a_photo_eye_is_told_at_the_start_and_when_it_changes_and_is_not_recorded() -> None:
+    """One that the bottles there block and leave, one that stays free; `signals` tell the same."""
+    eyes = {"busy": {"from": [0.75, 0.1], "to": [0.75, 0.3]}, "free": {"from": [0.0, 0.9], "to": [0.1, 0.9]}}
+    scene = load_scene(SMALL_LINE, {"photo_eyes": eyes})
+    topics = photo_eye_outputs(eyes)
+    assert [output.type for output in topics.values()] == [BOOL] * 2
+    assert {output.qos.durability for output in topics.values()} == {"transient_local"}
+    sink = Collector({*topics, "signals"})
+    simulation = run(scene, [sink], 40)
+    told: dict[str, list[tuple[int, bool]]] = {topic: [] for topic in topics}
+    shown: dict[str, list[tuple[int, bool]]] = {topic: [] for topic in topics}
+    for topic, data, stamp in sink.taken:
+        if topic in topics:
+            told[topic].append((stamp, typestore().deserialize_cdr(data, BOOL).data))
+            continue
+        values = dict(zip(simulation.process_image.signal_names, typestore().deserialize_cdr(
+            data, "conveyor_msgs/msg/Signals").values, strict=True))  # fmt: skip
+        for eye, seen in shown.items():
+            level = bool(values[f"{eye}/blocked"])
+            if not seen or seen[-1][1] is not level:
+                seen.append((stamp, level))
+    assert told == shown
+    assert told["photo_eyes/free"] == [(1, False)]
+    assert [level for _, level in told["photo_eyes/busy"]][:2] == [True, False]
+    assert not set(topics) & set(OUTPUTS)

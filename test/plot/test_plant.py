@@ -102,6 +102,17 @@ def test_outfeed_is_its_region(ax: Axes, plant: Plant) -> None:
     np.testing.assert_allclose(region.vertices[:3], [[4.5, 1.0], [5.0, 1.0], [5.0, 1.5]])
 
 
+def test_sensors_are_where_the_scene_has_them_and_a_counters_arrow_points_forward(ax: Axes, plant: Plant) -> None:
+    draw_plant(ax, plant, plant.speeds, NORM, 0.1)
+    (beam,) = artist(ax, "photo_eyes").get_segments()
+    np.testing.assert_allclose(beam, [[-0.2, 0.35], [-0.2, 0.65]])
+    (zone,) = artist(ax, "zones").get_paths()
+    np.testing.assert_allclose(zone.vertices[:4], [[1.2, 0.1], [1.9, 0.25], [1.9, 0.9], [1.2, 0.9]])
+    line, arrow = artist(ax, "counters").get_segments()
+    np.testing.assert_allclose(line, [[3.2, 0.5], [3.5, 0.1]])
+    np.testing.assert_allclose(arrow[1] - arrow[0], 0.1 * np.array([-0.8, -0.6]))
+
+
 def test_a_metre_is_as_long_in_x_as_in_y(ax: Axes, plant: Plant) -> None:
     draw_plant(ax, plant, plant.speeds, NORM, 0.1)
     assert ax.get_aspect() == 1.0

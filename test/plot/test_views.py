@@ -75,7 +75,8 @@ def test_plant_shows_every_bottle_and_names_every_belt(plant: Plant, frame: Fram
     assert ax.get_title(loc="left") == "t = 2.50 s, 3 bottles"
     assert count(ax, "bottles") == 3
     names = {text.get_text().split("\n")[0] for text in ax.texts}
-    assert names == {belt.name for belt in plant.belts} | {"infeed inlet", "outfeed reject"}
+    marks = {"infeed inlet", "outfeed reject", "eye entry", "zone waiting", "counter exit"}
+    assert names == {belt.name for belt in plant.belts} | marks
 
 
 def test_plant_labels_belts_with_the_speeds_of_that_instant(plant: Plant, frame: Frame) -> None:

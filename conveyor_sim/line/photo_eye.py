@@ -1,0 +1,157 @@
+"""Photo-eyes: a beam, what can go wrong with it, and the delays after which it is believed."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from conveyor_sim.line.beam import ROUNDING, Beams, Span
+from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.motion import Motion
+from conveyor_sim.line.process_image import Command, Signal, switch
+from conveyor_sim.line.timer import Edge, Timer
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.sensors import PhotoEye
+
+FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
+"""Hz and s, that can be injected."""
+
+
+class PhotoEyeDevice(Device):
+    """One photo-eye: beam, chatter, stuck, late by a delay, debounced; then on-delay and off-delay, in this order."""
+
+    def __init__(self, name: str, eye: PhotoEye, beams: Beams, index: int, random: np.random.Generator) -> None:
+        """index: of its beam among the beams; random: for its chatter alone."""
+        place = f"photo_eyes/{name}"
+        super().__init__(
+            place,
+            [
+                Signal(f"{place}/blocked", "1", "bool"),
+                Signal(f"{place}/rose", "s", "number"),
+                Signal(f"{place}/fell", "s", "number"),
+                Signal(f"{place}/edges", "1", "count"),
+            ],
+            (),
+            [
+                switch(f"{place}/stuck_on"),
+                switch(f"{place}/stuck_off"),
+                Command(f"{place}/chatter", "Hz", "number", 0.0, FASTEST_CHATTER),
+                Command(f"{place}/delay", "s", "number", 0.0, LONGEST_DELAY),
+            ],
+        )
+        self._beams, self._index, self._debounce = beams, index, eye.debounce
+        self.random = random
+        self.stuck_on = self.stuck_off = False
+        self.chatter = 0.0
+        """Hz: full cycles a second."""
+        self.delay = 0.0
+        """s."""
+        self.beam = False
+        """Whether a bottle is in the beam."""
+        self.flipped = False
+        """Whether chatter shows the opposite."""
+        self.next_flip = 0.0
+        """s: when chatter turns over next."""
+        self.level = False
+        """What it shows before delays."""
+        self.late: tuple[Edge, ...] = ()
+        """Edges that have not come through yet."""
+        self.debounced = Timer(eye.debounce, eye.debounce)
+        self.delayed = Timer(eye.on_delay, eye.off_delay)
+        self.rose = self.fell = 0.0
+        """s: when the beam was last broken and last freed, by the edges that passed the debounce."""
+        self.edges = 0
+
+    @property
+    def blocked(self) -> bool:
+        """What it tells."""
+        return self.delayed.output
+
+    def command(self, name: str, value: float, now: Now) -> None:
+        """Go wrong, or right again, from this tick on."""
+        fault = name.rpartition("/")[2]
+        setattr(self, fault, bool(value) if fault.startswith("stuck") else float(value))
+        if fault == "chatter":
+            self.flipped = False
+            self.next_flip = now.time
+            self._draw()
+
+    def end(self, now: Now) -> None:
+        """See what happened in this tick."""
+        spans = self._beams.spans(self._index)
+        if now.tick == 0:
+            self.beam = self.level = bool(spans)
+            self.debounced.start(self.level)
+            self.delayed.start(self.level)
+            return
+        begin, time = (now.tick - 1) * now.state.model.tick_ns * 1e-9, now.time
+        changes: list[tuple[float, bool | None]] = [(begin + at, level) for at, level in self._beam(spans, now.length)]
+        changes += [(at, None) for at in self._flips(time)]
+        self._show(begin)
+        for at, level in sorted(changes, key=lambda change: change[0]):
+            if level is None:
+                self.flipped = not self.flipped
+            else:
+                self.beam = level
+            self._show(at)
+        through = [edge for edge in self.late if edge[0] <= time + ROUNDING]
+        self.late = self.late[len(through) :]
+        seen = self.debounced.follow(through, time)
+        for at, level in seen:
+            self.edges += 1
+            if level:
+                self.rose = at - self._debounce
+            else:
+                self.fell = at - self._debounce
+        self.delayed.follow(seen, time)
+
+    def values(self, now: Now) -> Sequence[float]:
+        """As its signals are listed."""
+        return self.blocked, self.rose, self.fell, self.edges
+
+    def _beam(self, spans: Sequence[Span], length: float) -> list[Edge]:
+        """Edges of the beam in a tick, s from its begin on; bottles that came or went between ticks did so at once."""
+        edges: list[Edge] = []
+        level = self.beam
+        if level and (not spans or spans[0][0] > ROUNDING):
+            level = False
+            edges.append((0.0, False))
+        for enter, leave in spans:
+            if not level:
+                level = True
+                edges.append((enter, True))
+            if leave < length - ROUNDING:
+                level = False
+                edges.append((leave, False))
+        return edges
+
+    def _flips(self, time: float) -> list[float]:
+        """When up to a time chatter turns over, s."""
+        flips = []
+        while self.chatter > 0.0 and self.next_flip <= time:
+            flips.append(self.next_flip)
+            self._draw()
+        return flips
+
+    def _draw(self) -> None:
+        """Half a cycle of chatter, half as long or as long again."""
+        if self.chatter > 0.0:
+            self.next_flip += float(self.random.uniform(0.5, 1.5)) * 0.5 / self.chatter
+
+    def _show(self, at: float) -> None:
+        """Note what the eye makes of beam and faults from a time on; edges never overtake each other."""
+        level = self.stuck_on or (not self.stuck_off and self.beam != self.flipped)
+        if level != self.level:
+            self.level = level
+            after = self.late[-1][0] if self.late else 0.0
+            self.late += ((max(at + self.delay, after), level),)
+
+
+def photo_eye_devices(scene: Scene, random: Callable[[int], np.random.Generator]) -> list[Device]:
+    """One device a photo-eye, behind what they share. random: a stream for each, by its index."""
+    eyes = scene.photo_eyes
+    if not eyes:
+        return []
+    motion = Motion()
+    beams = Beams([(eye.from_, eye.to) for eye in eyes.values()], motion)
+    devices = (PhotoEyeDevice(name, eye, beams, n, random(n)) for n, (name, eye) in enumerate(eyes.items()))
+    return [motion, beams, *devices]

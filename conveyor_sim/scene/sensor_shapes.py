@@ -1,0 +1,27 @@
+"""Where the sensors of a scene are, for drawings."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.scene.schema import Scene
+
+
+@dataclass(frozen=True)
+class SensorShape:
+    """A beam or a counter's line from its `from` to its `to`, or the corners of a zone: `points` (k, 2) in m."""
+
+    kind: Literal["photo_eye", "zone", "counter"]
+    name: str
+    points: NDArray[np.float64]
+
+
+def sensor_shapes(scene: Scene) -> list[SensorShape]:
+    """Photo-eyes, zones and counters, in listing order."""
+    return [
+        *(SensorShape("photo_eye", name, np.array([eye.from_, eye.to])) for name, eye in scene.photo_eyes.items()),
+        *(SensorShape("zone", name, np.array(zone.region)) for name, zone in scene.zones.items()),
+        *(SensorShape("counter", name, np.array([line.from_, line.to])) for name, line in scene.counters.items()),
+    ]
