@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.engine.arrays import Near, NearSprings, PairSprings
+from conveyor_sim.engine.fewer import lists_of
 from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
@@ -117,7 +118,7 @@ class State:
     def make_lists(self) -> None:
         """Rebuild the neighbour lists if they are stale, growing those that are too short."""
         while self.world.neighbourhood.stale[0]:
-            needed = rebuild(self.world)
+            needed = rebuild(lists_of(self.world))
             if self.world.neighbourhood.stale[0]:
                 self._lengthen_lists(*needed)
 

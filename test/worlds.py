@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 
 from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.compile import kernel
 from conveyor_sim.engine.forces import evaluate_forces
 from conveyor_sim.engine.team import members
 from conveyor_sim.model import build_model
@@ -26,10 +27,12 @@ FAR = 90.0
 ALONE = members(1)[0]
 """A team of one thread."""
 
+_evaluate_forces: Any = kernel(evaluate_forces.py_func)  # type: ignore[attr-defined]
+
 
 def evaluate(world: World, dt: float = 1e-5) -> None:
     """Evaluate all forces of the present state into `world.load`."""
-    evaluate_forces(world, ALONE, dt)
+    _evaluate_forces(world, ALONE, dt)
 
 
 def state_of(

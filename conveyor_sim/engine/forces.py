@@ -8,7 +8,7 @@ from typing import Any
 
 from .arrays import Member, World
 from .base import add_base_friction
-from .compile import kernel, part
+from .compile import part
 from .footing import check_footing
 from .ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_parts
 from .pairs import find_touching, pack, pair_forces
@@ -17,7 +17,7 @@ from .slots import sum_pair_forces, sum_slots
 from .team import BLOCK, share, wait_for_all
 
 
-@kernel
+@part
 def evaluate_forces(world: World, member: Member, dt: float) -> None:
     """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
     pack_all(world, member)

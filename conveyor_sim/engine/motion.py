@@ -9,6 +9,7 @@ from numba import uint64
 
 from .arrays import Bottles, Load, Member, World
 from .compile import part
+from .fewer import for_lists
 from .rebuild import moved_too_far, rebuild
 from .team import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
 from .watch import watch_overlaps
@@ -97,7 +98,7 @@ def lists_hold(world: World, member: Member) -> bool:
         wait_for_all(member)
         if member.rank == 0:
             lower_flag(member, MOVED)
-            rebuild(world)
+            rebuild(for_lists(world))
             world.watch.due[0] = 1
         wait_for_all(member)
     return world.neighbourhood.stale[0] == 0
@@ -109,6 +110,6 @@ def watch_rebuilt(world: World, member: Member) -> None:
     if world.watch.due[0] != 0:
         wait_for_all(member)
         if member.rank == 0:
-            watch_overlaps(world, member.found)
+            watch_overlaps(for_lists(world), member.found)
             world.watch.due[0] = 0
         wait_for_all(member)

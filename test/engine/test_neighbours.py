@@ -9,6 +9,7 @@ from scenes import RADIUS, arc, bottle, contact, kind, polyline, scene, segment
 from worlds import FAR, nearest_on_arc, nearest_on_segment, rail_scene, state_of
 
 from conveyor_sim.empty_world import empty_pairs
+from conveyor_sim.engine.fewer import lists_of
 from conveyor_sim.engine.rebuild import moved_too_far, rebuild
 from conveyor_sim.state import State
 
@@ -120,7 +121,7 @@ def test_a_list_too_short_is_told_and_grown() -> None:
     """`rebuild` says how many entries each list needs, and stays stale until they fit."""
     state, points, radii = crowd(40, 0.1)
     state.world = state.world._replace(pairs=empty_pairs(state.model, 8))
-    needed = rebuild(state.world)
+    needed = rebuild(lists_of(state.world))
     assert needed[0] == len(within(points, radii, state.model.settings.skin)) > 8
     assert state.world.neighbourhood.stale[0] == 1
     state.make_lists()

@@ -28,6 +28,7 @@ from numba import uint64
 
 from ..arrays import Bottles, Member, World
 from ..compile import kernel, part
+from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_stages, note_powers
 from ..motion import lists_hold, note_moved, watch_rebuilt
@@ -82,18 +83,19 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     finished: the state is not finite then.
     """
     bottles, allowed = world.bottles, max(world.settings.error, LEAST)
+    line = for_forces(world)
     slopes: Any = world.slopes
     begin, stop = share(member, bottles.x.size)
     stage, h, left, tried = 0, dt, dt, 0
     if phase == RESUME:
         stage, h, left, tried = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2], int(slopes.progress[3])
     taken = 0
-    pack_all(world, member)
+    pack_all(line, member)
     while taken < steps:
-        pair_phase(world, member, h, 0.0)
+        pair_phase(line, member, h, 0.0)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(world, member, h, 0.0, first, end)
+            bottle_forces(line, member, h, 0.0, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             if stage == 0:
@@ -114,7 +116,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                     if worst == math.inf:
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
                 left -= h
-                watch_rebuilt(world, member)
+                watch_rebuilt(line, member)
                 if left == 0.0:
                     left = dt
                     taken += 1
@@ -131,8 +133,8 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             if stage == LAST:
                 come_to_rest(bottles, world.spin, first, end)
             pack(bottles, first, end)
-            note_moved(world, member, first, end)
-        if not lists_hold(world, member):
+            note_moved(line, member, first, end)
+        if not lists_hold(line, member):
             if member.rank == 0:
                 slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = stage, h, left, tried
             return taken

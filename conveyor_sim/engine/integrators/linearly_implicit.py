@@ -20,6 +20,7 @@ from ..arrays import Bottles, Member, World
 from ..base import add_base_friction
 from ..compile import kernel, part
 from ..conjugate_gradients import LEAST, RELATIVE, begin_search, factor, kick_with_rest, largest_kick, search
+from ..fewer import for_forces
 from ..footing import check_footing
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..integrator_arrays import Blocks, Linear
@@ -43,6 +44,7 @@ ENOUGH = 1e-4
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
+    line = for_forces(world)
     linear: Any = world.linear
     begin, stop = share(member, bottles.x.size)
     for step in range(steps):
@@ -83,9 +85,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             ):
                 raise_flag(member, MOVED)
         _book_solution(world, linear, world.ledger, member, dt, lean)
-        if not lists_hold(world, member):
+        if not lists_hold(line, member):
             return step + 1
-        watch_rebuilt(world, member)
+        watch_rebuilt(line, member)
     return steps
 
 
@@ -297,11 +299,12 @@ def _book_solution(world: World, linear: Linear, ledger: Any, member: Member, dt
             bottles.vy[i] -= change.y[i]
         _look_ahead(world, lean * dt, lean, first, end)
         _set_velocities(bottles, world.spin, linear, 1.0 - lean, True, first, end)
-    pack_all(world, member)
-    pair_phase(world, member, dt, 0.0)
+    line = for_forces(world)
+    pack_all(line, member)
+    pair_phase(line, member, dt, 0.0)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        bottle_forces(world, member, dt, 0.0, first, end)
+        bottle_forces(line, member, dt, 0.0, first, end)
         _set_velocities(bottles, world.spin, linear, 0.5, False, first, end)
         note_powers(bottles, world.spin, world.load, ledger, 0.0, 0, first, end)
         book(ledger, 0, dt, first, end)

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import Member, World
 from ..compile import kernel
+from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_stages, note_powers
 from ..motion import lists_hold, note_moved, watch_rebuilt
@@ -43,16 +44,17 @@ WAYS = ways_of(WEIGHTS)
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
     bottles = world.bottles
+    line = for_forces(world)
     slopes: Any = world.slopes
     begin, stop = share(member, bottles.x.size)
     stage = int(slopes.progress[0]) if phase == RESUME else 0
     taken = 0
-    pack_all(world, member)
+    pack_all(line, member)
     while True:
-        pair_phase(world, member, dt, 0.0)
+        pair_phase(line, member, dt, 0.0)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(world, member, dt, 0.0, first, end)
+            bottle_forces(line, member, dt, 0.0, first, end)
             if stage == 0:
                 note_peaks(world.load, world.peaks, first, end)
                 if taken == steps:
@@ -67,16 +69,16 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
                 book_stages(world.ledger, WEIGHTS, dt, first, end)
             pack(bottles, first, end)
-            note_moved(world, member, first, end)
+            note_moved(line, member, first, end)
         if taken == steps:
             return steps
         stage += 1
         if stage == STAGES:
             stage = 0
             taken += 1
-        if not lists_hold(world, member):
+        if not lists_hold(line, member):
             if member.rank == 0:
                 slopes.progress[0] = stage
             return taken
         if stage == 0:
-            watch_rebuilt(world, member)
+            watch_rebuilt(line, member)

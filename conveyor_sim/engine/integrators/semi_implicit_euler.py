@@ -12,6 +12,7 @@ from numba import uint64
 
 from ..arrays import Bottles, Load, Member, World
 from ..compile import kernel, part
+from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_kick
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
@@ -23,21 +24,22 @@ from ..team import BLOCK, share
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
+    line = for_forces(world)
     begin, stop = share(member, bottles.x.size)
-    pack_all(world, member)
+    pack_all(line, member)
     for step in range(steps):
-        pair_phase(world, member, dt, dt)
+        pair_phase(line, member, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(world, member, dt, dt, first, end)
+            bottle_forces(line, member, dt, dt, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
             _move(bottles, world.load, dt, first, end)
             _turn(world.spin, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
-            note_moved(world, member, first, end)
-        if not lists_hold(world, member):
+            note_moved(line, member, first, end)
+        if not lists_hold(line, member):
             return step + 1
-        watch_rebuilt(world, member)
+        watch_rebuilt(line, member)
     return steps
 
 

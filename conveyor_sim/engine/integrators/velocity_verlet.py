@@ -9,6 +9,7 @@ touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without,
 
 from ..arrays import Member, World
 from ..compile import kernel
+from ..fewer import for_forces
 from ..forces import bottle_forces, evaluate_forces, pack_all, pair_phase
 from ..ledger import book_kick
 from ..motion import (
@@ -29,10 +30,11 @@ from .phase import RESUME, START
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
     bottles, half = world.bottles, 0.5 * dt
+    line = for_forces(world)
     begin, stop = share(member, bottles.x.size)
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
-        evaluate_forces(world, member, dt)
+        evaluate_forces(line, member, dt)
     for step in range(steps):
         if phase != RESUME or step > 0:
             for first in range(begin, stop, BLOCK):
@@ -40,19 +42,19 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)
                 kick(bottles, world.spin, world.load, half, first, end)
                 drift(bottles, world.spin, dt, first, end)
-                note_moved(world, member, first, end)
-            if not lists_hold(world, member):
+                note_moved(line, member, first, end)
+            if not lists_hold(line, member):
                 return step
-            watch_rebuilt(world, member)
+            watch_rebuilt(line, member)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             store_velocities(world.stage, bottles, world.spin, first, end)
             kick(bottles, world.spin, world.load, half, first, end)
-        pack_all(world, member)
-        pair_phase(world, member, dt, dt)
+        pack_all(line, member)
+        pair_phase(line, member, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(world, member, dt, dt, first, end)
+            bottle_forces(line, member, dt, dt, first, end)
             recall_velocities(world.stage, bottles, world.spin, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)
             kick(bottles, world.spin, world.load, half, first, end)
