@@ -263,12 +263,14 @@ class Simulation:
         return self._line.signals()
 
     def state_hash(self) -> int:
-        """64 bits over tick, bottles and belts: equal if and (all but surely) only if the states are."""
+        """64 bits over tick, bottles, belts and moving rails: equal if and (all but surely) only if the states are."""
         bottles = self.bottles()
         digest = hashlib.blake2b(np.int64(self.tick).tobytes(), digest_size=8)
         for name in ("id", "type", "x", "y", "theta", "vx", "vy", "omega"):
             digest.update(getattr(bottles, name).tobytes())
         digest.update(self._line.now.setpoints.tobytes() + self._line.now.speeds.tobytes() + self._state.springs())
+        if (moving := self._state.world.moving) is not None:
+            digest.update(moving.position.tobytes() + moving.speed.tobytes())
         return int.from_bytes(digest.digest(), "little")
 
     def _memory(self) -> dict[str, Any]:

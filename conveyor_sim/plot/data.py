@@ -217,6 +217,8 @@ class Energy:
     damping: Floats
     residual: Floats
     turnover: Floats
+    rails: Floats
+    """(n,), work of all rails that move."""
 
 
 def box_around(points: Floats) -> tuple[float, float, float, float]:

@@ -72,7 +72,9 @@ class Recording:
         }
         # The last entry is the floor's.
         belts = values.pop("belt_work")[:, :-1]
-        return Energy(time=np.array([frame.time for frame in frames], dtype=np.float64), belts=belts, **values)
+        rails = values.pop("rail_work").sum(axis=1)
+        time = np.array([frame.time for frame in frames], dtype=np.float64)
+        return Energy(time=time, belts=belts, rails=rails, **values)
 
     def frames(self, times: Sequence[float] | None) -> list[Frame]:
         """The line at the recorded instants nearest to `times` (s), in ascending order, each once.

@@ -15,6 +15,7 @@ from ..compile import kernel, part
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_kick
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
+from ..moving import pass_step, place_rails
 from ..pairs import pack_row
 from ..team import BLOCK, share
 
@@ -24,6 +25,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
     begin, stop = share(member, bottles.x.size)
+    place_rails(world.moving, member, dt)
     pack_all(world, member)
     for step in range(steps):
         pair_phase(world, member, dt, dt)
@@ -35,7 +37,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             _turn(world.spin, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
             note_moved(world, member, first, end)
-        if not lists_hold(world, member):
+        hold = lists_hold(world, member)
+        pass_step(world.moving, member, dt)
+        if not hold:
             return step + 1
         watch_rebuilt(world, member)
     return steps

@@ -21,6 +21,7 @@ from ..motion import (
     store_velocities,
     watch_rebuilt,
 )
+from ..moving import pass_step, place_rails
 from ..team import BLOCK, share
 from .phase import RESUME, START
 
@@ -30,6 +31,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
     bottles, half = world.bottles, 0.5 * dt
     begin, stop = share(member, bottles.x.size)
+    place_rails(world.moving, member, dt)
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
         evaluate_forces(world, member, dt)
@@ -41,7 +43,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 kick(bottles, world.spin, world.load, half, first, end)
                 drift(bottles, world.spin, dt, first, end)
                 note_moved(world, member, first, end)
-            if not lists_hold(world, member):
+            hold = lists_hold(world, member)
+            pass_step(world.moving, member, dt)
+            if not hold:
                 return step
             watch_rebuilt(world, member)
         for first in range(begin, stop, BLOCK):
