@@ -134,9 +134,8 @@ def empty_world(model: Model, slots: int) -> World:
 def _moving(model: Model) -> MovingRails | None:
     if not model.has("moving_rails"):
         return None
-    first = len(model.rails) - len(model.moving_shapes)
-    pieces = sum(len(rail.pieces) for rail in model.rail_shapes[:first])
-    return moving_arrays(model.moving_shapes, model.rail_materials, first, pieces)
+    pieces = sum(len(rail.pieces) for rail in model.rails_at_rest)
+    return moving_arrays(model.moving_shapes, model.rail_materials, len(model.rails_at_rest), pieces)
 
 
 def _surface(model: Model) -> Surface | None:

@@ -85,6 +85,11 @@ class Model:
     versions: tuple[str, ...]
     machine: str
 
+    @property
+    def rails_at_rest(self) -> tuple[RailShape, ...]:
+        """Those of `rail_shapes` that do not move."""
+        return self.rail_shapes[: len(self.rail_shapes) - len(self.moving_shapes)]
+
     def has(self, effect: EffectName) -> bool:
         """Whether an effect is on."""
         return any(choice.on for choice in self.effects if choice.name == effect)

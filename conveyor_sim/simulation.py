@@ -25,7 +25,7 @@ from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.part_memory import recall, remembered
-from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import FIRST_SLOTS, State
 from conveyor_sim.world_arrays import changing_arrays
@@ -253,6 +253,10 @@ class Simulation:
     def belts(self) -> BeltColumns:
         """Commanded and actual speeds, m/s."""
         return BeltColumns(self._line.now.setpoints.copy(), self._line.now.speeds.copy())
+
+    def moving_rails(self) -> tuple[RailShape, ...]:
+        """Gates, pushers and diverters where they are now, the last ones of all rails by number."""
+        return self._state.moving_rails()
 
     def ledger(self) -> Ledger | None:
         """Where energy came from and went since the start; None without the effect `energy_ledger`."""

@@ -129,8 +129,7 @@ class State:
 
     def rails(self) -> tuple[RailShape, ...]:
         """All rails by number, where they are now."""
-        moving = self.moving_rails()
-        return (*self.model.rail_shapes[: len(self.model.rail_shapes) - len(moving)], *moving)
+        return (*self.model.rails_at_rest, *self.moving_rails())
 
     def make_lists(self) -> None:
         """Rebuild the neighbour lists if they are stale, growing those that are too short."""

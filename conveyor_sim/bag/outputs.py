@@ -86,7 +86,9 @@ class Snapshot:
 SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
     "bottles": lambda now, header: messages.bottles_message(now.bottles, header),
     "poses": lambda now, header: messages.poses_message(now.bottles, header),
-    "markers": lambda now, header: bottles_markers(now.bottles, now.sim.model.type_radius, header),
+    "markers": lambda now, header: bottles_markers(
+        now.bottles, now.sim.model.type_radius, now.sim.moving_rails(), header
+    ),
     "contacts": lambda now, header: messages.contacts_message(now.sim.contacts(), header),
     "belts": lambda now, header: messages.belts_message(now.sim.belts(), header),
     "signals": lambda now, header: messages.signals_message(now.sim.signals(), header),
@@ -109,7 +111,7 @@ class Outputs:
         """Writes what is latched (line, plant) and the state at the present tick."""
         model, header = self._sim.model, self._header(self._sim.tick)
         self._hand_out("line", header, messages.line_message, self._sim, self._run_id)
-        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rail_shapes)
+        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rails_at_rest)
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:
