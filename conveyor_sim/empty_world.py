@@ -29,9 +29,11 @@ from conveyor_sim.engine.arrays import (
 from conveyor_sim.engine.integrator_arrays import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
 from conveyor_sim.engine.ledger import BELTS
+from conveyor_sim.engine.moving_arrays import MovingRails
 from conveyor_sim.engine.slots import WIDTH
 from conveyor_sim.engine.team import UNIT
 from conveyor_sim.model import Model
+from conveyor_sim.moving_rails import moving_arrays
 from conveyor_sim.plant import belt_arrays, listed
 
 
@@ -118,6 +120,7 @@ def empty_world(model: Model, slots: int) -> World:
         near_segments=empty_near(model, slots, entries) if model.segments is not None else None,
         arcs=model.arcs,
         near_arcs=empty_near(model, slots, entries) if model.arcs is not None else None,
+        moving=_moving(model),
         railed=listed(slots) if model.rail_law is not None else None,
         rail_law=model.rail_law,
         belts=belt_arrays(model.belt_shapes, slots, entries) if model.has("belts") else None,
@@ -126,6 +129,13 @@ def empty_world(model: Model, slots: int) -> World:
         ring=Ring(reals()) if model.has("ring_base") else None,
         ledger=_ledger(slots, model) if model.has("energy_ledger") else None,
     )
+
+
+def _moving(model: Model) -> MovingRails | None:
+    if not model.has("moving_rails"):
+        return None
+    pieces = sum(len(rail.pieces) for rail in model.rails_at_rest)
+    return moving_arrays(model.moving_shapes, model.rail_materials, len(model.rails_at_rest), pieces)
 
 
 def _surface(model: Model) -> Surface | None:
@@ -193,14 +203,15 @@ def _linear(slots: int) -> Linear:
 
 
 def _ledger(slots: int, model: Model) -> Ledger:
-    units, surfaces = slots // UNIT + 1, len(model.belts) + 1
+    units, surfaces, rails = slots // UNIT + 1, len(model.belts) + 1, len(model.moving_shapes)
     return Ledger(
         damping=_triple(slots),
         friction=_triple(slots),
         base=_triple(slots),
         belt_power=np.zeros((units, surfaces)),
-        power=np.zeros((SLOPES.get(model.integrator, 1), units, BELTS + surfaces)),
-        work=np.zeros((units, BELTS + surfaces)),
+        rail_power=np.zeros((units, rails + 2)) if rails else None,
+        power=np.zeros((SLOPES.get(model.integrator, 1), units, BELTS + surfaces + rails)),
+        work=np.zeros((units, BELTS + surfaces + rails)),
     )
 
 

@@ -50,13 +50,15 @@ class EnergyAccount:
     def ledger(self) -> Ledger:
         """The ledger now."""
         stored, work = self._stored(), self._work().sum(axis=0)
+        surfaces = len(self._state.model.belts) + 1
         # Springs hold a part of what friction took: it is dissipated when they are let go.
         held = float(stored[SPRINGS]) - self.springs
         return balance(
             stored,
             self.fed,
             self.removed,
-            work[BELTS:],
+            work[BELTS : BELTS + surfaces],
+            work[BELTS + surfaces :],
             float(work[BASE_FRICTION]),
             float(work[CONTACT_FRICTION]) - held,
             float(work[DAMPING]),

@@ -14,6 +14,7 @@ from conveyor_sim.engine.thread_choice import ThreadChoice
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.guard import Guard, GuardEvent, Violation, chatter
 from conveyor_sim.guard.memory import Memory
+from conveyor_sim.moving_rails import fastest_rail
 from conveyor_sim.state import State
 
 SHORTER = (4, 16, 64)
@@ -81,7 +82,7 @@ class Integration:
     def take_tick(self, tick: int, surface_speed: float) -> None:
         """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
         seconds = tick * self._model.tick_ns * 1e-9
-        wrong = self._guard.begin(tick, surface_speed)
+        wrong = self._guard.begin(tick, surface_speed, fastest_rail(self._state.world.moving))
         if wrong is not None:
             raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
         began = time.perf_counter()
@@ -115,12 +116,18 @@ class Integration:
     def _take_steps(self, factor: int) -> None:
         """One tick in steps shortened by a factor; lists that turn out too short are grown in it, without a trace."""
         done, phase, steps, dt = 0, START, factor * self._model.steps_per_tick, self._model.dt / factor
+        self._set_clock(0)
         while True:
             done += self._crew.advance(self.threads, self._advance, self._state.world, steps - done, dt, phase)
             if not self._state.world.neighbourhood.stale[0]:
                 return
             self._state.make_lists()
             phase = RESUME
+
+    def _set_clock(self, steps: int) -> None:
+        """Rails that move are where they are after so many steps of the tick."""
+        if self._state.world.moving is not None:
+            self._state.world.moving.clock[0] = steps
 
     def _tell(self, tick: int) -> None:
         """What does not stop a run, told the first time."""
@@ -144,6 +151,7 @@ class Integration:
         state, model = self._state, self._model
         memory = Memory()
         memory.keep(state.world)
+        self._set_clock(model.steps_per_tick)
         velocities = [chatter.velocities_of(state.world)]
         for _ in range(chatter.STEPS):
             self._crew.advance(self.threads, self._advance, state.world, 1, model.dt, START)

@@ -35,7 +35,7 @@ def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str])
     masses = np.array([kind.mass for kind in scene.bottle_types.values()])
     reduced = masses[:, None] * masses / (masses[:, None] + masses)
     against_rails = np.repeat(masses[:, None], len(rail_materials), axis=1)
-    rails = "segment_rails" in on or "arc_rails" in on
+    rails = any(effect in on for effect in ("segment_rails", "arc_rails", "moving_rails"))
     return Laws(
         pair=_columns(scene, materials, materials, reduced, on) if "bottle_contact" in on else None,
         rail=_columns(scene, materials, rail_materials, against_rails, on) if rails else None,

@@ -18,6 +18,7 @@ from conveyor_sim.presets import target
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
+from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, fewest_steps, steps_per_tick
@@ -59,6 +60,10 @@ class Model:
     """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
     belt_shapes: tuple[BeltShape, ...]
     rail_shapes: tuple[RailShape, ...]
+    """By number; those that move are last, as they are at first."""
+    moving_shapes: tuple[MovingShape, ...]
+    rail_materials: tuple[str, ...]
+    """By number in `rail_law`."""
     settings: Settings
     pair_law: ContactLaw | None
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
@@ -80,6 +85,11 @@ class Model:
     versions: tuple[str, ...]
     machine: str
 
+    @property
+    def rails_at_rest(self) -> tuple[RailShape, ...]:
+        """Those of `rail_shapes` that do not move."""
+        return self.rail_shapes[: len(self.rail_shapes) - len(self.moving_shapes)]
+
     def has(self, effect: EffectName) -> bool:
         """Whether an effect is on."""
         return any(choice.on for choice in self.effects if choice.name == effect)
@@ -89,9 +99,10 @@ def build_model(scene: Scene) -> Model:
     """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
     effects = choose_effects(scene)
     on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
-    rails, belts = rail_shapes(scene), belt_shapes(scene)
+    rails, belts, moving = rail_shapes(scene), belt_shapes(scene), moving_shapes(scene)
+    all_rails = [*rails, *(shape.shape(shape.first) for shape in moving)]
     types = list(scene.bottle_types.values())
-    rail_materials = sorted({rail.material for rail in rails})
+    rail_materials = sorted({rail.material for rail in all_rails})
     radius = np.array([kind.radius for kind in types])
     laws = build_laws(scene, rail_materials, on)
     skin = SKIN * float(radius.min())
@@ -119,14 +130,16 @@ def build_model(scene: Scene) -> Model:
         integrator=scene.accuracy.integrator,
         effects=effects,
         belts=tuple(scene.belts),
-        rails=tuple(rail.name for rail in rails),
+        rails=tuple(rail.name for rail in all_rails),
         bottle_types=tuple(scene.bottle_types),
         type_radius=radius,
         type_mass=np.array([kind.mass for kind in types]),
         type_inertia=np.array([kind.moment_of_inertia for kind in types]),
         type_base_radius=laws.base_radius,
         belt_shapes=tuple(belts),
-        rail_shapes=tuple(rails),
+        rail_shapes=tuple(all_rails),
+        moving_shapes=tuple(moving),
+        rail_materials=tuple(rail_materials),
         settings=Settings(
             slip_limit=scene.slip_limit,
             lever=1.0 if scene.lever_arm == "overlap" else 0.0,

@@ -25,7 +25,7 @@ from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.part_memory import recall, remembered
-from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import FIRST_SLOTS, State
 from conveyor_sim.world_arrays import changing_arrays
@@ -254,6 +254,10 @@ class Simulation:
         """Commanded and actual speeds, m/s."""
         return BeltColumns(self._line.now.setpoints.copy(), self._line.now.speeds.copy())
 
+    def moving_rails(self) -> tuple[RailShape, ...]:
+        """Gates, pushers and diverters where they are now, the last ones of all rails by number."""
+        return self._state.moving_rails()
+
     def ledger(self) -> Ledger | None:
         """Where energy came from and went since the start; None without the effect `energy_ledger`."""
         return None if self._account is None else self._account.ledger()
@@ -267,12 +271,14 @@ class Simulation:
         return self._line.photo_eyes()
 
     def state_hash(self) -> int:
-        """64 bits over tick, bottles and belts: equal if and (all but surely) only if the states are."""
+        """64 bits over tick, bottles, belts and moving rails: equal if and (all but surely) only if the states are."""
         bottles = self.bottles()
         digest = hashlib.blake2b(np.int64(self.tick).tobytes(), digest_size=8)
         for name in ("id", "type", "x", "y", "theta", "vx", "vy", "omega"):
             digest.update(getattr(bottles, name).tobytes())
         digest.update(self._line.now.setpoints.tobytes() + self._line.now.speeds.tobytes() + self._state.springs())
+        if (moving := self._state.world.moving) is not None:
+            digest.update(moving.position.tobytes() + moving.speed.tobytes())
         return int.from_bytes(digest.digest(), "little")
 
     def _memory(self) -> dict[str, Any]:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from conveyor_sim.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.engine.arrays import Near, NearSprings, PairSprings
 from conveyor_sim.engine.fewer import lists_of
+from conveyor_sim.engine.moving_arrays import present
 from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
 from conveyor_sim.model import Model
+from conveyor_sim.scene.geometry import RailShape
 from conveyor_sim.world_arrays import Arrays, with_arrays
 
 FIRST_SLOTS = 16
@@ -76,6 +78,10 @@ class State:
             spin.theta[:], spin.omega[:] = before.theta, before.omega
         self._free = np.flatnonzero(bottles.id < 0).tolist()
         self._equip(np.flatnonzero(bottles.id >= 0))
+        if self.world.moving is not None and other.world.moving is not None:
+            self.world.moving.course[:] = other.world.moving.course
+            for now, then in zip(present(self.world.moving), present(other.world.moving), strict=True):
+                now[:] = then
         self.make_lists()
 
     def go_on_from(self, arrays: Arrays, next_id: int) -> None:
@@ -115,6 +121,17 @@ class State:
                 parts += [bottle, near.piece[held], near.springs.elongation[held]]
         return b"".join(part.tobytes() for part in parts)
 
+    def moving_rails(self) -> tuple[RailShape, ...]:
+        """The rails that move, where they are now."""
+        if self.world.moving is None:
+            return ()
+        places = zip(self.model.moving_shapes, self.world.moving.position.tolist(), strict=True)
+        return tuple(shape.shape(position) for shape, position in places)
+
+    def rails(self) -> tuple[RailShape, ...]:
+        """All rails by number, where they are now."""
+        return (*self.model.rails_at_rest, *self.moving_rails())
+
     def make_lists(self) -> None:
         """Rebuild the neighbour lists if they are stale, growing those that are too short."""
         while self.world.neighbourhood.stale[0]:
@@ -149,6 +166,7 @@ class State:
             pairs=old.pairs,
             near_segments=_for_slots(old.near_segments, slots),
             near_arcs=_for_slots(old.near_arcs, slots),
+            moving=old.moving,
         )
 
     def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int) -> None:

@@ -68,13 +68,16 @@ class Energy:
     damping: float
     residual: float
     turnover: float
+    rails: dict[str, float]
+    """Work done by each rail that moves."""
 
     @property
     def sentence(self) -> str:
         """The same in words."""
         share = self.residual / self.turnover if self.turnover else 0.0
+        rails = f", {sum(self.rails.values()):.4g} J from rails that move" if self.rails else ""
         return (
-            f"{sum(self.belts.values()):.4g} J from belts; {self.base_friction:.4g} J lost under bottles, "
+            f"{sum(self.belts.values()):.4g} J from belts{rails}; {self.base_friction:.4g} J lost under bottles, "
             f"{self.contact_friction:.4g} J in friction at contacts, {self.damping:.4g} J in damping; "
             f"residual {100.0 * share:.2g} % of a turnover of {self.turnover:.4g} J"
         )
@@ -209,7 +212,7 @@ class _Tally:
             achieved=None if model is None else achieved(model, peak),
             guard=dict(Counter(kind for kind, _ in self._guard)),
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
-            energy=None if self._ledger is None else _energy(self._ledger, line.belts),
+            energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
@@ -238,7 +241,8 @@ class _Tally:
         return Loop(self._bag.line.belts[index], len(returns[index]), *rates)
 
 
-def _energy(ledger: Ledger, belts: list[str]) -> Energy:
+def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
+    moving = rails[len(rails) - ledger.rail_work.size :]
     return Energy(
         # The last entry is the floor's.
         belts=dict(zip(belts, ledger.belt_work[:-1].tolist(), strict=True)),
@@ -250,6 +254,7 @@ def _energy(ledger: Ledger, belts: list[str]) -> Energy:
         damping=ledger.damping,
         residual=ledger.residual,
         turnover=ledger.turnover,
+        rails=dict(zip(moving, ledger.rail_work.tolist(), strict=True)),
     )
 
 

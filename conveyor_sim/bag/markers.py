@@ -1,4 +1,4 @@
-"""visualization_msgs/MarkerArray for RViz2 and Foxglove: the plant, drawn once, and the bottles, drawn at a rate."""
+"""visualization_msgs/MarkerArray for RViz2 and Foxglove: the plant, drawn once, and what moves, drawn at a rate."""
 
 from __future__ import annotations
 
@@ -91,8 +91,12 @@ def _write(writer: CdrWriter, marker: Marker, header: Header) -> None:
     writer.pack("?", False)  # mesh_use_embedded_materials
 
 
-def bottles_markers(columns: BottleColumns, radii: NDArray[np.float64], header: Header) -> bytes:
-    """The bottles: one SPHERE_LIST a bottle type, resting on the belts (z = 0); a type without bottles is deleted."""
+def bottles_markers(
+    columns: BottleColumns, radii: NDArray[np.float64], moving: Sequence[RailShape], header: Header
+) -> bytes:
+    """What moves: one SPHERE_LIST a bottle type, resting on the belts (z = 0), deleted where a type has no bottles; and
+    rails that move.
+    """
     markers = []
     for index, radius in enumerate(radii):
         chosen = columns.type == index
@@ -101,14 +105,14 @@ def bottles_markers(columns: BottleColumns, radii: NDArray[np.float64], header: 
         action = ADD if len(points) else DELETE
         size = 2.0 * float(radius)
         markers.append(Marker("bottles", index, SPHERE_LIST, (size, size, size), colour, points, action=action))
-    return marker_array(markers, header)
+    return marker_array([*markers, *_rails("moving_rails", moving)], header)
 
 
 def plant_markers(
     belts: Sequence[BeltShape], rails: Sequence[RailShape], sensors: Sequence[SensorShape], header: Header
 ) -> bytes:
-    """The plant: belt surfaces, arrows along positive speed, rails, sensors, and the names of belts and sensors."""
-    markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails(rails), *_names(belts), *_sensors(sensors)]
+    """The plant: belt surfaces, arrows along positive speed, rails at rest, sensors, and the names of belts and sensors."""
+    markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails("rails", rails), *_names(belts), *_sensors(sensors)]
     return marker_array(markers, header)
 
 
@@ -157,10 +161,10 @@ def _along(line: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np
     return np.column_stack([np.interp(places, distance, line[:, axis]) for axis in (0, 1)])
 
 
-def _rails(rails: Sequence[RailShape]) -> Iterator[Marker]:
+def _rails(space: str, rails: Sequence[RailShape]) -> Iterator[Marker]:
     for index, rail in enumerate(rails):
         points = xyz_rows(rail.outline(33), 0.03)
-        yield Marker("rails", index, LINE_STRIP, (RAIL_THICKNESS, 0.0, 0.0), RAIL_COLOUR, points)
+        yield Marker(space, index, LINE_STRIP, (RAIL_THICKNESS, 0.0, 0.0), RAIL_COLOUR, points)
 
 
 def _names(belts: Sequence[BeltShape]) -> Iterator[Marker]:

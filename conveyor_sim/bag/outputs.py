@@ -93,7 +93,9 @@ class Snapshot:
 SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
     "bottles": lambda now, header: messages.bottles_message(now.bottles, header),
     "poses": lambda now, header: messages.poses_message(now.bottles, header),
-    "markers": lambda now, header: bottles_markers(now.bottles, now.sim.model.type_radius, header),
+    "markers": lambda now, header: bottles_markers(
+        now.bottles, now.sim.model.type_radius, now.sim.moving_rails(), header
+    ),
     "contacts": lambda now, header: messages.contacts_message(now.sim.contacts(), header),
     "belts": lambda now, header: messages.belts_message(now.sim.belts(), header),
     "signals": lambda now, header: messages.signals_message(now.sim.signals(), header),
@@ -118,7 +120,7 @@ class Outputs:
         model, header = self._sim.model, self._header(self._sim.tick)
         sensors = sensor_shapes(self._sim.scene)
         self._hand_out("line", header, messages.line_message, self._sim, self._run_id)
-        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rail_shapes, sensors)
+        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rails_at_rest, sensors)
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:

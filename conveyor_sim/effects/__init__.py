@@ -11,7 +11,7 @@ from conveyor_sim.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
 from conveyor_sim.effects.damping import NORMAL_DAMPING, ONSET_DAMPING, PAPER_DAMPING, TSUJI_DAMPING
 from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
-from conveyor_sim.effects.geometry import ARC_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
+from conveyor_sim.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
 from conveyor_sim.effects.impacts import impact_bounds, impacts
 from conveyor_sim.effects.observers import CONTACT_ARRAYS, ENERGY_LEDGER, PEAKS
 from conveyor_sim.effects.rotation import ROTATION
@@ -41,6 +41,7 @@ EFFECTS: tuple[Effect, ...] = (
     BOTTLE_CONTACT,
     SEGMENT_RAILS,
     ARC_RAILS,
+    MOVING_RAILS,
     UNEQUAL_RADII,
     LINEAR,
     HERTZ,

@@ -21,6 +21,7 @@ from conveyor_sim.methods import Share
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.machines import Source
+from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep import Bound, lattice_bound, wedge_bound
 
@@ -30,6 +31,8 @@ def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Co
     bottles = {kind.material for kind in scene.bottle_types.values()}
     with_rails = "segment_rails" in on or "arc_rails" in on
     rails = {rail.material for rail in rail_shapes(scene)} if with_rails else set()
+    if "moving_rails" in on:
+        rails |= {shape.material for shape in moving_shapes(scene)}
     for index, contact in enumerate(scene.contacts):
         a, b = contact.between
         of_bottles = {a, b} <= bottles and "bottle_contact" in on

@@ -1,9 +1,10 @@
-"""Effects of what there is to touch: rails, and bottles of several sizes."""
+"""Effects of what there is to touch: rails at rest and moving ones, and bottles of several sizes."""
 
 from collections.abc import Collection
 
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.scene.geometry import ArcPiece, rail_shapes
+from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.schema import Scene
 
 
@@ -23,6 +24,10 @@ def _segments(scene: Scene, on: Collection[str]) -> Cause | None:
 
 def _arcs(scene: Scene, on: Collection[str]) -> Cause | None:
     return _rail(scene, arc=True)
+
+
+def _moving(scene: Scene, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in movers_of(scene)), None)
 
 
 def _radii(scene: Scene, on: Collection[str]) -> Cause | None:
@@ -48,6 +53,17 @@ ARC_RAILS = Effect(
     called_for=_arcs,
     absent="no arc rail",
     needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
+)
+MOVING_RAILS = Effect(
+    name="moving_rails",
+    law="straight rails that slide or swing, at constant accelerations one after another, in every step; damping and "
+    "friction know the velocity of the rail at the contact",
+    source="added",
+    called_for=_moving,
+    absent="no gate, pusher or diverter",
+    needs="the course of each rail and where it is now; a box that it sweeps; a contact for each pair of materials; "
+    "integrators semi_implicit_euler and velocity_verlet",
+    can_force_off=False,
 )
 UNEQUAL_RADII = Effect(
     name="unequal_radii",

@@ -11,6 +11,7 @@ from conveyor_sim.laws import Laws
 from conveyor_sim.methods import METHODS, STEP_ERROR, Method
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.machines import Source, Spill
+from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import BottleType, Scene, Single
 from conveyor_sim.timestep import Bound, contact_time, hertz_contact_time, least_steps
 
@@ -125,13 +126,15 @@ def queue_force(terms: Terms) -> float:
 def impact_speed(scene: Scene) -> float:
     """The speed of the hardest impact expected, m/s; SPEED_AT_REST if all rest.
 
-    The fastest belt or bottle that enters against something at rest, or the most by which bottles differ at the start.
+    The fastest belt or bottle that enters against something at rest, or the most by which bottles differ at the start;
+    and a rail that comes against that.
     """
     speeds = [abs(belt.speed) for belt in scene.belts.values()]
     speeds += [entry.speed for _, entry in scene.entries() if not isinstance(entry, Spill)]
     given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
     speeds.append(math.hypot(*np.ptp(given, axis=0)))
-    return max(speeds) or SPEED_AT_REST
+    rails = [shape.max_speed * shape.fastest_point for shape in moving_shapes(scene)]
+    return max(speeds) + max(rails, default=0.0) or SPEED_AT_REST
 
 
 def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .integrator_arrays import Linear, PairTangent, Slopes, Stage, Triple
+from .moving_arrays import MovingRails
 
 F8 = NDArray[np.float64]
 U4 = NDArray[np.uint32]
@@ -268,7 +269,7 @@ class RailContacts(NamedTuple):
     rail: U4
     surface: U4
     entry: I8
-    """Of the Near list of segments; -1 - entry for one of arcs."""
+    """Of the Near list of segments; -1 - entry for one of arcs; from MOVING on a rail that moves."""
     solution: F8
     """Effective overlaps while they are solved for."""
 
@@ -349,10 +350,12 @@ class Ledger(NamedTuple):
     """(S,), likewise of what it stands on."""
     belt_power: F8
     """(units, H + 1), W, of each belt on a unit of bottles (`team.py`) in the last evaluation; the floor is last."""
+    rail_power: F8 | None
+    """(units, Q + 2), W, of each moving rail, then what damping and friction take of it; None where no rail moves."""
     power: F8
-    """(stages, units, BELTS + H + 1), W, of each account in each stage of a step."""
+    """(stages, units, BELTS + H + 1 + Q), W, of each account in each stage of a step."""
     work: F8
-    """(units, BELTS + H + 1), J, the accounts, since the start."""
+    """(units, BELTS + H + 1 + Q), J, the accounts, since the start."""
 
 
 class Neighbourhood(NamedTuple):
@@ -443,8 +446,9 @@ class World(NamedTuple):
     near_segments: Near | None
     arcs: Arcs | None
     near_arcs: Near | None
+    moving: MovingRails | None
     railed: Listed | None
-    """Bottles with a rail near."""
+    """Bottles with a rail near, or near where one comes by."""
     rail_law: ContactLaw | None
     belts: Belts | None
     surface: Surface | None

@@ -92,12 +92,14 @@ def _rail_contacts(
     if law is None:
         return count
     for i in range(bottles.x.size):
-        here = find_rail_contacts(i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, found)
+        here = find_rail_contacts(
+            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
+        )
         for c in range(here):
             if found.share[c] > 0.0:
                 if count < kind.size:
                     spring = rail_elongation(
-                        law.tangential_stiffness, world.near_segments, world.near_arcs, found.entry[c]
+                        law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, found.entry[c]
                     )
                     normal, tangential, _ = rail_contact(
                         c,
@@ -106,6 +108,7 @@ def _rail_contacts(
                         world.settings.atan,
                         bottles,
                         spin,
+                        world.moving,
                         found,
                         law,
                         world.curves,

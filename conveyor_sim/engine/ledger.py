@@ -18,7 +18,7 @@ from .compile import part
 from .team import UNIT, units
 
 DAMPING, CONTACT_FRICTION, BASE_FRICTION, BELTS = 0, 1, 2, 3
-"""Columns of the accounts: what is dissipated, then the work of each belt."""
+"""Columns of the accounts: what is dissipated, then the work of each belt, then that of each moving rail."""
 
 
 @part
@@ -39,6 +39,19 @@ def note_powers(
         ledger.power[stage, unit, DAMPING] = -damping
         ledger.power[stage, unit, CONTACT_FRICTION] = -friction
         ledger.power[stage, unit, BASE_FRICTION] = belts - base
+        _note_rails(ledger.power, ledger.rail_power, BELTS + ledger.belt_power.shape[1], stage, unit)
+
+
+@part
+def _note_rails(power: F8, rail_power: Any, first: int, stage: int, unit: int) -> None:
+    """The power of each moving rail, and what damping and friction take of it; first: account of the first rail."""
+    if rail_power is None:
+        return
+    rails = rail_power.shape[1] - 2
+    for q in range(rails):
+        power[stage, unit, first + q] = rail_power[unit, q]
+    power[stage, unit, DAMPING] += rail_power[unit, rails]
+    power[stage, unit, CONTACT_FRICTION] += rail_power[unit, rails + 1]
 
 
 @part

@@ -9,10 +9,11 @@ from typing import Any
 
 from numba import uint64
 
-from .arrays import Bottles, ContactLaw, Ledger, Load, Member, Settings
+from .arrays import Bottles, ContactLaw, Ledger, Load, Member, RailContacts, Settings
 from .compile import part
 from .contact import drag_force, elastic_force
 from .integrator_arrays import Triple
+from .moving import add_rail_power
 from .pairs import normal_and_overlap
 from .slots import sum_slots
 from .team import UNIT, share, units
@@ -107,17 +108,18 @@ def add_rail_parts(
     law: ContactLaw,
     curves: Any,
     e: int,
+    moving: Any,
+    found: RailContacts,
+    c: int,
+    bottles: Bottles,
     i: int,
-    nx: float,
-    ny: float,
-    overlap: float,
-    shared: float,
     arm: float,
     normal: float,
     tangential: float,
     slip: float,
 ) -> None:
-    """Take N and T (N) of a contact of bottle i with a rail apart; slip in m/s, shared as in `RailContacts.share`."""
+    """Take N and T (N) of contact c of bottle i with a rail apart; arm in m, slip in m/s."""
+    nx, ny, overlap, shared = found.nx[c], found.ny[c], found.overlap[c], found.share[c]
     drag = shared * drag_force(law, e, overlap, -slip)
     along = normal - shared * _elastic(law, e, curves, overlap)
     across = tangential - drag
@@ -128,6 +130,7 @@ def add_rail_parts(
     friction.x[i] -= across * ny
     friction.y[i] += across * nx
     friction.turn[i] += arm * across
+    add_rail_power(ledger, moving, found, c, bottles, i, normal, tangential, along, drag, across)
 
 
 @part

@@ -9,6 +9,7 @@ from typing import Any
 
 from .arrays import Bottles, Listed, Near
 from .compile import kernel, part
+from .moving import near_sweep
 from .static_grid import static_cell
 from .team import UNIT
 
@@ -73,15 +74,15 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
 
 
 @part
-def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, railed: Any) -> None:
-    """List the bottles that have any rail near, by unit."""
+def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, moving: Any, railed: Any, margin: float) -> None:
+    """List the bottles that have any rail near, within radius + margin (m), by unit."""
     if railed is None:
         return
     count = 0
     for i in range(bottles.x.size):
         if i % UNIT == 0:
             railed.first[i // UNIT] = count
-        if _has_near(near_segments, i) or _has_near(near_arcs, i):
+        if _has_near(near_segments, i) or _has_near(near_arcs, i) or near_sweep(moving, bottles, i, margin):
             railed.bottle[count] = i
             count += 1
     end_list(railed, bottles.x.size, count)

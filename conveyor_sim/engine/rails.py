@@ -4,42 +4,14 @@ from typing import Any
 
 from .arc import arc_contact
 from .arrays import Bottles, ContactLaw, Load, RailContacts, Settings
-from .compile import kernel, part
+from .compile import part
 from .contact import contact_force, spring_after, stretched
+from .keep import keep_deepest
 from .ledger_parts import add_rail_parts
+from .moving import clear_rail_power, moves, moving_contacts, surface_velocity
 from .segment import segment_contact
 from .shares import share_overlaps
-from .team import MOST_CONTACTS, units
-
-
-@kernel
-def keep_deepest(
-    found: RailContacts,
-    count: int,
-    overlap: float,
-    nx: float,
-    ny: float,
-    material: int,
-    rail: int,
-    surface: int,
-    entry: int,
-) -> int:
-    place = count
-    if count == MOST_CONTACTS:
-        place = 0
-        for c in range(1, count):
-            if found.overlap[c] < found.overlap[place]:
-                place = c
-        if overlap <= found.overlap[place]:
-            return count
-    found.overlap[place] = overlap
-    found.nx[place] = nx
-    found.ny[place] = ny
-    found.material[place] = material
-    found.rail[place] = rail
-    found.surface[place] = surface
-    found.entry[place] = entry
-    return min(count + 1, MOST_CONTACTS)
+from .team import units
 
 
 @part
@@ -70,11 +42,19 @@ def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, found: RailCon
 
 @part
 def find_rail_contacts(
-    i: int, bottles: Bottles, segments: Any, near_segments: Any, arcs: Any, near_arcs: Any, found: RailContacts
+    i: int,
+    bottles: Bottles,
+    segments: Any,
+    near_segments: Any,
+    arcs: Any,
+    near_arcs: Any,
+    moving: Any,
+    found: RailContacts,
 ) -> int:
     """Fill `found` with the contacts of bottle i with rails, shares included; return how many."""
     count = _segment_contacts(i, bottles, segments, near_segments, found, 0)
     count = _arc_contacts(i, bottles, arcs, near_arcs, found, count)
+    count = moving_contacts(i, bottles, moving, found, count)
     if count == 1:
         found.share[0] = 1.0
     elif count > 1:
@@ -90,6 +70,7 @@ def rail_contact(
     atan: Any,
     bottles: Bottles,
     spin: Any,
+    moving: Any,
     found: RailContacts,
     law: ContactLaw,
     curves: Any,
@@ -97,13 +78,15 @@ def rail_contact(
     spring_dt: float,
     implicit: Any,
 ) -> tuple[float, float, float]:
-    """N and T (N) on bottle i in its contact c with a rail at rest, and its slip (m/s).
+    """N and T (N) on bottle i in its contact c with a rail, and its slip (m/s) along it.
 
     spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: s/kg, or None (see `contact_force`).
     """
     nx, ny = found.nx[c], found.ny[c]
-    closing = bottles.vx[i] * nx + bottles.vy[i] * ny
-    slip = -bottles.vx[i] * ny + bottles.vy[i] * nx
+    ux, uy = surface_velocity(moving, found, c, bottles, i)
+    vx, vy = bottles.vx[i] - ux, bottles.vy[i] - uy
+    closing = vx * nx + vy * ny
+    slip = -vx * ny + vy * nx
     if spin is not None:
         slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
     entry = law_entry(settings, bottles, found, c, i)
@@ -142,6 +125,7 @@ def count_rail_contacts(
     near_segments: Any,
     arcs: Any,
     near_arcs: Any,
+    moving: Any,
     railed: Any,
     found: RailContacts,
     first: int,
@@ -154,7 +138,7 @@ def count_rail_contacts(
     begin, stop = units(first, end)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        counts[i] += find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
+        counts[i] += find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, moving, found)
 
 
 @part
@@ -167,6 +151,7 @@ def add_rail_forces(
     near_segments: Any,
     arcs: Any,
     near_arcs: Any,
+    moving: Any,
     railed: Any,
     law: Any,
     curves: Any,
@@ -183,28 +168,29 @@ def add_rail_forces(
     """
     if railed is None:
         return
+    clear_rail_power(ledger, moving, first, end)
     begin, stop = units(first, end)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
+        count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, moving, found)
         for c in range(count):
             found.solution[c] = 0.0
             if found.share[c] > 0.0:
-                spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, found.entry[c])
+                spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, found.entry[c])
                 ease = _ease(implicit, i)
                 normal, tangential, slip = rail_contact(
-                    c, i, settings, settings.atan, bottles, spin, found, law, curves, spring, spring_dt, ease
+                    c, i, settings, settings.atan, bottles, spin, moving, found, law, curves, spring, spring_dt, ease
                 )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
                 _note_normal(load.normal_sum, load.normal_max, i, normal)
-                _note_parts(ledger, settings, bottles, found, c, i, law, curves, normal, tangential, slip)
+                _note_parts(ledger, settings, bottles, moving, found, c, i, law, curves, normal, tangential, slip)
                 if spin is not None:
                     spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
                 entry = law_entry(settings, bottles, found, c, i)
                 found.solution[c] = _spring_after(law, entry, spring, slip, spring_dt, normal, found.share[c])
         if spring_dt > 0.0:
-            _store_springs(law.tangential_stiffness, near_segments, near_arcs, found, count, i)
+            _store_springs(law.tangential_stiffness, near_segments, near_arcs, moving, found, count, i)
 
 
 @part
@@ -228,6 +214,7 @@ def _note_parts(
     ledger: Any,
     settings: Settings,
     bottles: Bottles,
+    moving: Any,
     found: RailContacts,
     c: int,
     i: int,
@@ -243,11 +230,11 @@ def _note_parts(
             law,
             curves,
             law_entry(settings, bottles, found, c, i),
+            moving,
+            found,
+            c,
+            bottles,
             i,
-            found.nx[c],
-            found.ny[c],
-            found.overlap[c],
-            found.share[c],
             rail_arm(found.overlap[c], bottles.radius[i], settings.lever),
             normal,
             tangential,
@@ -263,10 +250,12 @@ def _ease(implicit: Any, i: int) -> Any:
 
 
 @part
-def rail_elongation(tangential: Any, near_segments: Any, near_arcs: Any, entry: int) -> Any:
+def rail_elongation(tangential: Any, near_segments: Any, near_arcs: Any, moving: Any, entry: int) -> Any:
     """Elongation of the spring of a contact, by its entry in the lists (`RailContacts.entry`)."""
     if tangential is None:
         return None
+    if moves(moving, entry):
+        return 0.0
     if entry >= 0:
         return _spring_at(near_segments, entry)
     return _spring_at(near_arcs, -1 - entry)
@@ -280,13 +269,17 @@ def _spring_at(near: Any, entry: int) -> float:
 
 
 @part
-def _store_springs(tangential: Any, near_segments: Any, near_arcs: Any, found: Any, count: int, i: int) -> None:
+def _store_springs(
+    tangential: Any, near_segments: Any, near_arcs: Any, moving: Any, found: Any, count: int, i: int
+) -> None:
     """Keep the springs of the closed contacts of bottle i, forget those of all its other rails."""
     if tangential is None:
         return
     _forget_springs(near_segments, i)
     _forget_springs(near_arcs, i)
     for c in range(count):
+        if moves(moving, found.entry[c]):
+            continue
         if found.entry[c] >= 0:
             _set_spring(near_segments, found.entry[c], found.solution[c])
         else:

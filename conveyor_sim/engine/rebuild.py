@@ -28,7 +28,7 @@ def rebuild(world: World) -> tuple[int, int, int, int, int]:
     more = fill_slots(world.pairs, world.slots)
     segments = list_near_segments(bottles, world.grid, world.segments, world.near_segments, 0.5 * skin)
     arcs = list_near_arcs(bottles, world.grid, world.arcs, world.near_arcs, 0.5 * skin)
-    list_railed(bottles, world.near_segments, world.near_arcs, world.railed)
+    list_railed(bottles, world.near_segments, world.near_arcs, world.moving, world.railed, 0.5 * skin)
     belts = list_belts(bottles, world.grid, world.belts, world.ring, _floor(world.surface), 0.5 * skin)
     copy(bottles.x, hood.x)
     copy(bottles.y, hood.y)

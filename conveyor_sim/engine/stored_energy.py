@@ -53,11 +53,12 @@ def _in_pairs(bottles: Any, pairs: Any, curves: Any, energy: F8) -> None:
 def _at_rails(world: World, law: Any, found: RailContacts, energy: F8) -> None:
     if law is None:
         return
-    bottles, near_segments, near_arcs = world.bottles, world.near_segments, world.near_arcs
+    bottles, near_segments, near_arcs, moving = world.bottles, world.near_segments, world.near_arcs, world.moving
     for i in range(bottles.x.size):
-        for c in range(find_rail_contacts(i, bottles, world.segments, near_segments, world.arcs, near_arcs, found)):
+        count = find_rail_contacts(i, bottles, world.segments, near_segments, world.arcs, near_arcs, moving, found)
+        for c in range(count):
             e = law_entry(world.settings, bottles, found, c, i)
-            spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, found.entry[c])
+            spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, found.entry[c])
             energy[ELASTIC] += found.share[c] * _elastic(law, e, world.curves, found.overlap[c])
             energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring)
 

@@ -41,7 +41,7 @@ def stiffest_rails(
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
         most = linear.most[i // UNIT]
-        for c in range(find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)):
+        for c in range(find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)):
             entry = law_entry(settings, bottles, found, c, i)
             stiffness = contact_stiffness(
                 law, entry, curves, settings.slip_limit, settings.atan, found.overlap[c], found.share[c]
@@ -83,7 +83,7 @@ def linear_rails(
         for earlier in range(2 if lean > 0.5 else 1):
             if earlier:
                 bottles.x[i], bottles.y[i] = old_x, old_y
-            count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, found)
+            count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)
             bottles.x[i], bottles.y[i] = x, y
             for c in range(count):
                 overlap = found.overlap[c]

@@ -74,7 +74,9 @@ def _watch_rails(world: World, railed: Any, watch: Watch, found: RailContacts) -
     begin, stop = units(0, bottles.x.size)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        count = find_rail_contacts(i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, found)
+        count = find_rail_contacts(
+            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
+        )
         for c in range(count):
             _note(watch, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
 

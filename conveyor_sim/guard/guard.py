@@ -53,17 +53,19 @@ class Guard:
         self.has_put_in = False
         self.deepest = 0.0
 
-    def begin(self, tick: int, surface_speed: float) -> Violation | None:
+    def begin(self, tick: int, surface_speed: float, rail_speed: float) -> Violation | None:
         """Keep the state at the beginning of a tick; tell of a bottle that is not finite there.
 
-        surface_speed: m/s, the largest of any belt's surface.
+        surface_speed: m/s, the largest of any belt's surface; rail_speed: m/s, of any rail that moves.
         """
         model, world = self._model, self._state.world
         self._memory.keep(world)
         if tick % self._every == 0:
             world.watch.due[0] = 1
         bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
-        self._work = weight * (self._friction * surface_speed + self._noise)
+        # A rail that pushes a queue works against its friction; one that hits a bottle of speed v leaves it v + 2 u.
+        hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
+        self._work = weight * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
         return Words(model, world).put_in(bad) if bad >= 0 else None
 
     def end(self, dt: float) -> Violation | None:
@@ -118,6 +120,11 @@ class Guard:
             f"chatters at dt = {self._model.dt:g} s ({self._model.dt_reason}); choose a finer accuracy"
         )
         return GuardEvent(tick, "chatter", bottle, x, y, text)
+
+    def _mass(self) -> float:
+        """Of all bottles, kg."""
+        bottles = self._state.world.bottles
+        return float(self._model.type_mass[bottles.type[bottles.id >= 0]].sum())
 
     def _grown(self) -> tuple[float, float] | None:
         """Energy (J) before and after the tick if it grew by too much: a contact that opened may explain a speed."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.moving_arrays import present
 from conveyor_sim.state import State
 
 
@@ -71,5 +72,7 @@ def _moving(world: World) -> Iterator[NDArray[np.generic]]:
     for near in (world.near_segments, world.near_arcs):
         if near is not None and near.springs is not None:
             yield from (near.start, near.piece, near.springs.elongation, near.springs.kept_count)
+    if world.moving is not None:
+        yield from present(world.moving)
     if world.ledger is not None:
         yield world.ledger.work

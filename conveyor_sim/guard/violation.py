@@ -89,7 +89,8 @@ class Words:
         """Energy (J) that came from nowhere; slot: of the fastest bottle."""
         rise = f"from {before:.3g} to {after:.3g} J"
         what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
-        why = f"belts explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
+        what_works = "belts and rails" if self._model.moving_shapes else "belts"
+        why = f"{what_works} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
         return self._unstable(slot, what, why)
 
     def pair(self, slot: int, other: int, depth: float) -> Violation:

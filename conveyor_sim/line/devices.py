@@ -11,6 +11,7 @@ from conveyor_sim.line.drive import DriveDevice
 from conveyor_sim.line.entry import Entry, Quality
 from conveyor_sim.line.infeed import InfeedDevice
 from conveyor_sim.line.inspection import InspectionDevice
+from conveyor_sim.line.mover import mover_devices
 from conveyor_sim.line.outfeed import OutfeedDevice
 from conveyor_sim.line.reject import RejectDevice
 from conveyor_sim.line.sensors import sensor_devices
@@ -30,6 +31,7 @@ def build_devices(scene: Scene, model: Model) -> tuple[Device, ...]:
     belts = list(_belts(scene))
     return (
         *belts,
+        *mover_devices(model),
         *_infeeds(scene, model),
         *(OutfeedDevice(name, outfeed) for name, outfeed in scene.outfeeds.items()),
         *(_machine(name, machine, scene, model, index) for index, (name, machine) in enumerate(scene.machines.items())),

@@ -1,4 +1,4 @@
-"""Where bottles enter a line: never onto another bottle, and whether they are bad."""
+"""Where bottles enter a line: never onto another bottle or a rail that moves, and whether they are bad."""
 
 import math
 from dataclasses import dataclass
@@ -26,10 +26,13 @@ class Entry:
     """m/s"""
 
     def has_room(self, state: State, x: float, y: float) -> bool:
-        """Whether a bottle at (x, y) m would touch no other."""
+        """Whether a bottle at (x, y) m would touch no other, nor a rail that moves and stands there now."""
         bottles = state.world.bottles
         near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + self.radius - CLEAR) ** 2
-        return not bool((near & (bottles.id >= 0)).any())
+        if bool((near & (bottles.id >= 0)).any()):
+            return False
+        place, moving = np.array([[x, y]]), [piece for rail in state.moving_rails() for piece in rail.pieces]
+        return all(float(piece.distance(place)[0]) >= self.radius - CLEAR for piece in moving)
 
     def enter(self, state: State, x: float, y: float) -> int:
         """Put a bottle at (x, y) m; return its id."""

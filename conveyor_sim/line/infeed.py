@@ -107,7 +107,7 @@ class InfeedDevice(Device):
         """Whether a bottle that far ahead of its place is in no rail; ways: (n,), m."""
         places = np.array([self._place(float(way)) for way in ways])
         clear = np.ones(ways.size, dtype=bool)
-        for rail in state.model.rail_shapes:
+        for rail in state.rails():
             for piece in rail.pieces:
                 clear &= piece.distance(places) >= self._radius - CLEAR
         return clear

@@ -12,7 +12,8 @@ F8 = NDArray[np.float64]
 class Ledger:
     """Where energy came from, where it is and where it went since the start, J; fields of conveyor_msgs/Ledger.
 
-    kinetic + elastic + springs = fed - removed + sum(belt_work) - base_friction - contact_friction - damping + residual
+    kinetic + elastic + springs = fed - removed + sum(belt_work) + sum(rail_work)
+        - base_friction - contact_friction - damping + residual
     """
 
     kinetic: float
@@ -37,13 +38,22 @@ class Ledger:
     """What came from nowhere: the integrator's error, negative where energy was lost."""
     turnover: float
     """All that came or went, without signs: what to hold the residual against."""
+    rail_work: F8
+    """(Q,), done by each rail that moves: gates, pushers, diverters, in the order of the scene."""
 
 
 def balance(
-    stored: F8, fed: float, removed: float, belt_work: F8, base_friction: float, contact_friction: float, damping: float
+    stored: F8,
+    fed: float,
+    removed: float,
+    belt_work: F8,
+    rail_work: F8,
+    base_friction: float,
+    contact_friction: float,
+    damping: float,
 ) -> Ledger:
     """The ledger of what is stored, (3,): kinetic, elastic, springs; and of what came and went. All in J."""
-    came = fed + float(belt_work.sum())
+    came = fed + float(belt_work.sum()) + float(rail_work.sum())
     went = removed + base_friction + contact_friction + damping
     dissipated = abs(base_friction) + abs(contact_friction) + abs(damping)
     return Ledger(
@@ -57,5 +67,6 @@ def balance(
         contact_friction=contact_friction,
         damping=damping,
         residual=float(stored.sum()) - (came - went),
-        turnover=abs(fed) + abs(removed) + float(np.abs(belt_work).sum()) + dissipated,
+        turnover=abs(fed) + abs(removed) + float(np.abs(belt_work).sum() + np.abs(rail_work).sum()) + dissipated,
+        rail_work=rail_work,
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
 from conveyor_sim.scene.machines import Reject, Sink, Source, Spill
+from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import Infeed, Outfeed
 from conveyor_sim.scene.sensor_shapes import SensorShape, sensor_shapes
 
@@ -60,7 +62,7 @@ class Plant:
         return cls(
             belts=tuple(belt_shapes(scene)),
             speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
-            rails=tuple(rail_shapes(scene)),
+            rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
             infeeds=tuple(
                 InfeedMark(
                     path[1],
@@ -76,6 +78,10 @@ class Plant:
             ),
             sensors=tuple(sensor_shapes(scene)),
         )
+
+    def with_moving(self, moving: Sequence[RailShape]) -> Plant:
+        """The same with the rails that move, the last ones, somewhere else."""
+        return replace(self, rails=(*self.rails[: len(self.rails) - len(moving)], *moving))
 
     def belt_outline(self, index: int) -> Floats:
         """Outline (k, 2) of belt `index`, m."""
@@ -121,6 +127,8 @@ class Frame:
     speed: Floats
     belt_speeds: Floats
     contacts: Contacts | None = None
+    moving: tuple[RailShape, ...] = ()
+    """Gates, pushers and diverters; none: they are as at first."""
 
     @classmethod
     def start_of(cls, scene: Scene) -> Frame:
@@ -223,6 +231,8 @@ class Energy:
     damping: Floats
     residual: Floats
     turnover: Floats
+    rails: Floats
+    """(n,), work of all rails that move."""
 
 
 def box_around(points: Floats) -> tuple[float, float, float, float]:

@@ -19,13 +19,14 @@ Curve = tuple[str, Floats]
 
 
 def energy_figure(energy: Energy, belts: Sequence[str]) -> Figure:
-    """Work of the belts that do most, and what bottles brought; what is held; what went; the residual in percent.
+    """Work of the belts that do most and of moving rails, what bottles brought; what is held; what went; the residual.
 
     Accounts in which nothing ever was are left out.
     """
     figure = style.new_figure(13.0, 7.2)
     [[came, went], [held, residual]] = figure.subplots(2, 2, sharex=True)
-    _curves(came, "Came", energy.time, [*_work(energy.belts, belts), ("brought by bottles", energy.fed)])
+    brought = [("rails that move", energy.rails), ("brought by bottles", energy.fed)]
+    _curves(came, "Came", energy.time, [*_work(energy.belts, belts), *brought])
     _curves(
         went,
         "Went",

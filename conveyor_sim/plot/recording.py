@@ -16,7 +16,8 @@ from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.plot.data import Contacts, Energy, Floats, Flow, Frame, PeakForce, Plant, Velocity
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
-from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.geometry import RailShape, initial_bottles
+from conveyor_sim.scene.moving import moving_shapes
 
 Integers = NDArray[np.int64]
 
@@ -72,7 +73,9 @@ class Recording:
         }
         # The last entry is the floor's.
         belts = values.pop("belt_work")[:, :-1]
-        return Energy(time=np.array([frame.time for frame in frames], dtype=np.float64), belts=belts, **values)
+        rails = values.pop("rail_work").sum(axis=1)
+        time = np.array([frame.time for frame in frames], dtype=np.float64)
+        return Energy(time=time, belts=belts, rails=rails, **values)
 
     def frames(self, times: Sequence[float] | None) -> list[Frame]:
         """The line at the recorded instants nearest to `times` (s), in ascending order, each once.
@@ -132,6 +135,7 @@ class Recording:
             speed=np.hypot(bottles.vx, bottles.vy),
             belt_speeds=self._belt_speeds(tick),
             contacts=None if contacts is None else contact_lines(bottles, contacts),
+            moving=self._moving(tick),
         )
 
     @cached_property
@@ -165,6 +169,26 @@ class Recording:
         ticks, speeds = self._belt_records
         last = int(np.searchsorted(ticks, tick, side="right")) - 1
         return self.plant.speeds if last < 0 else speeds[last]
+
+    @cached_property
+    def _position_records(self) -> tuple[Integers, Floats]:
+        """Ticks (n,) and positions (n, movers), m or rad, of the recorded process images."""
+        shapes = moving_shapes(self.scene)
+        names = list(self._bag.line.signal_names)
+        columns = [names.index(f"{shape.name}/position") for shape in shapes]
+        frames = list(self._bag.signals()) if shapes else []
+        shares = np.array([frame.data[columns] for frame in frames], dtype=np.float64).reshape(len(frames), len(shapes))
+        ticks = np.array([frame.tick for frame in frames], dtype=np.int64)
+        return ticks, shares * np.array([shape.stroke for shape in shapes])
+
+    def _moving(self, tick: int) -> tuple[RailShape, ...]:
+        """Rails that move where they were last recorded up to `tick`; none before, when they are as at first."""
+        ticks, positions = self._position_records
+        last = int(np.searchsorted(ticks, tick, side="right")) - 1
+        if last < 0:
+            return ()
+        shapes = moving_shapes(self.scene)
+        return tuple(shape.shape(float(at)) for shape, at in zip(shapes, positions[last], strict=True))
 
     @cached_property
     def _summary(self) -> _Summary:

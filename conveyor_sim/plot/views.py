@@ -116,7 +116,7 @@ def _draw(
 ) -> None:
     """Plant, bottles and forces within `box`, on axes that will be about `inches` wide."""
     points_per_metre = inches * _POINTS / (box[2] - box[0])
-    draw_plant(ax, plant, frame.belt_speeds, norm, 13.0 / points_per_metre)
+    draw_plant(ax, plant.with_moving(frame.moving), frame.belt_speeds, norm, 13.0 / points_per_metre)
     radius = float(np.median(frame.radius)) * points_per_metre if len(frame.x) else 0.0
     draw_bottles(ax, frame, norm, float(np.clip(0.12 * radius, 0.25, 0.8)))
     if radius > 3.5:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.check_movers import unsound_movers
 from conveyor_sim.scene.geometry import (
     TOUCH,
     XY,
@@ -20,6 +21,7 @@ from conveyor_sim.scene.geometry import (
     rails_of_curved,
 )
 from conveyor_sim.scene.machines import Source, Spill
+from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
 from conveyor_sim.scene.polygons import why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
@@ -104,7 +106,7 @@ def _rails(scene: Scene) -> Iterator[Problem]:
 
 
 def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
-    """The rails whose geometry can be, to go on checking with."""
+    """The rails whose geometry can be, to go on checking with; those that move where they are at first."""
     shapes = [
         RailShape(name, rail.material, rail_pieces(rail))
         for name, rail in scene.rails.items()
@@ -113,7 +115,9 @@ def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and ("belts", name) not in wrong:
             shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
-    return shapes
+    unsound = unsound_movers(scene)
+    moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if path not in unsound]
+    return shapes + [shape.shape(shape.first) for shape in moving]
 
 
 def _outfeeds(scene: Scene) -> Iterator[Problem]:

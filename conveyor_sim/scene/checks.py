@@ -8,8 +8,10 @@ from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_machines import machine_problems
+from conveyor_sim.scene.check_movers import mover_problems
 from conveyor_sim.scene.check_sensors import sensor_problems
 from conveyor_sim.scene.check_shapes import shape_problems
+from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
@@ -31,6 +33,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_infeeds(scene),
         *_rail_names(scene),
         *machine_problems(scene),
+        *mover_problems(scene),
         *shape_problems(scene),
         *sensor_problems(scene),
     ]
@@ -80,6 +83,7 @@ def _missing_contacts(scene: Scene) -> Iterator[Problem]:
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and belt.rails.material and (belt.rails.inner or belt.rails.outer):
             rails[f"rails of belt {name}"] = belt.rails.material
+    rails |= {f"{path[0]}.{path[1]}": mover.material for path, mover in movers_of(scene)}
     for what, material in rails.items():
         for one in bottles:
             wanted.setdefault(frozenset((one, material)), f"bottle of {one} and {what} of {material}")

@@ -9,6 +9,7 @@ EffectName = Literal[
     "bottle_contact",
     "segment_rails",
     "arc_rails",
+    "moving_rails",
     "unequal_radii",
     "linear",
     "hertz",

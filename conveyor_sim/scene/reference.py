@@ -5,7 +5,7 @@ from inspect import getdoc
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import accuracy, belts, contacts, drives, indicators, machines, rails, schema, sensors
+from conveyor_sim.scene import accuracy, belts, contacts, drives, indicators, machines, movers, rails, schema, sensors
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -26,7 +26,10 @@ problem is one line that names the file, the line, the field, the value and what
 - Each pair of materials that can touch needs one entry in `contacts` (bottle and bottle, bottle and rail), each pair of
   bottle and belt one in `base`.
 - Where a rail ends on another (within 1e-6 m), both are one surface. Rails of curved belts follow those under
-  `rails` in the order of indices.
+  `rails` in the order of indices, then come gates, pushers and diverters.
+- Gates, pushers and diverters are straight rails that move on command, each a surface of its own: where one ends on
+  another rail, a bottle that slides past touches both. They take `semi_implicit_euler` or `velocity_verlet`, and
+  contacts without `tangential`.
 - No bottle may be born inside a rail or another bottle; touching is allowed.
 """
 
@@ -45,6 +48,10 @@ SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
     ("An entry of `rails`: `kind: segment`", rails.SegmentRail),
     ("An entry of `rails`: `kind: polyline`", rails.PolylineRail),
     ("An entry of `rails`: `kind: arc`", rails.ArcRail),
+    ("An entry of `gates`: `kind: slide`", movers.SlidingGate),
+    ("An entry of `gates`: `kind: swing`", movers.SwingingGate),
+    ("An entry of `pushers`", movers.Pusher),
+    ("An entry of `diverters`", movers.Diverter),
     ("`floor`", schema.Floor),
     ("An entry of `infeeds`", schema.Infeed),
     ("An entry of `outfeeds`", schema.Outfeed),

@@ -16,6 +16,7 @@ from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.effect_names import EffectName, Forced
 from conveyor_sim.scene.indicators import Indicator
 from conveyor_sim.scene.machines import Machine, Reject, Share, Sink, Source, Spill
+from conveyor_sim.scene.movers import Diverter, Gate, Pusher
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.rails import Rail
 from conveyor_sim.scene.sensors import Counter, PhotoEye, Zone
@@ -221,6 +222,15 @@ class Scene(Part):
     )
     rails: Annotated[dict[Name, Rail], _named("rails")] = quantity(
         "Rails. Those that join end to end, or end on another, are one surface.", default={}
+    )
+    gates: Annotated[dict[Name, Gate], _named("gates")] = quantity(
+        "Gates and stops: rails that open and close on command.", default={}
+    )
+    pushers: Annotated[dict[Name, Pusher], _named("pushers")] = quantity(
+        "Rails that push on command and return.", default={}
+    )
+    diverters: Annotated[dict[Name, Diverter], _named("diverters")] = quantity(
+        "Rails that swing into the way on command and return.", default={}
     )
     floor: Annotated[
         Annotated[Floor, Tag("(floor)")] | Annotated[Literal["none"], Tag("(none)")],

@@ -7,10 +7,11 @@ import pytest
 from bag.hand_made import HEADER, bottles
 from bag.ros_decode import assert_same, deserialize
 
-from conveyor_sim.bag.markers import ADD, DELETE, TRIANGLE_LIST, bottles_markers, plant_markers
+from conveyor_sim.bag.markers import ADD, DELETE, LINE_STRIP, TRIANGLE_LIST, bottles_markers, plant_markers
 from conveyor_sim.bag.messages import MARKERS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
+from conveyor_sim.scene.geometry import RailShape, SegmentPiece
 from conveyor_sim.scene.sensor_shapes import SensorShape
 
 RADII = np.array([0.03, 0.05, 0.04, 0.06])
@@ -26,7 +27,7 @@ def decode(data: bytes) -> list[Any]:
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 1000])
 def test_bottles_are_one_list_of_spheres_a_type(count: int) -> None:
     columns = bottles(count)
-    markers = decode(bottles_markers(columns, RADII, HEADER))
+    markers = decode(bottles_markers(columns, RADII, (), HEADER))
     assert [marker.id for marker in markers] == [0, 1, 2, 3]
     for index, marker in enumerate(markers):
         chosen = columns.type == index
@@ -35,6 +36,13 @@ def test_bottles_are_one_list_of_spheres_a_type(count: int) -> None:
         assert marker.scale.x == marker.scale.y == 2.0 * RADII[index]
         assert marker.action == (ADD if chosen.any() else DELETE)
         assert marker.header.frame_id == "hall"
+
+
+def test_rails_that_move_are_drawn_with_the_bottles() -> None:
+    rail = RailShape("gates/g", "steel", (SegmentPiece((1.0, 2.0), (3.0, 5.0)),))
+    *others, marker = decode(bottles_markers(bottles(3), RADII, [rail], HEADER))
+    assert (len(others), marker.ns, marker.type) == (4, "moving_rails", LINE_STRIP)
+    assert [(point.x, point.y) for point in marker.points] == [(1.0, 2.0), (3.0, 5.0)]
 
 
 def test_plant_shows_every_belt_rail_and_name(scene: Scene) -> None:

@@ -21,7 +21,8 @@ LEDGER = balance(
     stored=np.array([3.0, 0.5, 0.25]),
     fed=1.0,
     removed=0.125,
-    belt_work=np.array([5.0, -1.0, 0.0]),
+    belt_work=np.array([5.0, -1.5, 0.0]),
+    rail_work=np.array([0.75, -0.25]),
     base_friction=0.5,
     contact_friction=0.25,
     damping=0.125,
@@ -74,11 +75,12 @@ def test_header_tells_simulated_time_tick_and_frame() -> None:
 
 
 def test_a_ledger_tells_what_does_not_close() -> None:
-    """1 + 4 J came and 1 J went, 3.75 J are held: 0.25 J are lost, of 8 J."""
+    """1 + 3.5 + 0.5 J came and 1 J went, 3.75 J are held: 0.25 J are lost, of 9.5 J."""
     message = decode("ledger")
     assert (message.kinetic, message.elastic, message.springs) == (3.0, 0.5, 0.25)
-    assert message.belt_work.tolist() == [5.0, -1.0, 0.0]
-    assert (message.residual, message.turnover) == (-0.25, 8.0)
+    assert message.belt_work.tolist() == [5.0, -1.5, 0.0]
+    assert message.rail_work.tolist() == [0.75, -0.25]
+    assert (message.residual, message.turnover) == (-0.25, 9.5)
 
 
 def test_pose_is_position_and_turn_about_the_vertical() -> None:

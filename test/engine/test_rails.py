@@ -16,7 +16,7 @@ from worlds import (
     rail_forces,
 )
 
-from conveyor_sim.engine.rails import keep_deepest
+from conveyor_sim.engine.keep import keep_deepest
 from conveyor_sim.engine.team import MOST_CONTACTS
 
 RANDOM = np.random.default_rng(20240229)

@@ -16,6 +16,7 @@ from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_kick
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
+from ..moving import pass_step, place_rails
 from ..pairs import pack_row
 from ..team import BLOCK, share
 
@@ -26,6 +27,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     bottles = world.bottles
     line = for_forces(world)
     begin, stop = share(member, bottles.x.size)
+    place_rails(line.moving, member, dt)
     pack_all(line, member)
     for step in range(steps):
         pair_phase(line, member, dt, dt)
@@ -37,7 +39,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             _turn(world.spin, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
             note_moved(line, member, first, end)
-        if not lists_hold(line, member):
+        hold = lists_hold(line, member)
+        pass_step(line.moving, member, dt)
+        if not hold:
             return step + 1
         watch_rebuilt(line, member)
     return steps

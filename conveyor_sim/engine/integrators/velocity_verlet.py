@@ -22,6 +22,7 @@ from ..motion import (
     store_velocities,
     watch_rebuilt,
 )
+from ..moving import pass_step, place_rails
 from ..team import BLOCK, share
 from .phase import RESUME, START
 
@@ -32,6 +33,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     bottles, half = world.bottles, 0.5 * dt
     line = for_forces(world)
     begin, stop = share(member, bottles.x.size)
+    place_rails(line.moving, member, dt)
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
         evaluate_forces(line, member, dt)
@@ -43,7 +45,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 kick(bottles, world.spin, world.load, half, first, end)
                 drift(bottles, world.spin, dt, first, end)
                 note_moved(line, member, first, end)
-            if not lists_hold(line, member):
+            hold = lists_hold(line, member)
+            pass_step(line.moving, member, dt)
+            if not hold:
                 return step
             watch_rebuilt(line, member)
         for first in range(begin, stop, BLOCK):

@@ -1,0 +1,67 @@
+"""The arrays of the rails that move at the beginning of a run, and how fast they are in a tick."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from conveyor_sim.engine.arrays import Ends
+from conveyor_sim.engine.joint import FREE
+from conveyor_sim.engine.moving_arrays import PHASES, MovingRails
+from conveyor_sim.scene.moving import MovingShape
+
+
+def moving_arrays(shapes: Sequence[MovingShape], materials: Sequence[str], rail: int, surface: int) -> MovingRails:
+    """Rails that rest where they are at first, each a surface of its own.
+
+    materials: of all rails, by number. rail, surface: the number of the first one as a rail and as a surface.
+    """
+    count = len(shapes)
+    start = np.array([shape.at(shape.first).p1 for shape in shapes])
+    end = np.array([shape.at(shape.first).p2 for shape in shapes])
+    home = np.array([shape.start for shape in shapes])
+    length = np.array([shape.length for shape in shapes])
+    tangent = (end - start) / length[:, None]
+    home_tangent = (np.array([shape.end for shape in shapes]) - home) / length[:, None]
+    along = np.array([shape.along for shape in shapes])
+    course = np.zeros((count, PHASES, 4))
+    course[:, :, 1] = np.array([shape.first for shape in shapes])[:, None]
+    return MovingRails(
+        x=start[:, 0].copy(),
+        y=start[:, 1].copy(),
+        tx=tangent[:, 0].copy(),
+        ty=tangent[:, 1].copy(),
+        length=length,
+        ends=Ends(
+            x=np.column_stack([start[:, 0], end[:, 0]]),
+            y=np.column_stack([start[:, 1], end[:, 1]]),
+            joint=np.full((count, 2), FREE, np.int8),
+            neighbour_x=np.zeros((count, 2)),
+            neighbour_y=np.zeros((count, 2)),
+        ),
+        material=np.array([materials.index(shape.material) for shape in shapes], np.uint32),
+        rail=np.arange(rail, rail + count, dtype=np.uint32),
+        surface=np.arange(surface, surface + count, dtype=np.uint32),
+        vx=np.zeros(count),
+        vy=np.zeros(count),
+        turn=np.zeros(count),
+        position=course[:, 0, 1].copy(),
+        speed=np.zeros(count),
+        home_x=home[:, 0].copy(),
+        home_y=home[:, 1].copy(),
+        home_tx=home_tangent[:, 0].copy(),
+        home_ty=home_tangent[:, 1].copy(),
+        along_x=along[:, 0].copy(),
+        along_y=along[:, 1].copy(),
+        turning=np.array([shape.turning for shape in shapes]),
+        sweep=np.array([shape.sweep() for shape in shapes]),
+        course=course,
+        clock=np.zeros(1),
+    )
+
+
+def fastest_rail(moving: MovingRails | None) -> float:
+    """Speed (m/s) that no point of a moving rail exceeds on its course, 0 if none moves."""
+    if moving is None:
+        return 0.0
+    reach = np.where(moving.turning != 0.0, moving.length, 1.0)
+    return float((reach * np.abs(moving.course[:, :, 2]).max(axis=1)).max())

@@ -1,0 +1,62 @@
+"""Gates, pushers and diverters that can't be, or that can't be computed with what else a scene asks for."""
+
+import math
+from collections.abc import Iterator
+
+from conveyor_sim.scene.geometry import TOUCH
+from conveyor_sim.scene.movers import Diverter, SwingingGate
+from conveyor_sim.scene.moving import movers_of
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.words import shown
+
+INTEGRATORS = ("semi_implicit_euler", "velocity_verlet")
+"""Those that move rails: the others take forces within a step, or solve for what a rail at rest exerts."""
+
+
+def mover_problems(scene: Scene) -> list[Problem]:
+    """Problems of the rails that move."""
+    return [*_shapes(scene), *_integrator(scene), *_springs(scene)]
+
+
+def unsound_movers(scene: Scene) -> set[Path]:
+    """Paths of the movers whose geometry can't be."""
+    return {problem.path[:2] for problem in _shapes(scene)}
+
+
+def _shapes(scene: Scene) -> Iterator[Problem]:
+    for path, mover in movers_of(scene):
+        if math.dist(mover.from_, mover.to) <= TOUCH:
+            yield Problem((*path, "to"), f"{shown(mover.to)} given, expected a point away from `from` (zero length)")
+        if isinstance(mover, (SwingingGate, Diverter)) and not 1e-6 <= abs(mover.angle) <= 2.0 * math.pi:
+            yield Problem(
+                (*path, "angle"),
+                f"{shown(mover.angle)} given, expected an angle of 1e-6 rad up to a full turn, to either side",
+            )
+
+
+def _integrator(scene: Scene) -> Iterator[Problem]:
+    chosen = scene.accuracy.integrator
+    for path, _ in movers_of(scene):
+        if chosen not in INTEGRATORS:
+            yield Problem(
+                ("accuracy", "integrator"),
+                f"{shown(chosen)} given, expected {' or '.join(INTEGRATORS)}, as {path[0]}.{path[1]} moves: "
+                "the other integrators take rails to be at rest within a step",
+            )
+            return
+
+
+def _springs(scene: Scene) -> Iterator[Problem]:
+    bottles = {kind.material for kind in scene.bottle_types.values()}
+    movers = {mover.material: path for path, mover in reversed(list(movers_of(scene)))}
+    for index, contact in enumerate(scene.contacts):
+        a, b = contact.between
+        moving = next((rail for one, rail in ((a, b), (b, a)) if one in bottles and rail in movers), None)
+        if contact.tangential is not None and moving is not None:
+            path = movers[moving]
+            yield Problem(
+                ("contacts", index, "tangential"),
+                f"given, expected none for {moving}, of which {path[0]}.{path[1]} is made: "
+                "rails that move have no tangential springs",
+            )

@@ -1,0 +1,100 @@
+"""Shapes of the rails that move: where they are at a position of their course. Pure functions; m and rad."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from conveyor_sim.scene.geometry import XY, Array, RailShape, SegmentPiece
+from conveyor_sim.scene.movers import Diverter, Mover, Pusher, SwingingGate
+from conveyor_sim.scene.problems import Path
+from conveyor_sim.scene.schema import Scene
+
+
+@dataclass(frozen=True)
+class MovingShape:
+    """A straight rail from `start` to `end` at home, which slides along a direction or swings about its start."""
+
+    name: str
+    """Such as `gates/exit`."""
+    material: str
+    start: XY
+    end: XY
+    along: XY
+    """Unit vector along which it slides, (0, 0) if it swings."""
+    turning: float
+    """1 swings counter-clockwise, -1 clockwise; 0 slides."""
+    stroke: float
+    """m, or rad: its position goes from 0, at home, to this."""
+    max_speed: float
+    """m/s, or rad/s."""
+    acceleration: float
+    """m/s^2, or rad/s^2."""
+    first: float
+    """Position at the beginning of the run."""
+
+    @property
+    def length(self) -> float:
+        """Length of the rail, m."""
+        return math.dist(self.start, self.end)
+
+    @property
+    def fastest_point(self) -> float:
+        """m that its fastest point goes when its position changes by 1."""
+        return self.length if self.turning else 1.0
+
+    def at(self, position: float) -> SegmentPiece:
+        """The rail at a position (m or rad)."""
+        (x, y), (dx, dy) = self.start, (self.end[0] - self.start[0], self.end[1] - self.start[1])
+        x, y = x + self.along[0] * position, y + self.along[1] * position
+        cos, sin = math.cos(self.turning * position), math.sin(self.turning * position)
+        return SegmentPiece((x, y), (x + dx * cos - dy * sin, y + dx * sin + dy * cos))
+
+    def sweep(self) -> Array:
+        """Box of all places that it can be at, (4,): least x and y, greatest x and y."""
+        places = [0.0, self.stroke]
+        if self.turning:
+            # Its end is farthest along an axis where it crosses that.
+            home = math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
+            crossings = (self.turning * (quarter * math.pi / 2.0 - home) for quarter in range(-12, 13))
+            places += [place for place in crossings if 0.0 < place < self.stroke]
+        points = np.concatenate([self.at(place).points() for place in places])
+        return np.concatenate([points.min(axis=0), points.max(axis=0)])
+
+    def shape(self, position: float) -> RailShape:
+        """The rail at a position (m or rad), as a rail like others."""
+        return RailShape(self.name, self.material, (self.at(position),))
+
+
+def movers_of(scene: Scene) -> Iterator[tuple[Path, Mover]]:
+    """Every gate, pusher and diverter with its path, in the order of the numbers of their rails."""
+    for field, movers in (("gates", scene.gates), ("pushers", scene.pushers), ("diverters", scene.diverters)):
+        for name, mover in movers.items():
+            yield (field, name), mover
+
+
+def moving_shape(path: Path, mover: Mover) -> MovingShape:
+    """The shape of one mover."""
+    if isinstance(mover, (SwingingGate, Diverter)):
+        along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
+    else:
+        along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
+    starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
+    return MovingShape(
+        name="/".join(str(part) for part in path),
+        material=mover.material,
+        start=mover.from_,
+        end=mover.to,
+        along=along,
+        turning=turning,
+        stroke=stroke,
+        max_speed=mover.max_speed,
+        acceleration=mover.acceleration,
+        first=stroke if starts_open else 0.0,
+    )
+
+
+def moving_shapes(scene: Scene) -> list[MovingShape]:
+    """The rails that move; their numbers follow those of the rails that don't."""
+    return [moving_shape(path, mover) for path, mover in movers_of(scene)]

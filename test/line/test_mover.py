@@ -1,0 +1,77 @@
+"""Gates, pushers and diverters as a controller has them: commands, end switches, a jam."""
+
+import math
+from typing import Any
+
+import pytest
+from physics.test_moving_rails import plant
+from scenes import RADIUS, bottle
+
+from conveyor_sim.line.process_image import switch
+from conveyor_sim.simulation import Simulation
+
+STROKE, TOP, ACCELERATION = 0.3, 0.5, 2.0
+
+
+def alone(*bottles: dict[str, Any]) -> Simulation:
+    """A pusher, and a gate that is open at the start, far away."""
+    steel = {"material": "steel", "max_speed": TOP, "acceleration": ACCELERATION}
+    pusher = {"from": [0.0, -0.2], "to": [0.0, 0.2], "direction": 0.0, "stroke": STROKE, **steel}
+    gate = {"kind": "swing", "from": [9.0, 5.0], "to": [9.5, 5.0], "angle": "-90 deg", "open": True, **steel}
+    return plant(*bottles, pushers={"p": pusher}, gates={"g": gate}, diverters={})
+
+
+def seen(sim: Simulation, name: str) -> tuple[float, ...]:
+    """Position and both end switches."""
+    signals = dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
+    return tuple(value for signal, value in signals.items() if signal.startswith(f"{name}/"))
+
+
+def test_the_process_image_has_them() -> None:
+    image = alone().process_image
+    assert tuple(name for name in image.signal_names if not name.startswith("belts/")) == (
+        "gates/g/position", "gates/g/is_closed", "gates/g/is_open",
+        "pushers/p/position", "pushers/p/retracted", "pushers/p/extended",
+    )  # fmt: skip
+    assert image.commands[1:] == (switch("gates/g/open"), switch("pushers/p/push"))
+    assert image.faults == (switch("gates/g/jammed"), switch("pushers/p/jammed"))
+
+
+def test_a_stroke_takes_its_time_and_there_are_switches_at_its_ends() -> None:
+    """0.85 s out: 0.3 m at 0.5 m/s, and 0.25 s to speed up and brake; as long back."""
+    sim = alone()
+    assert (seen(sim, "gates/g"), seen(sim, "pushers/p")) == ((1.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+    sim.command(["pushers/p/push", "gates/g/open"], [1, 0])
+    sim.advance(25)
+    assert seen(sim, "pushers/p") == pytest.approx((0.5 * TOP * 0.25 / STROKE, 0.0, 0.0))
+    sim.advance(60)
+    assert seen(sim, "pushers/p") == pytest.approx((1.0, 0.0, 1.0))
+    sim.command(["pushers/p/push"], [0])
+    sim.advance(20)
+    # A command that is given again changes nothing.
+    sim.command(["pushers/p/push"], [0])
+    sim.advance(64)
+    assert seen(sim, "pushers/p")[0] < 1e-3
+    sim.advance(1)
+    assert seen(sim, "pushers/p") == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+    sim.advance(300)
+    assert seen(sim, "gates/g") == (0.0, 1.0, 0.0)
+
+
+def test_a_jammed_rail_stands_where_it_was_and_goes_on_when_it_is_free() -> None:
+    """At once, as against a stop; a bottle that comes up against it stays on its side."""
+    sim = alone(bottle(0.3, 0.0, -0.2, 0.0))
+    sim.command(["pushers/p/push"], [1])
+    sim.advance(30)
+    place = seen(sim, "pushers/p")[0]
+    sim.inject("pushers/p/jammed", 1)
+    sim.advance(30)
+    assert seen(sim, "pushers/p") == (place, 0.0, 0.0)
+    sim.command(["pushers/p/push"], [0])
+    sim.advance(20)
+    assert seen(sim, "pushers/p") == (place, 0.0, 0.0)
+    assert sim.bottles().x[0] > place * STROKE + 0.9 * RADIUS
+    sim.inject("pushers/p/jammed", 0)
+    way = place * STROKE
+    sim.advance(math.ceil(100.0 * 2.0 * math.sqrt(way / ACCELERATION)) + 1)
+    assert seen(sim, "pushers/p") == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
