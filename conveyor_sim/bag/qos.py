@@ -37,7 +37,7 @@ DATA = Qos(depth=5)
 LATCHED = Qos(depth=1, durability="transient_local")
 """What is published once: a subscriber that joins late still gets it."""
 COMMANDS = Qos(depth=100)
-"""Commands, their outcomes, what the guard tells: each one counts."""
+"""Commands, their outcomes, what the guard tells, limits that are passed: each one counts."""
 CLOCK = Qos(depth=1)
 """Reliable, because that also matches subscribers that ask for best effort."""
 
@@ -48,11 +48,14 @@ QOS = {
     "belts": DATA,
     "signals": DATA,
     "ledger": DATA,
+    "damage": DATA,
+    "rail_wear": DATA,
     "markers": DATA,
     "line": LATCHED,
     "plant": LATCHED,
     "outcomes": COMMANDS,
     "guard": COMMANDS,
+    "damage_events": COMMANDS,
     "commands": COMMANDS,
     "cmd_speed": COMMANDS,
     "clock": CLOCK,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.observe.damage import RailWearColumns
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
 
 if TYPE_CHECKING:
@@ -207,6 +208,20 @@ class Energy:
     damping: Floats
     residual: Floats
     turnover: Floats
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What rails had borne at the end of a recording, and the worst that each bottle ever bore."""
+
+    time: float
+    """s, of the last output."""
+    wear: RailWearColumns
+    bottles: int
+    worst: dict[str, Floats]
+    """By quantity (`DamageColumns`), one entry a bottle for which it is known."""
+    limits: dict[str, float]
+    """Those of the scene."""
 
 
 def box_around(points: Floats) -> tuple[float, float, float, float]:

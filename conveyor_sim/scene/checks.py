@@ -7,6 +7,7 @@ from itertools import combinations_with_replacement
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
+from conveyor_sim.scene.check_limits import limit_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
@@ -28,6 +29,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_belt_speeds(scene),
         *_infeeds(scene),
         *_rail_names(scene),
+        *limit_problems(scene),
         *shape_problems(scene),
     ]
 

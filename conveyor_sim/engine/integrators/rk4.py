@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import Member, World
 from ..compile import kernel
+from ..damage import note_damage
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_stages, note_powers
 from ..motion import lists_hold, note_moved, watch_rebuilt
@@ -49,6 +50,8 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     taken = 0
     pack_all(world, member)
     while True:
+        if stage == 0 and taken < steps:
+            note_damage(world, member, dt)
         pair_phase(world, member, dt, 0.0)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)

@@ -12,6 +12,7 @@ from numba import uint64
 
 from ..arrays import Bottles, Load, Member, World
 from ..compile import kernel, part
+from ..damage import note_damage
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_kick
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
@@ -26,6 +27,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     begin, stop = share(member, bottles.x.size)
     pack_all(world, member)
     for step in range(steps):
+        note_damage(world, member, dt)
         pair_phase(world, member, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
