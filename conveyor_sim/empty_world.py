@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from conveyor_sim.empty_damage import empty_damage
 from conveyor_sim.engine.arrays import (
     F8,
     Bottles,
@@ -128,6 +129,7 @@ def empty_world(model: Model, slots: int) -> World:
         footing=_footing(model, slots),
         ring=Ring(reals()) if model.has("ring_base") else None,
         ledger=_ledger(slots, model) if model.has("energy_ledger") else None,
+        damage=empty_damage(model, slots),
     )
 
 

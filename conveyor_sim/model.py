@@ -1,5 +1,6 @@
 """Scene -> Model: the constant arrays, the chosen effects and why, the time step and its reason."""
 
+import math
 import platform
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -20,7 +21,7 @@ from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.places import Places
-from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.schema import BottleType, Scene
 from conveyor_sim.timestep import Bound, fewest_steps, steps_per_tick
 from conveyor_sim.version import __version__, sources_hash
 
@@ -58,6 +59,8 @@ class Model:
     """(T,), kg m^2"""
     type_base_radius: F8 | None
     """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
+    type_heights: F8
+    """(T, 2), m, of the contact band and of the centre of gravity; NaN where they are not given."""
     belt_shapes: tuple[BeltShape, ...]
     rail_shapes: tuple[RailShape, ...]
     """By number; those that move are last, as they are at first."""
@@ -136,6 +139,7 @@ def build_model(scene: Scene) -> Model:
         type_mass=np.array([kind.mass for kind in types]),
         type_inertia=np.array([kind.moment_of_inertia for kind in types]),
         type_base_radius=laws.base_radius,
+        type_heights=np.array([_heights(kind) for kind in types]),
         belt_shapes=tuple(belts),
         rail_shapes=tuple(all_rails),
         moving_shapes=tuple(moving),
@@ -182,6 +186,13 @@ def _given_steps(scene: Scene) -> int | None:
 def _given_words(scene: Scene) -> str:
     accuracy = scene.accuracy
     return f"{accuracy.per_tick} steps a tick" if accuracy.dt is None else f"at most {accuracy.dt * 1e6:g} us"
+
+
+def _heights(kind: BottleType) -> tuple[float, float]:
+    """Of the contact band and of the centre of gravity, m; NaN where they are not given."""
+    if kind.contact_height is None or kind.gravity_height is None:
+        return math.nan, math.nan
+    return kind.contact_height, kind.gravity_height
 
 
 def _largest(radii: F8 | None) -> float:

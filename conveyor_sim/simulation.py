@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
+from conveyor_sim.damage_account import DamageAccount
 from conveyor_sim.energy_account import EnergyAccount
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import closed_contacts
@@ -23,6 +24,7 @@ from conveyor_sim.line.line import FAULT, Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.part_memory import recall, remembered
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
@@ -73,6 +75,10 @@ class Simulation:
         self._outermost = np.array([shape.outermost for shape in self.model.belt_shapes])
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
+        self._damage: DamageAccount | None = None
+        if self._state.world.damage is not None or scene.limits.clogging_time is not None:
+            exits = {name: np.array(outfeed.region) for name, outfeed in scene.outfeeds.items()}
+            self._damage = DamageAccount(self._state, scene.limits, exits)
         self._account: EnergyAccount | None = None
         self._feed()
         self._line.end(self.tick)
@@ -136,8 +142,12 @@ class Simulation:
             if peaks is not None and self.due("bottles"):
                 peaks.force[:] = 0.0
                 peaks.impulse[:] = 0.0
+            if self._damage is not None:
+                self._damage.begin(self.due("damage"))
             self._integration.take_tick(self.tick, self._fastest_surface())
             self.tick += 1
+            if self._damage is not None:
+                self._damage.end(self.tick, self._line.removed_by())
             self._line.end(self.tick)
             self._remove()
             self._feed()
@@ -167,6 +177,10 @@ class Simulation:
     def take_guard_events(self) -> list[GuardEvent]:
         """What the guard has to tell since the last call, in order."""
         return self._integration.take_events()
+
+    def take_damage_events(self) -> list[DamageEvent]:
+        """What went beyond a limit of the scene since the last call, in order."""
+        return [] if self._damage is None else self._damage.take_events()
 
     @property
     def shortened_ticks(self) -> int:
@@ -262,6 +276,14 @@ class Simulation:
         """Where energy came from and went since the start; None without the effect `energy_ledger`."""
         return None if self._account is None else self._account.ledger()
 
+    def damage(self) -> DamageColumns | None:
+        """What every bottle present has borne, ordered by id; None where the scene does not ask."""
+        return None if self._damage is None else self._damage.columns(self._slots())
+
+    def rail_wear(self) -> RailWearColumns | None:
+        """What the rails have borne since the start; None where the scene does not ask."""
+        return None if self._damage is None else self._damage.rail_wear()
+
     def signals(self) -> np.ndarray:
         """The process image's values, in the order of `process_image.signal_names`; float64."""
         return self._line.signals()
@@ -288,6 +310,7 @@ class Simulation:
             "next_id": self._state.next_id,
             "line": self._line.memory(),
             "account": None if self._account is None else remembered(self._account),
+            "damage": None if self._damage is None else remembered(self._damage),
             "integration": self._integration.memory(),
         }
 
@@ -298,6 +321,8 @@ class Simulation:
             self._line.go_on_from(self.tick, memory["line"])
             if self._account is not None:
                 recall(self._account, memory["account"])
+            if self._damage is not None:
+                recall(self._damage, memory["damage"])
             self._integration.recall(memory["integration"])
             self._state.go_on_from(checkpoint.arrays, memory["next_id"])
         except (KeyError, AttributeError, TypeError, ValueError) as error:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.engine.arrays import Near, NearSprings, PairSprings
+from conveyor_sim.engine.damage_arrays import bin_columns, slot_columns
 from conveyor_sim.engine.fewer import lists_of
 from conveyor_sim.engine.moving_arrays import present
 from conveyor_sim.engine.near import drop_near_springs
@@ -45,6 +46,7 @@ class State:
         if self.world.spin is not None:
             self.world.spin.theta[slot], self.world.spin.omega[slot] = theta, omega
         self._equip(slice(slot, slot + 1))
+        self._note_velocities(slice(slot, slot + 1))
         self.world.neighbourhood.stale[0] = 1
         self.next_id += 1
         return self.next_id - 1
@@ -56,6 +58,8 @@ class State:
             for name, column in zip(group._fields, group, strict=True) if group is not None else ():
                 if name != "packed":
                     np.asarray(column)[slot] = 0
+        for column in slot_columns(world.damage) if world.damage is not None else ():
+            column[slot] = 0
         world.bottles.id[slot] = -1
         heapq.heappush(self._free, slot)
         if world.pairs is not None and world.pairs.spring is not None:
@@ -82,6 +86,7 @@ class State:
             self.world.moving.course[:] = other.world.moving.course
             for now, then in zip(present(self.world.moving), present(other.world.moving), strict=True):
                 now[:] = then
+        self._note_velocities(slice(None))
         self.make_lists()
 
     def go_on_from(self, arrays: Arrays, next_id: int) -> None:
@@ -106,6 +111,12 @@ class State:
             world.ring.radius[slots] = model.type_base_radius[kind]
         if world.implicit is not None:
             world.implicit.mobility[slots] = 1.0 / mass + (radius**2 / inertia if world.spin is not None else 0.0)
+
+    def _note_velocities(self, slots: slice) -> None:
+        """What has just been put in has not been looked at before."""
+        damage, bottles = self.world.damage, self.world.bottles
+        if damage is not None and damage.impacts is not None:
+            damage.impacts.vx[slots], damage.impacts.vy[slots] = bottles.vx[slots], bottles.vy[slots]
 
     def springs(self) -> bytes:
         """All tangential springs that are not slack, with the slots and rail pieces that they tie; no others' bits."""
@@ -160,6 +171,10 @@ class State:
                     getattr(new.surface, name)[:] = before
         if old.ledger is not None and new.ledger is not None:
             new.ledger.work[: len(old.ledger.work)] = old.ledger.work
+        if old.damage is not None and new.damage is not None:
+            for columns in (slot_columns, bin_columns):
+                for before, after in zip(columns(old.damage), columns(new.damage), strict=True):
+                    after[: len(before)] = before
         # Higher than all there are, and none is free: still a heap.
         self._free += range(used, slots)
         self.world = new._replace(

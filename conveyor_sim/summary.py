@@ -15,17 +15,20 @@ from rich.console import Group
 from rich.table import Table
 
 from conveyor_sim.achieved import Achieved, achieved
-from conveyor_sim.bag.messages import BOTTLES, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
+from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.errors import SceneError
 from conveyor_sim.model import Model, build_model
+from conveyor_sim.observe.borne import Borne
 from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3
+TAKEN = (BOTTLES, SIGNALS, LEDGER, DAMAGE, DAMAGE_EVENT, OUTCOME, GUARD_EVENT)
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,12 @@ class Summary:
     """What it said, the first times."""
     energy: Energy | None
     """None if no energy ledger was recorded."""
+    borne: Borne | None
+    """What bottles have borne; None if it was not recorded."""
+    damage_events: dict[str, int]
+    """How often a limit was passed, by limit."""
+    damage_texts: list[str]
+    """What was said of it, the first times."""
     commands: int
     refused: int
     """Of the commands."""
@@ -167,10 +176,12 @@ class _Tally:
         self._ledger: Ledger | None = None
         self._outcomes: Counter[bool] = Counter()
         self._guard: list[tuple[str, str]] = []
+        self._borne: Borne | None = None
+        self._passed: list[tuple[str, str]] = []
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
-            if bag.types[topic] in (BOTTLES, SIGNALS, LEDGER, OUTCOME, GUARD_EVENT):
+            if bag.types[topic] in TAKEN:
                 self._take(bag.types[topic], bag.decode(topic, data))
 
     def _take(self, kind: str, message: Any) -> None:
@@ -184,6 +195,10 @@ class _Tally:
             self._signals = message.values
         elif kind == GUARD_EVENT:
             self._guard.append((message.kind, message.text))
+        elif kind == DAMAGE:
+            self._borne = (self._borne or Borne()).with_more(to_columns(DamageColumns, message))
+        elif kind == DAMAGE_EVENT:
+            self._passed.append((message.kind, message.text))
         elif kind == LEDGER:
             self._ledger = to_columns(Ledger, message)
         else:
@@ -213,6 +228,9 @@ class _Tally:
             guard=dict(Counter(kind for kind, _ in self._guard)),
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
             energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),
+            borne=self._borne,
+            damage_events=dict(Counter(kind for kind, _ in self._passed)),
+            damage_texts=[text for _, text in self._passed[:GUARD_TEXTS]],
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
@@ -310,17 +328,19 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("setting", summary.setting),
         ("predicted error", "not known" if summary.predicted is None else summary.predicted),
         ("achieved", "not known" if summary.achieved is None else summary.achieved.sentence),
-        ("guard", _guard(summary)),
+        ("guard", _told(summary.guard, summary.guard_texts)),
+        *([] if summary.borne is None else [("damage", summary.borne.sentence)]),
+        *([("limits passed", _told(summary.damage_events, summary.damage_texts))] if summary.damage_events else []),
         *([] if summary.energy is None else [("energy", summary.energy.sentence)]),
         ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
     ]
 
 
-def _guard(summary: Summary) -> str:
-    if not summary.guard:
+def _told(kinds: dict[str, int], texts: list[str]) -> str:
+    if not kinds:
         return "nothing to tell"
-    counts = ", ".join(f"{count} x {kind.replace('_', ' ')}" for kind, count in summary.guard.items())
-    return "\n".join([counts, *summary.guard_texts])
+    counts = ", ".join(f"{count} x {kind.replace('_', ' ')}" for kind, count in kinds.items())
+    return "\n".join([counts, *texts])
 
 
 def _table(*headings: str) -> Table:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.reader import Outcome
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
 
 TOLERANCE = {
@@ -71,6 +72,10 @@ def _contact_name(line: Any, message: Any, index: int) -> str:
     return f"the contact of bottle {message.a[index]} and rail {rail}"
 
 
+def _bin_name(line: Any, message: Any, index: int) -> str:
+    return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"
+
+
 @dataclass(frozen=True)
 class _Comparer:
     """The columns of a topic, how to name an entry of them, and the column that holds its bottle's id."""
@@ -90,6 +95,8 @@ COMPARERS = {
     "belts": _Comparer(_columns(BeltColumns), lambda line, _, index: f"belt {line.belts[index]}"),
     "signals": _Comparer(("values",), lambda line, _, index: f"signal {line.signal_names[index]}"),
     "ledger": _Comparer(_columns(Ledger), lambda *_: ""),
+    "damage": _Comparer(_columns(DamageColumns), _bottle_name, "id"),
+    "rail_wear": _Comparer(_columns(RailWearColumns), _bin_name),
 }
 """By topic, in the order in which differences of one tick are looked for."""
 

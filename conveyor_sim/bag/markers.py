@@ -111,7 +111,7 @@ def bottles_markers(
 def plant_markers(
     belts: Sequence[BeltShape], rails: Sequence[RailShape], sensors: Sequence[SensorShape], header: Header
 ) -> bytes:
-    """The plant: belt surfaces, arrows along positive speed, rails at rest, sensors, and the names of belts and sensors."""
+    """The plant: belt surfaces, arrows along positive speed, rails at rest, sensors, names of belts and sensors."""
     markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails("rails", rails), *_names(belts), *_sensors(sensors)]
     return marker_array(markers, header)
 

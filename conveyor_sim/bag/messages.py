@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ CONTACTS = "conveyor_msgs/msg/Contacts"
 BELTS = "conveyor_msgs/msg/Belts"
 SIGNALS = "conveyor_msgs/msg/Signals"
 LEDGER = "conveyor_msgs/msg/Ledger"
+DAMAGE = "conveyor_msgs/msg/Damage"
+RAIL_WEAR = "conveyor_msgs/msg/RailWear"
+DAMAGE_EVENT = "conveyor_msgs/msg/DamageEvent"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
 GUARD_EVENT = "conveyor_msgs/msg/GuardEvent"
 LINE = "conveyor_msgs/msg/Line"
@@ -96,6 +100,23 @@ def signals_message(values: NDArray[np.float64], header: Header) -> bytes:
 def ledger_message(ledger: Ledger, header: Header) -> bytes:
     """conveyor_msgs/Ledger."""
     return _serialize(LEDGER, header, _by_field(ledger))
+
+
+def damage_message(columns: DamageColumns, header: Header) -> bytes:
+    """conveyor_msgs/Damage."""
+    return _serialize(DAMAGE, header, _by_field(columns))
+
+
+def rail_wear_message(columns: RailWearColumns, header: Header) -> bytes:
+    """conveyor_msgs/RailWear."""
+    return _serialize(RAIL_WEAR, header, _by_field(columns))
+
+
+def damage_event_message(event: DamageEvent, header: Header) -> bytes:
+    """conveyor_msgs/DamageEvent; the header belongs to the tick of the event."""
+    values = _by_field(event)
+    del values["tick"]
+    return _serialize(DAMAGE_EVENT, header, values)
 
 
 def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from conveyor_sim.guard import GuardEvent
     from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.observe.columns import BottleColumns
+    from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
     from conveyor_sim.observe.ledger import Ledger
     from conveyor_sim.simulation import Simulation
 
@@ -28,7 +29,7 @@ class Output:
     name: str
     type: str
     rate: str | None
-    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes, guard, photo-eyes)."""
+    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes, events, photo-eyes)."""
 
     @property
     def qos(self) -> Qos:
@@ -43,6 +44,7 @@ OUTPUTS: dict[str, Output] = {
         Output("plant", messages.MARKERS, None),
         Output("outcomes", messages.OUTCOME, None),
         Output("guard", messages.GUARD_EVENT, None),
+        Output("damage_events", messages.DAMAGE_EVENT, None),
         Output("bottles", messages.BOTTLES, "bottles"),
         Output("poses", messages.POSES, "poses"),
         Output("markers", messages.MARKERS, "poses"),
@@ -50,6 +52,8 @@ OUTPUTS: dict[str, Output] = {
         Output("belts", messages.BELTS, "belts"),
         Output("signals", messages.SIGNALS, "signals"),
         Output("ledger", messages.LEDGER, "ledger"),
+        Output("damage", messages.DAMAGE, "damage"),
+        Output("rail_wear", messages.RAIL_WEAR, "damage"),
     )
 }
 """By name; within a tick, messages are written in this order. These are recorded."""
@@ -89,6 +93,20 @@ class Snapshot:
         assert ledger is not None
         return ledger
 
+    @property
+    def damage(self) -> DamageColumns:
+        """What bottles have borne, which a scene with that output has."""
+        damage = self.sim.damage()
+        assert damage is not None
+        return damage
+
+    @property
+    def rail_wear(self) -> RailWearColumns:
+        """What rails have borne, likewise."""
+        wear = self.sim.rail_wear()
+        assert wear is not None
+        return wear
+
 
 SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
     "bottles": lambda now, header: messages.bottles_message(now.bottles, header),
@@ -100,6 +118,8 @@ SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
     "belts": lambda now, header: messages.belts_message(now.sim.belts(), header),
     "signals": lambda now, header: messages.signals_message(now.sim.signals(), header),
     "ledger": lambda now, header: messages.ledger_message(now.ledger, header),
+    "damage": lambda now, header: messages.damage_message(now.damage, header),
+    "rail_wear": lambda now, header: messages.rail_wear_message(now.rail_wear, header),
 }
 """The topics that have a rate."""
 
@@ -130,13 +150,15 @@ class Outputs:
         return outcomes
 
     def after_failure(self) -> list[CommandOutcome]:
-        """Writes what is known of a tick that failed: what became of its commands, and what the guard says."""
+        """Writes what is known of a tick that failed: what became of its commands, what the guard says and what went beyond limits."""
         outcomes = self._sim.take_outcomes()
         for outcome in outcomes:
             self.tell(outcome)
         for event in self._sim.take_guard_events():
             self._noticed.append(event)
             self._hand_out("guard", self._header(event.tick), messages.guard_message, event)
+        for passed in self._sim.take_damage_events():
+            self._hand_out("damage_events", self._header(passed.tick), messages.damage_event_message, passed)
         return outcomes
 
     def take_noticed(self) -> list[GuardEvent]:

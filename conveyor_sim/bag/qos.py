@@ -37,7 +37,7 @@ DATA = Qos(depth=5)
 LATCHED = Qos(depth=1, durability="transient_local")
 """What is published once: a subscriber that joins late still gets it."""
 COMMANDS = Qos(depth=100)
-"""Commands, their outcomes, what the guard tells: each one counts."""
+"""Commands, their outcomes, what the guard tells, limits that are passed: each one counts."""
 ALARMS = Qos(depth=100, durability="transient_local")
 """A controller's alarms: who joins late still gets what came and went before."""
 CLOCK = Qos(depth=1)
@@ -50,12 +50,15 @@ QOS = {
     "belts": DATA,
     "signals": DATA,
     "ledger": DATA,
+    "damage": DATA,
+    "rail_wear": DATA,
     "markers": DATA,
     "line": LATCHED,
     "plant": LATCHED,
     "outcomes": COMMANDS,
     "guard": COMMANDS,
     "alarms": ALARMS,
+    "damage_events": COMMANDS,
     "commands": COMMANDS,
     "cmd_speed": COMMANDS,
     "photo_eyes": LATCHED,

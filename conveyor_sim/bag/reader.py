@@ -18,6 +18,7 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
 
 T = TypeVar("T")
@@ -148,6 +149,18 @@ class Bag(AbstractContextManager["Bag"]):
     def ledger(self) -> Iterator[Frame[Ledger]]:
         """Every recorded energy ledger."""
         return self._columns("ledger", lambda message: to_columns(Ledger, message))
+
+    def damage(self) -> Iterator[Frame[DamageColumns]]:
+        """Every recorded Damage."""
+        return self._columns("damage", lambda message: to_columns(DamageColumns, message))
+
+    def rail_wear(self) -> Iterator[Frame[RailWearColumns]]:
+        """Every recorded wear of the rails."""
+        return self._columns("rail_wear", lambda message: to_columns(RailWearColumns, message))
+
+    def damage_events(self) -> Iterator[Frame[DamageEvent]]:
+        """Every limit that was passed."""
+        return self._columns("damage_events", lambda message: to_columns(DamageEvent, message))
 
     def outcomes(self) -> Iterator[Frame[Outcome]]:
         """What became of every command, in order; the tick is the one at which it was applied or refused."""

@@ -16,7 +16,7 @@ from conveyor_sim.line.line import FAULT, WATCHDOG
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 
-SENSITIVE = frozenset({"contacts", "ledger"})
+SENSITIVE = frozenset({"contacts", "ledger", "damage", "rail_wear"})
 """Topics that are compared bit for bit or not at all."""
 
 
@@ -68,8 +68,8 @@ class _Messages:
 def replay(path: str | Path, progress: Callable[[float, float], None] | None = None) -> ReplayReport:
     """Replays a bag (recorded by this package or, the same topics, by stock rosbag2) and compares.
 
-    Bottles, Contacts, Belts, Signals, Ledgers and CommandOutcomes are compared bit for bit where the engine, versions
-    and machine are those of the recording; elsewhere within compare.TOLERANCE, Contacts and Ledgers left out. Stops at
+    Bottles, Contacts, Belts, Signals, Ledgers, Damage, RailWear and CommandOutcomes are compared bit for bit where the engine, versions
+    and machine are those of the recording; elsewhere within compare.TOLERANCE, Contacts, Ledgers, Damage and RailWear left out. Stops at
     the first difference. progress(done, total) is told simulated times, s.
     Raises BagError, and SceneError if the recorded scene is refused.
     """

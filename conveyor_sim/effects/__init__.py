@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from conveyor_sim.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
 from conveyor_sim.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
+from conveyor_sim.effects.damage import CRUSHING, IMPACTS, SCUFFING, TIPPING
 from conveyor_sim.effects.damping import NORMAL_DAMPING, ONSET_DAMPING, PAPER_DAMPING, TSUJI_DAMPING
 from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
@@ -64,6 +65,10 @@ EFFECTS: tuple[Effect, ...] = (
     PEAKS,
     CONTACT_ARRAYS,
     ENERGY_LEDGER,
+    SCUFFING,
+    CRUSHING,
+    IMPACTS,
+    TIPPING,
 )
 """In the order in which they are decided: what is on may call for those after it."""
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .damage_arrays import Borne, Damage
 from .integrator_arrays import Linear, PairTangent, Slopes, Stage, Triple
 from .moving_arrays import MovingRails
 
@@ -455,6 +456,7 @@ class World(NamedTuple):
     footing: Footing | None
     ring: Ring | None
     ledger: Ledger | None
+    damage: Damage | None
 
 
 class Member(NamedTuple):
@@ -466,3 +468,4 @@ class Member(NamedTuple):
     """(SYNC_SIZE,), shared: counts of the barrier and flags."""
     gathered: Gathered
     found: RailContacts
+    borne: Borne

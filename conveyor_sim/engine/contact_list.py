@@ -38,7 +38,7 @@ def _pair_contacts(
         overlap, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
         if overlap > 0.0:
             if count < kind.size:
-                normal, tangential = _pair_force(
+                normal, tangential, _ = pair_contact(
                     settings, bottles, spin, pairs, pairs.spring, curves, p, overlap, nx, ny
                 )
                 kind[count] = BOTTLE_BOTTLE
@@ -51,7 +51,7 @@ def _pair_contacts(
 
 
 @part
-def _pair_force(
+def pair_contact(
     settings: Any,
     bottles: Any,
     spin: Any,
@@ -62,7 +62,8 @@ def _pair_force(
     overlap: float,
     nx: float,
     ny: float,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
+    """N and T (N) on the first bottle of pair p, and its slip (m/s); the normal is that from the first to the other."""
     i, j = pairs.i[p], pairs.j[p]
     vx = bottles.vx[i] - bottles.vx[j]
     vy = bottles.vy[i] - bottles.vy[j]
@@ -73,7 +74,8 @@ def _pair_force(
     closing = vx * nx + vy * ny
     limit, atan = settings.slip_limit, settings.atan
     spring = elongation(springs, p)
-    return contact_force(pairs.law, p, curves, limit, atan, overlap, 1.0, closing, slip, spring, None)
+    normal, tangential = contact_force(pairs.law, p, curves, limit, atan, overlap, 1.0, closing, slip, spring, None)
+    return normal, tangential, slip
 
 
 @part

@@ -40,6 +40,7 @@ def _for_forces(world: World) -> World:
         footing=world.footing,
         ring=world.ring,
         ledger=world.ledger,
+        damage=None,
     )
 
 
@@ -74,6 +75,7 @@ def lists_of(world: World) -> Any:
         footing=world.footing,
         ring=world.ring,
         ledger=None,
+        damage=None,
     )
 
 

@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 
 from .arrays import F8, U4, Gathered, Member, RailContacts
 from .compile import part
+from .damage_arrays import borne
 
 UNIT = 64
 """Pairs, or bottles, that are never parted: few enough that shares are even, and no two threads write to one line."""
@@ -34,7 +35,7 @@ SPINS = 2000
 def members(size: int) -> tuple[Member, ...]:
     """Return `size` members of one team."""
     sync = np.zeros(SYNC_SIZE, np.int64)
-    return tuple(Member(rank, size, sync, _gathered(), _rail_contacts()) for rank in range(size))
+    return tuple(Member(rank, size, sync, _gathered(), _rail_contacts(), borne()) for rank in range(size))
 
 
 def _gathered() -> Gathered:

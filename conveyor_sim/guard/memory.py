@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.damage_arrays import bin_columns, slot_columns
 from conveyor_sim.engine.moving_arrays import present
 from conveyor_sim.state import State
 
 
 class Memory:
-    """One state of the bottles of a State, with peaks, tangential springs and the books of the energy ledger."""
+    """One state of the bottles of a State, with peaks, tangential springs, the books of the energy ledger and damage."""
 
     def __init__(self) -> None:
         self._world: World | None = None
@@ -76,3 +77,6 @@ def _moving(world: World) -> Iterator[NDArray[np.generic]]:
         yield from present(world.moving)
     if world.ledger is not None:
         yield world.ledger.work
+    if world.damage is not None:
+        yield from slot_columns(world.damage)
+        yield from bin_columns(world.damage)

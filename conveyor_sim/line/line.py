@@ -60,6 +60,10 @@ class Line:
         """Bottles taken off the line so far."""
         return sum(device.removed for device in self._devices)
 
+    def removed_by(self) -> dict[str, int]:
+        """Bottles taken off the line so far, by the names of the devices."""
+        return {device.name: device.removed for device in self._devices}
+
     @property
     def blocked_ticks(self) -> int:
         """Ticks so far at which a device had a bottle to feed and no room."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.plot import style
 from conveyor_sim.plot.accuracy import accuracy_figures
+from conveyor_sim.plot.damage import bottles_figure, rails_figure
 from conveyor_sim.plot.data import Frame, Plant
 from conveyor_sim.plot.energy import energy_figure
 from conveyor_sim.plot.flow import flow_figure, force_figure
@@ -43,7 +44,8 @@ def plot_bag(
 
     `table` shows the widest belt at `times` (s; nearest recorded, default a quarter, half, three quarters and the end),
     `plant` everything at the last of them, `velocity_bottle_ID` the `bottles` (ids; default the 1st and the 50th fed),
-    `flow` and `force` the whole run, and `energy` too if its ledger was recorded.
+    `flow` and `force` the whole run, `energy` too if its ledger was recorded, `damage_rails` and
+    `damage_bottles` if damage was.
     Raises BagError if the bag can't be read, ConveyorError for a time or bottle that it does not hold.
     """
     out = Path(out_dir)
@@ -64,6 +66,11 @@ def plot_bag(
         energy = recording.energy
         if energy is not None:
             figures["energy"] = energy_figure(energy, recording.belts)
+        damage = recording.damage
+        if damage is not None:
+            figures["damage_bottles"] = bottles_figure(damage, name)
+            if len(damage.wear.rail):
+                figures["damage_rails"] = rails_figure(recording.plant, damage, name)
         return [path for stem, figure in figures.items() for path in style.save(figure, out / stem)]
 
 

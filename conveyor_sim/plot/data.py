@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.observe.damage import RailWearColumns
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
 from conveyor_sim.scene.machines import Reject, Sink, Source, Spill
 from conveyor_sim.scene.moving import moving_shapes
@@ -233,6 +234,20 @@ class Energy:
     turnover: Floats
     rails: Floats
     """(n,), work of all rails that move."""
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What rails had borne at the end of a recording, and the worst that each bottle ever bore."""
+
+    time: float
+    """s, of the last output."""
+    wear: RailWearColumns
+    bottles: int
+    worst: dict[str, Floats]
+    """By quantity (`DamageColumns`), one entry a bottle for which it is known."""
+    limits: dict[str, float]
+    """Those of the scene."""
 
 
 def box_around(points: Floats) -> tuple[float, float, float, float]:

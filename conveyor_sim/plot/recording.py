@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
+from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.plot.data import Contacts, Energy, Floats, Flow, Frame, PeakForce, Plant, Velocity
+from conveyor_sim.plot.data import Contacts, Damage, Energy, Floats, Flow, Frame, PeakForce, Plant, Velocity
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.moving import moving_shapes
@@ -76,6 +77,36 @@ class Recording:
         rails = values.pop("rail_work").sum(axis=1)
         time = np.array([frame.time for frame in frames], dtype=np.float64)
         return Energy(time=time, belts=belts, rails=rails, **values)
+
+    @property
+    def damage(self) -> Damage | None:
+        """What was borne up to the last recorded Damage; None if there is none."""
+        known = [field.name for field in fields(DamageColumns) if field.name not in ("id", "type", "x", "y")]
+        worst: dict[str, dict[int, float]] = {name: {} for name in known}
+        ids: set[int] = set()
+        time = None
+        for frame in self._bag.damage():
+            time = frame.time
+            ids.update(frame.data.id.tolist())
+            for name, by_bottle in worst.items():
+                values = getattr(frame.data, name)
+                there = np.isfinite(values)
+                for bottle, value in zip(frame.data.id[there].tolist(), values[there].tolist(), strict=True):
+                    by_bottle[bottle] = max(value, by_bottle.get(bottle, 0.0))
+        if time is None:
+            return None
+        wear: RailWearColumns | None = None
+        for last in self._bag.rail_wear():
+            wear = last.data
+        none = np.zeros(0)
+        limits = {name: limit for name in known if (limit := getattr(self.scene.limits, name)) is not None}
+        return Damage(
+            time=time,
+            wear=wear or RailWearColumns(np.zeros(0, np.uint32), none, none, none, none, none),
+            bottles=len(ids),
+            worst={name: np.array(list(by_bottle.values())) for name, by_bottle in worst.items()},
+            limits=limits,
+        )
 
     def frames(self, times: Sequence[float] | None) -> list[Frame]:
         """The line at the recorded instants nearest to `times` (s), in ascending order, each once.

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from conveyor_sim.ros.declared import Entry, declare_table
 
 _RATE_TEXT = "Hz of simulated time; -1: as the scene says, 0: never. Must divide the tick rate."
-RATES = ("bottles", "poses", "contacts", "belts", "signals", "ledger")
+RATES = ("bottles", "poses", "contacts", "belts", "signals", "ledger", "damage")
 
 TABLE = (
     Entry("scene", "paper_plant", "Scene file, or the name of a shipped scene."),

@@ -7,6 +7,7 @@ from itertools import combinations_with_replacement
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
+from conveyor_sim.scene.check_limits import limit_problems
 from conveyor_sim.scene.check_machines import machine_problems
 from conveyor_sim.scene.check_movers import mover_problems
 from conveyor_sim.scene.check_sensors import sensor_problems
@@ -34,6 +35,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_rail_names(scene),
         *machine_problems(scene),
         *mover_problems(scene),
+        *limit_problems(scene),
         *shape_problems(scene),
         *sensor_problems(scene),
     ]

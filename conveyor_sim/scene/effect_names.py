@@ -32,6 +32,10 @@ EffectName = Literal[
     "peaks",
     "contact_arrays",
     "energy_ledger",
+    "scuffing",
+    "crushing",
+    "impacts",
+    "tipping",
 ]
 
 EFFECT_NAMES: tuple[EffectName, ...] = get_args(EffectName)

@@ -15,6 +15,7 @@ from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.effect_names import EffectName, Forced
 from conveyor_sim.scene.indicators import Indicator
+from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.machines import Machine, Reject, Share, Sink, Source, Spill
 from conveyor_sim.scene.movers import Diverter, Gate, Pusher
 from conveyor_sim.scene.part import Part
@@ -45,6 +46,14 @@ class BottleType(Part):
     mass: Positive = quantity("Mass m.", "kg")
     inertia: Positive | None = quantity(
         "Moment of inertia about the axis. Left out: m R^2, a thin-walled cylinder.", "kg m^2", default=None
+    )
+    contact_height: Positive | None = quantity(
+        "Height at which it touches others and rails, for the index of tipping. Given with `gravity_height`.",
+        "m",
+        default=None,
+    )
+    gravity_height: Positive | None = quantity(
+        "Height of its centre of gravity, for the index of tipping. Given with `contact_height`.", "m", default=None
     )
     base_radius: Positive | None = quantity(
         "Radius of the ring that the bottle stands on: sliding and spinning on it are one motion, solved explicitly "
@@ -144,6 +153,11 @@ class Outputs(Part):
     signals: NotNegative = quantity("The process image.", "Hz", default=100.0)
     ledger: NotNegative = quantity(
         "The energy ledger: work of each belt, what is dissipated and stored, and what does not close.",
+        "Hz",
+        default=0.0,
+    )
+    damage: NotNegative = quantity(
+        "What every bottle has borne (scuffing, crushing, impacts, tipping), and the wear of the rails.",
         "Hz",
         default=0.0,
     )
@@ -266,6 +280,12 @@ class Scene(Part):
         Holds("a list of bottles and grids"),
     ] = quantity("Bottles that are there at the start.", default=())
     outputs: Outputs = quantity("Rates of the outputs.", default=Outputs.model_construct())
+    limits: Annotated[DamageLimits, Holds("a mapping with the fields " + ", ".join(DamageLimits.model_fields))] = (
+        quantity(
+            "What bottles should bear at most; what goes beyond is told as an event.",
+            default=DamageLimits.model_construct(),
+        )
+    )
     effects: Annotated[Forced, Holds('a mapping of names of effects to "on" or "off"')] = quantity(
         "Effects forced on or off, whatever the scene calls for; docs/effects.md lists them.", default={}
     )

@@ -28,6 +28,7 @@ from numba import uint64
 
 from ..arrays import Bottles, Member, World
 from ..compile import kernel, part
+from ..damage import note_damage
 from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_stages, note_powers
@@ -115,6 +116,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                     _accept(world, slopes, h, first, end)
                     if worst == math.inf:
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
+                note_damage(world, member, h)
                 left -= h
                 watch_rebuilt(line, member)
                 if left == 0.0:

@@ -20,6 +20,7 @@ from ..arrays import Bottles, Member, World
 from ..base import add_base_friction
 from ..compile import kernel, part
 from ..conjugate_gradients import LEAST, RELATIVE, begin_search, factor, kick_with_rest, largest_kick, search
+from ..damage import note_damage
 from ..fewer import for_forces
 from ..footing import check_footing
 from ..forces import bottle_forces, pack_all, pair_phase
@@ -48,6 +49,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     linear: Any = world.linear
     begin, stop = share(member, bottles.x.size)
     for step in range(steps):
+        note_damage(world, member, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             _begin(bottles, linear, first, end)

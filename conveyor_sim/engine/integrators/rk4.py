@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import Member, World
 from ..compile import kernel
+from ..damage import note_damage
 from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_stages, note_powers
@@ -51,6 +52,8 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     taken = 0
     pack_all(line, member)
     while True:
+        if stage == 0 and taken < steps:
+            note_damage(world, member, dt)
         pair_phase(line, member, dt, 0.0)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)

@@ -12,6 +12,7 @@ from numba import uint64
 
 from ..arrays import Bottles, Load, Member, World
 from ..compile import kernel, part
+from ..damage import note_damage
 from ..fewer import for_forces
 from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_kick
@@ -30,6 +31,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     place_rails(line.moving, member, dt)
     pack_all(line, member)
     for step in range(steps):
+        note_damage(world, member, dt)
         pair_phase(line, member, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)

@@ -9,6 +9,7 @@ touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without,
 
 from ..arrays import Member, World
 from ..compile import kernel
+from ..damage import note_damage
 from ..fewer import for_forces
 from ..forces import bottle_forces, evaluate_forces, pack_all, pair_phase
 from ..ledger import book_kick
@@ -39,6 +40,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
         evaluate_forces(line, member, dt)
     for step in range(steps):
         if phase != RESUME or step > 0:
+            note_damage(world, member, dt)
             for first in range(begin, stop, BLOCK):
                 end = min(first + BLOCK, stop)
                 book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)

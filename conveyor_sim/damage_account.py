@@ -1,0 +1,174 @@
+"""Keeps what bottles and rails bear beside what the engine notes in every step: outputs, limits, events."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+
+from conveyor_sim.empty_damage import rail_places
+from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.damage_arrays import Damage, Worst, worst_columns
+from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.scene.limits import Limits
+from conveyor_sim.state import State
+
+WORDS = {
+    "scuffing_work": ("has taken {:.3g} J of sliding work at its wall by the time it is", "J"),
+    "crushing_force": ("is pressed from all sides with {:.3g} N", "N"),
+    "opposed_force": ("is squeezed with {:.3g} N", "N"),
+    "impact_speed": ("hits, or is hit, at {:.3g} m/s", "m/s"),
+    "impact_force": ("is pushed with {:.3g} N in one contact", "N"),
+    "tipping": ("has an index of tipping of {:.3g}", ""),
+}
+
+PLACES = {
+    "crushing_force": ("crushing", "total"),
+    "opposed_force": ("crushing", "opposed"),
+    "impact_speed": ("impacts", "speed"),
+    "impact_force": ("impacts", "force"),
+    "tipping": ("tipping", "index"),
+}
+"""Group and column of the engine."""
+
+SLOW = 0.1
+"""Of the speed of the belt under it: what is slower is held up."""
+
+
+class DamageAccount:
+    """What the bottles of a State bear. Public attributes are remembered in checkpoints."""
+
+    def __init__(self, state: State, limits: Limits, exits: Mapping[str, F8]) -> None:
+        """exits: corners (n, 2) m of each outfeed, by name."""
+        self._state = state
+        self._limits: dict[str, float] = {
+            name: limit for name in Limits.model_fields if (limit := getattr(limits, name)) is not None
+        }
+        self._exits = exits if "clogging_time" in self._limits else {}
+        self._places = rail_places(state.model)
+        self.beyond: dict[str, list[int]] = {name: [] for name in WORDS}
+        """By limit, ids of the bottles that were beyond it at the end of the last tick."""
+        self.passages = {name: [0, 0, 0] for name in self._exits}
+        """By outfeed: bottles removed, tick of the last passage or of nobody waiting, whether that was told."""
+        self.events: list[Any] = []
+
+    def begin(self, was_output: bool) -> None:
+        """A tick begins; was_output: the largest of everything were output at its beginning."""
+        for worst in self._worst():
+            worst.tick[:] = 0.0
+            if was_output:
+                worst.output[:] = 0.0
+
+    def end(self, tick: int, removed: Mapping[str, int]) -> None:
+        """A tick has ended: what went beyond a limit in it becomes an event. removed: bottles so far, by device."""
+        for worst in self._worst():
+            np.maximum(worst.output, worst.tick, out=worst.output)
+        damage = self._state.world.damage
+        for kind, limit in self._limits.items():
+            if damage is not None and (column := _column(damage, kind)) is not None:
+                self._compare(tick, kind, column, limit)
+        for name, corners in self._exits.items():
+            self._look_at_exit(tick, name, corners, removed[f"outfeeds/{name}"])
+
+    def take_events(self) -> list[DamageEvent]:
+        """What went beyond a limit since the last call, in order."""
+        events, self.events = self.events, []
+        return [DamageEvent(*event) for event in events]
+
+    def columns(self, slots: np.ndarray) -> DamageColumns:
+        """What the bottles in some slots bear."""
+        world, damage = self._state.world, self._state.world.damage
+        heights = self._state.model.type_heights[world.bottles.type[slots], 0]
+
+        def output(kind: str) -> F8:
+            column = None if damage is None else _column(damage, kind, output=True)
+            return np.full(slots.size, np.nan) if column is None else column[slots]
+
+        return DamageColumns(
+            id=world.bottles.id[slots].astype(np.uint64),
+            type=world.bottles.type[slots].astype(np.uint16),
+            x=world.bottles.x[slots],
+            y=world.bottles.y[slots],
+            scuffing_work=output("scuffing_work"),
+            crushing_force=output("crushing_force"),
+            opposed_force=output("opposed_force"),
+            impact_speed=output("impact_speed"),
+            impact_force=output("impact_force"),
+            tipping=np.where(np.isfinite(heights), output("tipping"), np.nan),
+        )
+
+    def rail_wear(self) -> RailWearColumns:
+        """What the rails have borne; no bin where nobody asks."""
+        damage, places = self._state.world.damage, self._places
+        if damage is None or damage.scuffing is None or damage.scuffing.bins is None:
+            none = np.zeros(0)
+            return RailWearColumns(np.zeros(0, np.uint32), none, none, none, none, none)
+        bins = damage.scuffing.bins
+        work, impulse = bins.work.sum(axis=0), bins.impulse.sum(axis=0)
+        return RailWearColumns(places.rail, places.x, places.y, places.length, work, impulse)
+
+    def _worst(self) -> Iterator[Worst]:
+        damage = self._state.world.damage
+        return iter(()) if damage is None else worst_columns(damage)
+
+    def _compare(self, tick: int, kind: str, column: F8, limit: float) -> None:
+        bottles = self._state.world.bottles
+        slots = np.flatnonzero((column > limit) & (bottles.id >= 0))
+        slots = slots[np.argsort(bottles.id[slots])]
+        before = self.beyond[kind]
+        self.beyond[kind] = bottles.id[slots].tolist()
+        for slot in slots.tolist():
+            # A load that lasts is told once; each blow is one of its own.
+            if kind == "impact_speed" or int(bottles.id[slot]) not in before:
+                what, unit = WORDS[kind]
+                self._tell(tick, kind, slot, float(column[slot]), limit, what.format(column[slot]), unit)
+
+    def _tell(self, tick: int, kind: str, slot: int, value: float, limit: float, what: str, unit: str) -> None:
+        bottles = self._state.world.bottles
+        bottle, x, y = int(bottles.id[slot]), float(bottles.x[slot]), float(bottles.y[slot])
+        time = tick * self._state.model.tick_ns * 1e-9
+        text = (
+            f"bottle {bottle} {what} at ({x:.4g}, {y:.4g}) m at {time:g} s: limits.{kind} is {limit:g} {unit}".rstrip()
+        )
+        self.events.append(astuple(DamageEvent(tick, kind, bottle, x, y, value, limit, text)))
+
+    def _look_at_exit(self, tick: int, name: str, corners: F8, removed: int) -> None:
+        bottles, passage = self._state.world.bottles, self.passages[name]
+        waiting = self._held_up()
+        if removed != passage[0] or not len(waiting):
+            self.passages[name] = [removed, tick, 0]
+            return
+        idle = (tick - passage[1]) * self._state.model.tick_ns * 1e-9
+        limit = self._limits["clogging_time"]
+        if idle < limit - 1e-9 or passage[2]:
+            return
+        self.passages[name] = [*passage[:2], 1]
+        centre = corners.mean(axis=0)
+        slot = waiting[np.argmin(np.hypot(bottles.x[waiting] - centre[0], bottles.y[waiting] - centre[1]))]
+        what = f"waits, for outfeed {name} has removed nothing for {idle:.3g} s, nearest to it"
+        self._tell(tick, "clogging_time", int(slot), idle, limit, what, "s")
+
+    def _held_up(self) -> Any:
+        """Slots of the bottles that a running belt does not take along."""
+        world, bottles = self._state.world, self._state.world.bottles
+        if world.footing is None:
+            return np.zeros(0, np.int64)
+        ux, uy = world.footing.ux, world.footing.uy
+        if world.footing.turn is not None:
+            ux, uy = ux - world.footing.turn * bottles.y, uy + world.footing.turn * bottles.x
+        belt, speed = np.hypot(ux, uy), np.hypot(bottles.vx, bottles.vy)
+        runs = belt > world.settings.slip_limit
+        return np.flatnonzero(runs & (speed < SLOW * belt) & (bottles.id >= 0))
+
+
+def _column(damage: Damage, kind: str, output: bool = False) -> F8 | None:
+    """What a limit holds for, by slot, in the tick or since the last output; None where it is not looked at."""
+    if kind == "scuffing_work":
+        return None if damage.scuffing is None else damage.scuffing.work
+    if kind not in PLACES:
+        return None
+    group, name = PLACES[kind]
+    worst: Worst | None = getattr(getattr(damage, group), name, None)
+    if worst is None:
+        return None
+    return worst.output if output else worst.tick

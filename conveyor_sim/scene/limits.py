@@ -1,0 +1,33 @@
+"""Limits of a scene file: what goes beyond them is told as an event (topic `damage_events`), and nothing else happens."""
+
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.types import Positive, quantity
+
+
+class Limits(Part):
+    """What bottles should bear at most. Each that is given has its effect looked at in every step."""
+
+    scuffing_work: Positive | None = quantity(
+        "Sliding work at the wall of a bottle since it entered.", "J", default=None
+    )
+    crushing_force: Positive | None = quantity(
+        "Sum of the normal forces that act on a bottle at once.", "N", default=None
+    )
+    opposed_force: Positive | None = quantity(
+        "Squeeze of a bottle by two contacts that oppose each other: the smaller force, times how straight they do.",
+        "N",
+        default=None,
+    )
+    impact_speed: Positive | None = quantity(
+        "Relative normal speed just before a contact closes, what glass is rated in.", "m/s", default=None
+    )
+    impact_force: Positive | None = quantity("Normal force of any one contact.", "N", default=None)
+    tipping: Positive | None = quantity(
+        "Index of tipping, 1 where a load that lasts would tip the bottle; for types with `contact_height` and "
+        "`gravity_height`.",
+        "1",
+        default=None,
+    )
+    clogging_time: Positive | None = quantity(
+        "How long an outfeed may remove nothing while a bottle is held up on a running belt.", "s", default=None
+    )
