@@ -23,7 +23,7 @@ FLOORS = [
     ["simulation"],
     ["bag", "price", "accuracy", "achieved", "stopped"],
     ["progress", "summary", "plot", "explain"],
-    ["runner", "report"],
+    ["runner", "report", "testing"],
     ["ros"],
     ["cli"],
 ]

@@ -1,0 +1,74 @@
+"""Conditions of the present signals: what they read, and how a failure tells of them."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from types import CodeType
+from typing import Any
+
+from conveyor_sim.control.scan import ALARMS, Inputs
+
+Condition = Callable[["Present"], Any]
+"""A plain function of the present signals, true or false: `lambda s: s["belts/table/bottles"] < 40`."""
+
+
+_PLAIN = (str, int, float)
+
+
+class ConditionFailed(AssertionError):
+    """A condition asserted over simulated time that did not hold; the text says which, when, and the signals."""
+
+
+class Present(Inputs):
+    """Signals and alarms at a tick, by name; notes which of them are read."""
+
+    __slots__ = ("_scanned", "read")
+
+    def __init__(self, signals: Mapping[str, float], time: float, tick: int, length: float, scanned: bool) -> None:
+        """scanned: whether alarms are known; until the first scan none stands."""
+        super().__init__(signals, time, tick, length)
+        self._scanned = scanned
+        self.read: dict[str, None] = {}
+        """Names, in the order of the first reading."""
+
+    def __getitem__(self, name: str) -> float:
+        """The value of a signal, or of an alarm by its whole name. Raises NoSuchSignal, which is a KeyError."""
+        if not self._scanned and name.startswith(ALARMS):
+            return 0.0
+        value = super().__getitem__(name)
+        self.read[name] = None
+        return value
+
+
+def text_of(condition: Condition) -> str:
+    """What a condition says: the text of a lambda, the name of a function."""
+    code = getattr(condition, "__code__", None)
+    if not isinstance(code, CodeType):
+        return repr(condition)
+    if code.co_name != "<lambda>":
+        return code.co_name
+    try:
+        source = "".join(inspect.findsource(condition)[0])
+        lambdas = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Lambda)]
+    except (OSError, SyntaxError):
+        return f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
+    here = [node for node in lambdas if node.lineno == code.co_firstlineno]
+    if len(here) > 1:
+        constants = {value for value in code.co_consts if isinstance(value, _PLAIN)}
+        here = [node for node in here if _constants(node) == constants]
+    texts = {" ".join((ast.get_source_segment(source, node.body) or "").split()) for node in here}
+    # Two on a line that differ in nothing but an operator can't be told apart.
+    return " or ".join(sorted(texts)) or f"the lambda in line {code.co_firstlineno} of {code.co_filename}"
+
+
+def _constants(node: ast.Lambda) -> set[object]:
+    inner = (part.value for part in ast.walk(node.body) if isinstance(part, ast.Constant))
+    return {value for value in inner if isinstance(value, _PLAIN)}
+
+
+def values(names: Iterable[str], present: Mapping[str, float], units: Callable[[str], str]) -> str:
+    """One line a signal: name, value and unit."""
+    lines = [f"    {name} = {present[name]:g} {units(name)}".rstrip() for name in names]
+    return "\n".join(lines) or "    (it reads no signals)"

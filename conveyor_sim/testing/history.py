@@ -1,0 +1,108 @@
+"""`History`: what every signal, command, fault and alarm was at every tick of a scenario, as arrays."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from conveyor_sim.control.scan import ALARMS
+from conveyor_sim.engine.arrays import F8
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.line import FAULT
+from conveyor_sim.line.process_image import Command, Kind, ProcessImage, Signal
+
+_FIRST_ROWS = 1024
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What was done to the line from outside its controller, or went wrong with it."""
+
+    time: float
+    """s"""
+    name: str
+    value: float
+
+
+class History:
+    """Columns by name, one entry a tick from the scenario's first to its present one.
+
+    A signal is what it was at the tick. A command is what was in force from the tick on, NaN until it was first given;
+    a fault likewise, 0 until it was first injected. An alarm ("alarms/<name>") is 1 while it stood.
+    """
+
+    def __init__(self, image: ProcessImage) -> None:
+        self._index = {name: column for column, name in enumerate(image.signal_names)}
+        entries: tuple[Signal | Command, ...] = (*image.signals, *image.commands, *image.faults)
+        self._unit = {entry.name: entry.unit for entry in entries}
+        self._kind = {entry.name: entry.type for entry in entries}
+        self._rows = 0
+        self._times = array("d")
+        self._signals = np.empty((_FIRST_ROWS, len(image.signals)))
+        self._others = {name: array("d") for name in (*image.command_names, *image.fault_names)}
+        self._now = {**dict.fromkeys(image.command_names, math.nan), **dict.fromkeys(image.fault_names, 0.0)}
+        self.marks: list[Mark] = []
+        """Faults injected and commands given by the test, in order."""
+
+    def __len__(self) -> int:
+        """Ticks in it."""
+        return self._rows
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that there is: signals, commands, faults, then the alarms that were told of."""
+        return (*self._index, *self._others)
+
+    @property
+    def time(self) -> F8:
+        """Simulated time of each tick, (n,), s."""
+        return np.array(self._times)
+
+    def __getitem__(self, name: str) -> F8:
+        """A column (n,), in the unit of the process image. Raises ConveyorError for a name that there is not."""
+        if name in self._index:
+            return self._signals[: self._rows, self._index[name]].copy()
+        if name in self._others:
+            return np.array(self._others[name])
+        raise ConveyorError(f"{name}: not in the history, expected one of {', '.join(self.names)}")
+
+    def unit(self, name: str) -> str:
+        """The unit of a column, "" where it has none."""
+        unit = self._unit.get(name, "1")
+        return "" if unit == "1" else unit
+
+    def kind(self, name: str) -> Kind:
+        """The type of a column; of an alarm it is bool."""
+        return "bool" if name.startswith(ALARMS) else self._kind[name]
+
+    def begin_tick(self, time: float, signals: F8) -> None:
+        """A tick is reached; commands, faults and alarms go on as they are."""
+        if self._rows == len(self._signals):
+            self._signals = np.concatenate([self._signals, np.empty_like(self._signals)])
+        self._signals[self._rows] = signals
+        self._rows += 1
+        self._times.append(time)
+        for name, column in self._others.items():
+            column.append(self._now[name])
+
+    def take(self, outcome: CommandOutcome, from_test: bool) -> None:
+        """What was applied at the last tick. from_test: by the test itself, not by the controller."""
+        for name, value in zip(outcome.names, outcome.values, strict=True):
+            self._set(name, value)
+            if from_test or outcome.source == FAULT:
+                self.marks.append(Mark(self._times[-1], name, value))
+
+    def alarms(self, alarms: Mapping[str, float]) -> None:
+        """The alarms of the last tick, by their whole names."""
+        for name, value in alarms.items():
+            if name not in self._others:
+                self._others[name] = array("d", bytes(8 * self._rows))
+            self._set(name, value)
+
+    def _set(self, name: str, value: float) -> None:
+        self._now[name] = self._others[name][-1] = value

@@ -1,0 +1,255 @@
+"""`Scenario`: a line with a controller attached, run in simulated time by a test that looks at it at every tick."""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, NoReturn
+
+from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.control.scan import ALARMS, ON, Controller
+from conveyor_sim.errors import CommandError, SimulationError
+from conveyor_sim.line.line import FAULT
+from conveyor_sim.resources import scene_path
+from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.testing.conditions import Condition, ConditionFailed, Present, text_of, values
+from conveyor_sim.testing.history import History
+
+CONTROLLER = "controller"
+"""Source of the attached controller's commands, in the bag's outcomes."""
+
+TEST = "test"
+"""Source of commands that the test itself gives."""
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Watch:
+    """A condition that is asserted, from a time on."""
+
+    condition: Condition
+    word: str
+    """always, never, eventually or run_until."""
+    since: float
+    """s"""
+
+    @property
+    def text(self) -> str:
+        """What it says, as the test calls it."""
+        return f"{self.word}({text_of(self.condition)})"
+
+
+class Scenario(AbstractContextManager["Scenario"]):
+    """A line under test. All times are simulated; conditions are evaluated at every tick.
+
+    The controller's first scan is at the end of the tick after `attach`, as over the service `lockstep`, and then there
+    is one a tick: it sees the signals of a tick, and its commands act from that tick on.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | PathLike[str],
+        overrides: Mapping[str, Any] | None = None,
+        *,
+        bag: Path | None = None,
+    ) -> None:
+        """scene: one that was loaded, a scene file, or the name of a shipped one. overrides: laid over a file's fields.
+        bag: folder to record to from the start, new or empty; None: nothing is recorded.
+
+        Raises SceneError for a scene that can't be, BagError if it can't be recorded, ValueError for overrides of a
+        loaded scene.
+        """
+        if isinstance(scene, Scene):
+            if overrides is not None:
+                raise ValueError("overrides given for a scene that is loaded, expected them where it is loaded")
+        else:
+            scene = load_scene(scene_path(Path(scene)), overrides)
+        self.scene = scene
+        self.simulation = Simulation(scene)
+        self.history = History(self.simulation.process_image)
+        self.failed: Watch | None = None
+        """The condition that failed."""
+        self.of_interest: dict[str, None] = {}
+        """Names that conditions and the controller have read, the last condition's last."""
+        self._recorder = None if bag is None else Recorder(bag)
+        self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
+        self._outputs.start()
+        self._controller: Controller | None = None
+        self._answer: dict[str, float] = {}
+        self._alarms: dict[str, float] = {}
+        self._scanned = False
+        self._standing: list[Watch] = []
+        self._signals: dict[str, float] = {}
+        self._look()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the recording, if there is one; it can't run on then."""
+        if self._recorder is not None:
+            self._recorder.close()
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.simulation.time
+
+    @property
+    def signals(self) -> Present:
+        """The present signals by name, alarms among them ("alarms/<name>")."""
+        return Present(
+            {**self._signals, **self._alarms}, self.time, self.simulation.tick, self.scene.tick, self._scanned
+        )
+
+    @property
+    def alarms(self) -> frozenset[str]:
+        """Names of the alarms that stand, as told by the controller's last scan."""
+        return frozenset(name.removeprefix(ALARMS) for name, value in self._alarms.items() if value >= ON)
+
+    def attach(self, controller: Controller) -> None:
+        """Have a controller scan at every tick from the next one on, in place of the one before."""
+        self._controller, self._answer, self._alarms, self._scanned = controller, {}, {}, False
+        self.history.alarms(dict.fromkeys(self._known_alarms(), 0.0))
+
+    def command(self, name: str, value: float) -> None:
+        """Give a command for the next tick; one of the controller's of the same name comes after it.
+
+        Raises CommandError if it would be refused.
+        """
+        self._require(name, value, TEST)
+        self.simulation.command((name,), (value,), TEST)
+
+    def inject(self, fault: str, value: float = 1.0) -> None:
+        """Have a fault begin, or with value 0 end, at the next tick. Raises CommandError if it would be refused."""
+        self._require(fault, value, FAULT)
+        self.simulation.inject(fault, value)
+
+    def run_for(self, seconds: float) -> None:
+        """Let time pass, rounded up to whole ticks.
+
+        Raises ConditionFailed for what must always or never be, CommandError for a command of the controller that is
+        refused, SimulationError.
+        """
+        for _ in range(self._ticks(seconds)):
+            self._step()
+
+    def run_until(self, condition: Condition, within: float) -> float:
+        """Let time pass until a condition is true, and return the seconds that took; none if it is true already.
+
+        For what a scenario needs to begin with; raises ConditionFailed if it takes more than `within` seconds.
+        """
+        return self._wait(Watch(condition, "run_until", self.time), within)
+
+    def eventually(self, condition: Condition, within: float) -> float:
+        """Assert that a condition comes true within so many seconds, let them pass until then; returns how many."""
+        return self._wait(Watch(condition, "eventually", self.time), within)
+
+    def always(self, condition: Condition, for_: float | None = None) -> None:
+        """Assert that a condition is true now and at every tick of the next `for_` seconds, and let them pass.
+
+        for_: None: lets no time pass, and asserts it at every tick of whatever is run later.
+        """
+        self._hold(Watch(condition, "always", self.time), for_)
+
+    def never(self, condition: Condition, for_: float | None = None) -> None:
+        """Assert that a condition is true at no tick, as `always` does."""
+        self._hold(Watch(condition, "never", self.time), for_)
+
+    def _hold(self, watch: Watch, for_: float | None) -> None:
+        __tracebackhide__ = True
+        self._check(watch)
+        self._standing.append(watch)
+        if for_ is not None:
+            self.run_for(for_)
+            self._standing.remove(watch)
+
+    def _wait(self, watch: Watch, within: float) -> float:
+        __tracebackhide__ = True
+        first, last = self.simulation.tick, self.simulation.tick + self._ticks(within)
+        while not self._true(watch, present := self.signals):
+            if self.simulation.tick >= last:
+                span = f"within {within:g} s, from {watch.since:.2f} s to {self.time:.2f} s"
+                self._fail(watch, f"{watch.text} did not come true {span}", present)
+            self._step()
+        return round((self.simulation.tick - first) * self.scene.tick, 9)
+
+    def _check(self, watch: Watch) -> None:
+        __tracebackhide__ = True
+        unwanted = watch.word == "never"
+        if self._true(watch, present := self.signals) is unwanted:
+            after = f", {self.time - watch.since:.2f} s after it was first asserted" if self.time > watch.since else ""
+            when = f"at {self.time:.2f} s (tick {self.simulation.tick}){after}"
+            self._fail(watch, f"{watch.text} was {str(unwanted).lower()} {when}", present)
+
+    def _true(self, watch: Watch, present: Present) -> bool:
+        true = bool(watch.condition(present))
+        for name in present.read:
+            self.of_interest.pop(name, None)
+            self.of_interest[name] = None
+        return true
+
+    def _fail(self, watch: Watch, head: str, present: Present) -> NoReturn:
+        __tracebackhide__ = True
+        self.failed = watch
+        raise ConditionFailed(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
+
+    def _step(self) -> None:
+        __tracebackhide__ = True
+        if self._answer:
+            self.simulation.command(tuple(self._answer), tuple(self._answer.values()), CONTROLLER)
+        try:
+            self.simulation.advance()
+        except SimulationError:
+            self._outputs.after_failure()
+            raise
+        refused = []
+        for outcome in self._outputs.after_tick():
+            if outcome.accepted:
+                self.history.take(outcome, outcome.source == TEST)
+            else:
+                refused.append(outcome.reason)
+        self._look()
+        if refused:
+            raise CommandError(f"at {self.time - self.scene.tick:.2f} s a command was refused: {'; '.join(refused)}")
+        if self._controller is not None:
+            self._scan(self._controller)
+        for watch in self._standing:
+            self._check(watch)
+
+    def _look(self) -> None:
+        """Read the signals of a tick that is reached."""
+        now = self.simulation.signals()
+        self.history.begin_tick(self.time, now)
+        self._signals = dict(zip(self.simulation.process_image.signal_names, now.tolist(), strict=True))
+
+    def _scan(self, controller: Controller) -> None:
+        inputs = Present(self._signals, self.time, self.simulation.tick, self.scene.tick, True)
+        answer = controller.scan(inputs)
+        self._scanned = True
+        for name in inputs.read:
+            self.of_interest.setdefault(name)
+        self._answer = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
+        told = {name: float(value) for name, value in answer.items() if name.startswith(ALARMS)}
+        self._alarms = {**dict.fromkeys(self._alarms, 0.0), **told}
+        self.history.alarms(self._alarms)
+
+    def _known_alarms(self) -> list[str]:
+        return [name for name in self.history.names if name.startswith(ALARMS)]
+
+    def _require(self, name: str, value: float, source: str) -> None:
+        if reason := self.simulation.refusal((name,), (value,), source):
+            raise CommandError(reason)
+
+    def _ticks(self, seconds: float) -> int:
+        if not (math.isfinite(seconds) and seconds >= 0.0):
+            raise ValueError(f"{seconds:g} s given, expected 0 s or more")
+        return math.ceil(seconds / self.scene.tick - _ROUNDING)

@@ -1,0 +1,57 @@
+"""How conditions are told."""
+
+from conveyor_sim.testing.conditions import Present, text_of
+
+LIMIT = 3
+
+
+def nearly_full(s: Present) -> bool:
+    return s["a"] > LIMIT
+
+
+def test_a_function_is_told_by_its_name() -> None:
+    assert text_of(nearly_full) == "nearly_full"
+
+
+def test_a_lambda_is_told_by_its_text() -> None:
+    assert text_of(lambda s: s["a"] > LIMIT) == 's["a"] > LIMIT'
+    over_lines = text_of(
+        lambda s: (
+            s["a_device_with_a_long_name"] > LIMIT
+            and s["some_device_with_a_long_name"] == 0
+            and s["another_device_with_a_long_name"]
+        )
+    )
+    assert over_lines.startswith(
+        's["a_device_with_a_long_name"] > LIMIT and s["some_device_with_a_long_name"] == 0 and'
+    )
+
+
+def test_two_in_a_line_are_told_apart_where_they_can_be() -> None:
+    first, second = (lambda s: s["a"] > 1), (lambda s: s["b"] > 2)
+    assert (text_of(first), text_of(second)) == ('s["a"] > 1', 's["b"] > 2')
+    more, less = (lambda s: s["a"] > 1), (lambda s: s["a"] < 1)
+    assert text_of(more) == text_of(less) == 's["a"] < 1 or s["a"] > 1'
+
+
+def test_one_without_a_source_is_told_by_its_place() -> None:
+    condition = eval(compile("lambda s: s['a'] > 1", "<typed>", "eval"))
+    assert text_of(condition) == "the lambda in line 1 of <typed>"
+
+
+def test_a_callable_object_is_told_by_its_repr() -> None:
+    class Full:
+        def __call__(self, s: Present) -> bool:
+            return s["a"] > 1
+
+        def __repr__(self) -> str:
+            return "Full()"
+
+    assert text_of(Full()) == "Full()"
+
+
+def test_reading_is_noted_and_alarms_are_off_before_the_first_scan() -> None:
+    present = Present({"a": 1.0, "b": 2.0}, 0.0, 0, 0.01, scanned=False)
+    assert present["b"] == 2.0 and present.on("a") and present.get("c") is None
+    assert present["alarms/any"] == 0.0
+    assert list(present.read) == ["b", "a"]

@@ -1,0 +1,162 @@
+"""Scenarios: a controller's scans, what is asserted over simulated time, and what a failure tells."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import pytest
+from testing.conftest import FEEDER, ON_TABLE, PACKER, REMOVED, TABLE
+
+from conveyor_sim.control import Inputs
+from conveyor_sim.errors import CommandError
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.testing import Scenario
+from conveyor_sim.testing.conditions import ConditionFailed
+
+
+@dataclass
+class Hold:
+    """Holds the feeder while there are so many bottles on the table; remembers its scans."""
+
+    high: float
+    ticks: list[int] = field(default_factory=list)
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        self.ticks.append(inputs.tick)
+        assert inputs.time == pytest.approx(inputs.tick * inputs.length)
+        full = inputs[ON_TABLE] >= self.high
+        return {FEEDER: 0.0 if full else 0.4, "alarms/full": float(full)}
+
+
+def test_a_controller_scans_once_a_tick_from_the_next_on(table: Scenario) -> None:
+    hold = Hold(5)
+    table.run_for(0.02)
+    table.attach(hold)
+    table.run_for(0.03)
+    assert hold.ticks == [3, 4, 5]
+
+
+def test_the_same_bits_as_by_hand(table: Scenario) -> None:
+    """A scan's answer to the signals of a tick acts from that tick on."""
+    table.attach(Hold(3))
+    table.run_for(8.0)
+
+    simulation, hold, answer = Simulation(load_scene(TABLE)), Hold(3), dict[str, float]()
+    names = simulation.process_image.signal_names
+    while simulation.tick < 800:
+        if answer:
+            simulation.command(tuple(answer), tuple(answer.values()))
+        simulation.advance()
+        signals = dict(zip(names, simulation.signals().tolist(), strict=True))
+        answer = dict(hold.scan(Inputs(signals, simulation.time, simulation.tick, 0.01)))
+        del answer["alarms/full"]
+    assert table.simulation.state_hash() == simulation.state_hash()
+    assert (table.history["belts/feeder/speed"] == 0.0).any()  # it did act
+
+
+def test_time_passes_until_a_condition_is_true_and_no_further(table: Scenario) -> None:
+    took = table.run_until(lambda s: s[ON_TABLE] >= 2, within=10)
+    assert table.signals[ON_TABLE] == 2
+    assert took == pytest.approx(table.time) == table.history.time[-1]
+    assert (table.history[ON_TABLE][:-1] < 2).all()
+    assert table.eventually(lambda s: s[ON_TABLE] >= 2, within=10) == 0.0
+
+
+def test_seconds_are_rounded_up_to_ticks(table: Scenario) -> None:
+    table.run_for(0.07)  # 0.07 / 0.01 is a little more than 7 in floating point
+    assert table.simulation.tick == 7
+    table.run_for(0.011)
+    assert table.simulation.tick == 9
+    with pytest.raises(ValueError, match="-1 s given, expected 0 s or more"):
+        table.run_for(-1)
+
+
+def test_what_does_not_come_true_in_time(table: Scenario) -> None:
+    table.run_for(1.0)
+    with pytest.raises(ConditionFailed) as failure:
+        table.eventually(lambda s: s[ON_TABLE] > 90 and s[REMOVED] > 0, within=0.5)
+    assert str(failure.value) == (
+        "eventually(s[ON_TABLE] > 90 and s[REMOVED] > 0) did not come true within 0.5 s, from 1.00 s to 1.50 s; "
+        "the signals that it reads:\n    belts/table/bottles = 0"
+    )
+    assert table.simulation.tick == 150
+
+
+def test_always_tells_the_first_tick_at_which_it_is_not(table: Scenario) -> None:
+    table.run_for(1.0)
+    with pytest.raises(ConditionFailed) as failure:
+        table.always(lambda s: s[ON_TABLE] < 2 or s["belts/table/speed"] > 1.0, for_=20)
+    assert table.signals[ON_TABLE] == 2
+    assert (table.history[ON_TABLE][:-1] < 2).all()
+    text = str(failure.value)
+    assert text.startswith('always(s[ON_TABLE] < 2 or s["belts/table/speed"] > 1.0) was false at ')
+    assert f"at {table.time:.2f} s (tick {table.simulation.tick}), {table.time - 1.0:.2f} s after" in text
+    assert text.endswith("    belts/table/bottles = 2\n    belts/table/speed = 0.4 m/s")
+
+
+def test_what_holds_lets_its_time_pass(table: Scenario) -> None:
+    table.always(lambda s: s["belts/table/speed"] == 0.4, for_=0.5)
+    table.never(lambda s: s[ON_TABLE] > 90, for_=0.5)
+    assert table.simulation.tick == 100
+    table.command("belts/table/cmd_speed", 0.2)
+    table.run_for(0.1)  # neither is asserted any longer
+    assert table.signals["belts/table/speed"] == 0.2
+
+
+def test_what_is_asserted_from_now_on_is_looked_at_in_every_run(table: Scenario) -> None:
+    table.never(lambda s: s[ON_TABLE] >= 2)
+    assert table.simulation.tick == 0
+    with pytest.raises(ConditionFailed, match=r"^never\(s\[ON_TABLE\] >= 2\) was true at "):
+        table.eventually(lambda s: s[REMOVED] > 0, within=30)
+    assert table.signals[ON_TABLE] == 2
+
+
+def test_what_is_false_already_fails_at_once(table: Scenario) -> None:
+    with pytest.raises(ConditionFailed, match=r"was false at 0\.00 s \(tick 0\); the signals"):
+        table.always(lambda s: s[ON_TABLE] > 0, for_=1.0)
+    assert table.simulation.tick == 0
+
+
+def test_alarms(table: Scenario) -> None:
+    table.attach(Hold(2))
+    table.never(lambda s: s["alarms/full"], for_=0.5)
+    table.eventually(lambda s: s["alarms/full"], within=20)
+    assert table.alarms == {"full"}
+    assert table.signals[ON_TABLE] == 2
+    with pytest.raises(KeyError, match="alarms/ful: no such signal on this line, expected one of alarms/full"):
+        table.never(lambda s: s["alarms/ful"], for_=0.5)
+
+
+def test_an_unknown_signal_is_an_error_not_a_condition_that_holds(table: Scenario) -> None:
+    with pytest.raises(KeyError, match="belts/tabel/bottles: no such signal"):
+        table.never(lambda s: s["belts/tabel/bottles"] > 3, for_=1.0)
+
+
+def test_inputs_that_would_be_refused_are_so_at_once(table: Scenario) -> None:
+    with pytest.raises(CommandError, match="belts/tabel/cmd_speed: no such command, expected one of"):
+        table.command("belts/tabel/cmd_speed", 0.1)
+    with pytest.raises(CommandError, match="belts/table/trip: no such fault"):
+        table.inject("belts/table/trip")
+
+
+def test_a_refused_command_of_the_controller_is_an_error(table: Scenario) -> None:
+    class TooFast:
+        def scan(self, inputs: Inputs) -> Mapping[str, float]:
+            return {FEEDER: 99.0}
+
+    table.attach(TooFast())
+    with pytest.raises(CommandError, match=r"^at 0\.01 s a command was refused: belts/feeder/cmd_speed: 99 given"):
+        table.run_for(1.0)
+
+
+def test_overrides_are_for_files() -> None:
+    assert Scenario(TABLE, {"belts": {"table": {"speed": 0.1}}}).signals["belts/table/speed"] == 0.1
+    with pytest.raises(ValueError, match="expected them where it is loaded"):
+        Scenario(load_scene(TABLE), {"duration": 1.0})
+
+
+def test_a_test_stops_the_packer(table: Scenario) -> None:
+    table.run_for(1.0)
+    table.command(PACKER, 0.0)
+    table.run_for(0.02)
+    assert table.signals["belts/packer/speed"] == 0.0
