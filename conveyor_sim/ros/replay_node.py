@@ -82,9 +82,9 @@ class ReplayNode:
             self._quit = True
             self._wake.notify()
         self._thread.join()
-        patience = Duration(seconds=LAST_WORDS)
+        end = time.monotonic() + LAST_WORDS
         for publisher in self._publishers.values():
-            publisher.wait_for_all_acked(patience)
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
         self._spinner.close()
         self._node.destroy_node()
 

@@ -11,9 +11,10 @@ from bag.small_line import SPEED, TURN
 from ros.recording import TICKS, record
 
 from conveyor_sim.bag import messages as types
+from conveyor_sim.bag.mcap_file import McapFile, Schema
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.playback import Message, Playback
@@ -187,6 +188,24 @@ def test_a_jump_stays_within_the_recording(bag: Bag) -> None:
     assert played.player.time == 0.0
     played.player.jump(5.0)
     assert played.player.time == pytest.approx(0.6)
+
+
+def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_own(bag: Bag, tmp_path: Path) -> None:
+    _, _, line = next(bag.raw({"line"}))
+    with (tmp_path / "bag.mcap").open("xb") as stream:
+        file = McapFile(stream, "bag.mcap", "jazzy")
+        for name, kind in {
+            "/hall/line": types.LINE,
+            "/hall/signals": types.SIGNALS,
+            "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+            "/clock": "rosgraph_msgs/msg/Clock",
+        }.items():
+            schema = Schema(kind, "ros2msg", definition(kind).encode())
+            file.add_message(file.add_topic(name, schema, "cdr", {}), line, 1, 1)
+        file.finish()
+    with open_bag(tmp_path / "bag.mcap") as spaced:
+        assert spaced.namespace == "/hall"
+        assert {topic.name for topic in Playback(spaced).topics} == {"line", "signals", "/diagnostics"}
 
 
 @pytest.mark.parametrize(
