@@ -200,8 +200,30 @@ def recover(bag: Path) -> None:
 
 @main.command()
 @click.argument("bag", type=click.Path(path_type=Path))
-def replay(bag: Path) -> None:
-    """Run BAG again, with its commands at their ticks, and compare every recorded state."""
+@click.argument("ros_arguments", nargs=-1, type=click.UNPROCESSED, metavar="[-- --ros-args ...]")
+@click.option("--publish", is_flag=True, help="Play the recording over ROS, with /clock, instead of simulating.")
+@click.option("--rate", type=float, help="With --publish: recorded s per wall s, 0 for no limit (default: 1).")
+@click.option("--start", type=float, help="With --publish: simulated time in s to begin at (default: its start).")
+@click.option("--paused", is_flag=True, help="With --publish: wait until resumed, by the space key or the service.")
+def replay(
+    bag: Path,
+    ros_arguments: tuple[str, ...],
+    publish: bool,
+    rate: float | None,
+    start: float | None,
+    paused: bool,
+) -> None:
+    """Run BAG again, with its commands at their ticks, and compare every recorded state.
+
+    With --publish nothing is simulated: the recorded messages are published over ROS as the live node would.
+    """
+    if publish:
+        _publish(bag, 1.0 if rate is None else rate, start, paused, ros_arguments)
+        return
+    given = {"--rate": rate is not None, "--start": start is not None, "--paused": paused, "--ros-args": ros_arguments}
+    for option, is_given in given.items():
+        if is_given:
+            raise ConveyorError(f"{option}: given without --publish, expected both or neither")
     from conveyor_sim.bag.compare import TOLERANCE
     from conveyor_sim.bag.replay import replay as replay_bag
 
@@ -214,8 +236,8 @@ def replay(bag: Path) -> None:
     count = sum(report.compared.values())
     if report.difference is not None:
         raise click.ClickException(f"{bag}: the first difference ({how}) is at {report.difference}")
-    start = "" if report.first_tick == 0 else f" from tick {report.first_tick}"
-    click.echo(f"{bag}: {count} messages equal {how}{start} up to tick {report.last_tick} ({report.end:.2f} s)")
+    began = "" if report.first_tick == 0 else f" from tick {report.first_tick}"
+    click.echo(f"{bag}: {count} messages equal {how}{began} up to tick {report.last_tick} ({report.end:.2f} s)")
 
 
 @main.command()
@@ -233,6 +255,19 @@ def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[i
     folder = out or (bag if bag.is_dir() else bag.parent) / "pictures"
     for picture in plot_bag(bag, folder, times=times or None, bottles=bottles or None):
         click.echo(picture)
+
+
+def _publish(bag: Path, rate: float, start: float | None, paused: bool, ros_arguments: tuple[str, ...]) -> None:
+    if not 0.0 <= rate < float("inf"):
+        raise ConveyorError(f"--rate: {rate:g} given, expected a number of at least 0")
+    try:
+        from conveyor_sim.ros.replay_job import publish_bag
+    except ImportError as error:
+        raise ConveyorError(
+            f"replay --publish: {error}, expected ROS 2 with rclpy and conveyor_msgs: source it, or run in the "
+            "environment that `make` sets up"
+        ) from error
+    publish_bag(bag, rate, start, paused, ros_arguments)
 
 
 def _print(content: RenderableType) -> None:

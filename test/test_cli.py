@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -118,6 +120,30 @@ def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path)
     assert "whole again with" in recovered.output
     assert "bag_0.mcap.damaged and may be deleted" in recovered.output
     assert command("replay", "bag").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--rate", "2"), "--rate: given without --publish, expected both or neither"),
+        (("--start", "0"), "--start: given without --publish"),
+        (("--", "--ros-args"), "--ros-args: given without --publish"),
+        (("--publish", "--rate", "-1"), "--rate: -1 given, expected a number of at least 0"),
+        (("--publish", "--rate", "nan"), "--rate: nan given"),
+    ],
+)
+def test_replay_refuses_options_that_cannot_be(command: Command, arguments: tuple[str, ...], sentence: str) -> None:
+    assert_refused(command("replay", "bag", *arguments), sentence)
+
+
+def test_replay_over_ros_says_what_it_lacks() -> None:
+    without_ros = "import sys; sys.modules['rclpy'] = None; from conveyor_sim.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", without_ros, "replay", "bag", "--publish"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert re.search("^Error: replay --publish: .*rclpy.*, expected ROS 2 with rclpy and conveyor_msgs", done.stderr)
+    assert "Traceback" not in done.stderr
 
 
 def test_plot_draws_into_a_folder(command: Command, tmp_path: Path) -> None:

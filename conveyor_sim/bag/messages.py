@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -29,9 +30,11 @@ DAMAGE = "conveyor_msgs/msg/Damage"
 RAIL_WEAR = "conveyor_msgs/msg/RailWear"
 DAMAGE_EVENT = "conveyor_msgs/msg/DamageEvent"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
+COMMANDS = "conveyor_msgs/msg/Commands"
 GUARD_EVENT = "conveyor_msgs/msg/GuardEvent"
 LINE = "conveyor_msgs/msg/Line"
 BOOL = "std_msgs/msg/Bool"
+SPEED = "std_msgs/msg/Float64"
 POSES = "geometry_msgs/msg/PoseArray"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 
@@ -129,6 +132,18 @@ def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
         "reason": outcome.reason,
     }
     return _serialize(OUTCOME, header, values)
+
+
+def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:
+    """conveyor_msgs/Commands."""
+    return _serialize(COMMANDS, header, {"names": list(names), "values": values})
+
+
+def speed_message(speed: float) -> bytes:
+    """std_msgs/Float64 of a belt's speed, m/s."""
+    writer = CdrWriter()
+    writer.pack("d", speed)
+    return writer.finish()
 
 
 def guard_message(event: GuardEvent, header: Header) -> bytes:

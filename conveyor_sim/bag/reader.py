@@ -11,10 +11,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import ReaderError
 from rosbags.serde import SerdeError
 
 from conveyor_sim.bag import messages
+from conveyor_sim.bag.qos import DATA, Qos
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
@@ -106,13 +108,32 @@ class Bag(AbstractContextManager["Bag"]):
         """Simulated time of a tick, s."""
         return float(tick * self.line.tick_ns * 1e-9)
 
-    def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, log time (ns) and serialized bytes of every message in time order; of some topics, if given."""
+    @property
+    def qos(self) -> dict[str, Qos]:
+        """Quality of service that was offered when it was recorded, by topic, names as in OUTPUTS."""
+        return {self._relative(c.topic): _offered(c) for c in self._reader.connections}
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """Log times of the first and the last message."""
+        return self._reader.start_time, self._reader.end_time - 1
+
+    def type_hash(self, topic: str) -> str:
+        """RIHS01 hash of a topic's type by the definition that the bag states."""
+        return self._reader.typestore.hash_rihs01(self.types[topic])
+
+    def raw(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, log time (ns) and serialized bytes of every message in time order.
+
+        If given: of some topics, from a log time on, before a log time.
+        """
         chosen = [c for c in self._reader.connections if topics is None or self._relative(c.topic) in topics]
         if not chosen:
             return
         try:
-            for connection, log_time, data in self._reader.messages(connections=chosen):
+            for connection, log_time, data in self._reader.messages(chosen, start_ns, stop_ns):
                 yield self._relative(connection.topic), log_time, data
         except (AnyReaderError, ReaderError) as error:
             raise BagError(f"{self.path}: {error} (damaged? `conveyor-sim recover` may help)") from error
@@ -184,10 +205,22 @@ class Bag(AbstractContextManager["Bag"]):
             yield Frame(frame.tick, frame.time, convert(frame.data))
 
     def _relative(self, topic: str) -> str:
-        return topic.removeprefix(self.namespace).removeprefix("/")
+        return topic.removeprefix(f"{self.namespace}/")
 
     def _tick_ns(self, message: Any) -> int:
         return int(message.tick_ns if message.__msgtype__ == messages.LINE else self.line.tick_ns)
+
+
+def _offered(connection: Connection) -> Qos:
+    profiles = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
+    if not profiles:
+        return DATA
+    first = profiles[0]  # of one publisher; several of one topic offer the same here
+    return Qos(
+        depth=max(1, first.depth),
+        reliability="best_effort" if first.reliability is QosReliability.BEST_EFFORT else "reliable",
+        durability="transient_local" if first.durability is QosDurability.TRANSIENT_LOCAL else "volatile",
+    )
 
 
 def to_columns(kind: type[T], message: Any) -> T:

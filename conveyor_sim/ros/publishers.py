@@ -78,11 +78,16 @@ def check_type(node: Node, topic: str, type_name: str, distro: str) -> None:
     garbage at the subscribers.
     """
     ours = type_hash(type_name, distro)
-    for endpoint in node.get_publishers_info_by_topic(topic):
-        if endpoint.node_name != node.get_name() or endpoint.node_namespace != node.get_namespace():
-            continue
-        if str(endpoint.topic_type_hash) != ours:
+    for theirs in published_hashes(node, topic):
+        if theirs != ours:
             raise ConveyorError(
                 f"{type_name}: the installed message package was built from another definition "
-                f"({endpoint.topic_type_hash}) than msg_defs ({ours}); rebuild it from msg_defs"
+                f"({theirs}) than msg_defs ({ours}); rebuild it from msg_defs"
             )
+
+
+def published_hashes(node: Node, topic: str) -> list[str]:
+    """RIHS01 hashes of the types that `node` publishes on `topic`: one for each of its publishers."""
+    own = (node.get_name(), node.get_namespace())
+    endpoints = node.get_publishers_info_by_topic(topic)
+    return [str(one.topic_type_hash) for one in endpoints if (one.node_name, one.node_namespace) == own]

@@ -1,0 +1,153 @@
+"""A recording as a stream to be told again: what belongs to each tick, and what holds at a tick that is gone to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from conveyor_sim.bag import messages
+from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.qos import COMMANDS, QOS, Qos
+from conveyor_sim.bag.reader import Bag, Outcome, to_outcome
+from conveyor_sim.errors import BagError
+from conveyor_sim.line.line import FAULT, WATCHDOG
+from conveyor_sim.line.process_image import speed_command
+
+OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
+"""What a node that plays back tells of itself."""
+
+NOT_SENT = frozenset({WATCHDOG, FAULT})
+"""Sources of outcomes that nobody sent as a command."""
+
+WALL_CLOCK = 10**18
+"""ns: later log times are dates (from 2001 on), not simulated times."""
+
+LOOK_BACK = 10**9
+"""ns: how far a search for the state at a time looks back first."""
+
+
+class Message(NamedTuple):
+    """A serialized message to be published."""
+
+    topic: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic that is played back: its name as in OUTPUTS, from the root if it was outside the bag's namespace."""
+
+    name: str
+    type: str
+    qos: Qos
+    type_hash: str | None
+    """RIHS01 hash of the type its bytes were recorded with; None: made here."""
+
+    @property
+    def latched(self) -> bool:
+        """Whether its last message holds until the next one, for whoever joins late."""
+        return self.qos.durability == "transient_local"
+
+    @property
+    def event(self) -> bool:
+        """Whether each message counts for its own moment only, and none tells a state."""
+        return QOS.get(self.name) is COMMANDS
+
+
+class Playback:
+    """The messages of an open bag by ticks: `cue` goes to a tick, `take` then yields tick after tick.
+
+    Commands are not recorded as they were sent. Where the bag lacks their topics they are made from the outcomes, right
+    before these: `belts/<belt>/cmd_speed` for what came that way, else `commands`; refused ones too, as they were sent.
+    """
+
+    def __init__(self, bag: Bag) -> None:
+        """Raises BagError if the bag's times are not simulated times of one run."""
+        self._bag = bag
+        first_ns, last_ns = bag.span_ns
+        if first_ns > WALL_CLOCK:
+            raise BagError(
+                f"{bag.path}: recorded in wall time, expected simulated time, as `record` and `conveyor-sim run` do it"
+            )
+        if (runs := bag.counts["line"]) > 1:
+            raise BagError(f"{bag.path}: holds {runs} runs (messages of line), expected one")
+        self.tick_ns = int(bag.line.tick_ns)
+        self.first_tick = first_ns // self.tick_ns
+        self.last_tick = -(-last_ns // self.tick_ns)
+        qos = bag.qos
+        recorded = [
+            Topic(name, kind, qos[name], bag.type_hash(name))
+            for name, kind in bag.types.items()
+            if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN
+        ]
+        known = {topic.name for topic in recorded}
+        made = [Topic("commands", messages.COMMANDS, COMMANDS, None)]
+        made += [Topic(speed_command(belt), messages.SPEED, COMMANDS, None) for belt in bag.line.belts]
+        self._made = {topic.name for topic in made if topic.name not in known} if "outcomes" in known else set()
+        self.topics = (*recorded, *(topic for topic in made if topic.name in self._made))
+        self._recorded = known
+        self._latched = {topic.name for topic in recorded if topic.latched}
+        self._states = {topic.name for topic in recorded if not topic.latched and not topic.event}
+        self._cued_ns = 0
+        self._due: list[Message] = []
+        self._stream: Iterator[tuple[str, int, bytes]] = iter(())
+        self._next: tuple[str, int, bytes] | None = None
+
+    def stamp_ns(self, tick: int) -> int:
+        """Simulated time of a tick, ns; tick 0 is stamped 1, for ROS reads 0 as "not set"."""
+        return max(1, tick * self.tick_ns)
+
+    def cue(self, tick: int) -> list[Message]:
+        """Go to a tick; returns what is latched there. The next `take` begins with the state at that tick."""
+        after_ns = self.stamp_ns(tick - 1) if tick > self.first_tick else -1
+        self._cued_ns = self.stamp_ns(tick)
+        latched = {}
+        for topic, stamp, data in self._bag.raw(self._latched):
+            if stamp <= self._cued_ns or topic not in latched:  # the first one, where none came before
+                latched[topic] = Message(topic, data)
+        now = {topic for topic, _, _ in self._bag.raw(self._states, after_ns + 1, self._cued_ns + 1)}
+        self._due = self._last_before(after_ns + 1, self._states - now)
+        self._stream = self._bag.raw(self._recorded, after_ns + 1)
+        self._next = next(self._stream, None)
+        return list(latched.values())
+
+    def take(self, tick: int) -> Iterator[Message]:
+        """What is left up to a tick, in the order of recording."""
+        due, self._due = self._due, []
+        yield from due
+        stamp_ns = self.stamp_ns(tick)
+        while self._next is not None and self._next[1] <= stamp_ns:
+            topic, stamp, data = self._next
+            self._next = next(self._stream, None)
+            if topic in self._latched and stamp <= self._cued_ns:
+                continue
+            if topic == "outcomes":
+                yield from self._sent(data)
+            yield Message(topic, data)
+
+    def _last_before(self, stop_ns: int, topics: set[str]) -> list[Message]:
+        """The last message of each topic before a time, in their order."""
+        found: dict[str, tuple[int, int, bytes]] = {}
+        span, missing = LOOK_BACK, set(topics)
+        first_ns, _ = self._bag.span_ns
+        while missing and stop_ns > first_ns:
+            start_ns = stop_ns - span
+            for place, (topic, stamp, data) in enumerate(self._bag.raw(missing, start_ns, stop_ns)):
+                found[topic] = (stamp, place, data)
+            missing -= found.keys()
+            stop_ns, span = start_ns, 2 * span
+        return [Message(topic, found[topic][2]) for topic in sorted(found, key=lambda name: found[name][:2])]
+
+    def _sent(self, data: bytes) -> Iterator[Message]:
+        """The command that an outcome tells of, if it was one and the bag does not hold it itself."""
+        message = self._bag.decode("outcomes", data)
+        outcome: Outcome = to_outcome(message)
+        if outcome.source in NOT_SENT:
+            return
+        stamp = message.header.stamp
+        header = Header(message.tick, stamp.sec * 10**9 + stamp.nanosec, message.header.frame_id)
+        if outcome.source in self._made and outcome.names == (outcome.source,) and len(outcome.values) == 1:
+            yield Message(outcome.source, messages.speed_message(outcome.values[0]))
+        elif "commands" in self._made and outcome.source not in self._recorded:
+            yield Message("commands", messages.commands_message(outcome.names, message.values, header))

@@ -1,0 +1,185 @@
+"""The node `conveyor_replay`: publishes a recording as a live node would; answers `pause`, `resume` and `seek`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+from conveyor_msgs.srv import Seek
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from std_srvs.srv import Trigger
+
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.ros.clock import ClockPublisher
+from conveyor_sim.ros.lockstep import Refused
+from conveyor_sim.ros.playback import Message, Playback, Topic
+from conveyor_sim.ros.player import Player
+from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
+from conveyor_sim.ros.services import settled
+from conveyor_sim.ros.spinner import Spinner
+
+T = TypeVar("T")
+
+CLOCK_RATE = 100.0  # messages a wall second at most, as the live node's default
+LAST_WORDS = 1.0  # s of wall time that reliable subscribers have to receive the last messages
+
+
+class ReplayNode:
+    """The node, with the two threads that run it: one spins the executor, one plays."""
+
+    def __init__(
+        self,
+        bag: Bag,
+        rate: float,
+        start: float | None,
+        paused: bool,
+        on_end: Callable[[], None],
+        *,
+        context: Context | None = None,
+        arguments: Sequence[str] = (),
+    ) -> None:
+        """`rate`: recorded seconds per wall second, 0 for as fast as possible. `start`: s; None: the recording's start.
+
+        `on_end` is called, from any thread, when the recording has been played or can't go on; close() must follow.
+        Raises ConveyorError if the bag can't be played back, or holds nothing that can.
+        """
+        self.error: Exception | None = None
+        self._on_end = on_end
+        self._calls: deque[Callable[[], None]] = deque()
+        self._wake = threading.Condition()
+        self._quit = False
+        playback = Playback(bag)
+        self._spinner = Spinner(context, died=self._die)
+        self._node = Node("conveyor_replay", context=context, namespace=bag.namespace, cli_args=list(arguments) or None)
+        try:
+            self._publishers = self._advertise(bag, playback.topics)
+            clock = ClockPublisher(self._node, CLOCK_RATE)
+            self.player = Player(playback, rate, start=start, paused=paused, publish=self._publish, beat=clock.beat)
+        except BaseException:
+            self._spinner.close()
+            self._node.destroy_node()
+            raise
+        group = ReentrantCallbackGroup()
+        self._node.create_service(Trigger, "pause", self._pause, callback_group=group)
+        self._node.create_service(Trigger, "resume", self._resume, callback_group=group)
+        self._node.create_service(Seek, "seek", self._seek, callback_group=group)
+        self._thread = threading.Thread(target=self._run, name="player", daemon=True)
+        self._spinner.start(self._node)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End between two ticks; what was published is given time to arrive."""
+        with self._wake:
+            self._quit = True
+            self._wake.notify()
+        self._thread.join()
+        end = time.monotonic() + LAST_WORDS
+        for publisher in self._publishers.values():
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+        self._spinner.close()
+        self._node.destroy_node()
+
+    def call(self, function: Callable[[], T]) -> Future[T]:
+        """From any thread: have `function` called between two ticks; Refused, in the future, once playing has ended."""
+        future: Future[T] = Future()
+
+        def run() -> None:
+            try:
+                future.set_result(function())
+            except Exception as error:
+                future.set_exception(error)
+
+        with self._wake:
+            if self._quit:
+                future.set_exception(Refused("the recording has been played"))
+            else:
+                self._calls.append(run)
+                self._wake.notify()
+        return future
+
+    def _advertise(self, bag: Bag, topics: Sequence[Topic]) -> dict[str, Publisher]:
+        """A publisher for each topic of which this ROS has the recorded type; it warns of the others."""
+        publishers = {}
+        for topic in topics:
+            try:
+                kind = message_class(topic.type)
+            except (ImportError, AttributeError):
+                self._node.get_logger().warning(f"{topic.name}: left out, {topic.type} is not installed here")
+                continue
+            publisher = self._node.create_publisher(kind, topic.name, ros_qos(topic.qos))
+            # Bytes are published as they were recorded: of another definition they would be garbage.
+            if topic.type_hash and topic.type_hash not in published_hashes(self._node, publisher.topic_name):
+                self._node.destroy_publisher(publisher)
+                self._node.get_logger().warning(
+                    f"{topic.name}: left out, the installed {topic.type} has another definition than the recorded one"
+                )
+                continue
+            publishers[topic.name] = publisher
+        if not publishers:
+            raise BagError(f"{bag.path}: no topic of a type that is installed here, expected at least one")
+        return publishers
+
+    def _publish(self, message: Message) -> None:
+        if publisher := self._publishers.get(message.topic):
+            publisher.publish(message.data)
+
+    def _run(self) -> None:
+        try:
+            self._loop()
+            time.sleep(1.0 / CLOCK_RATE)
+            self.player.step(time.monotonic())  # the end's time, where /clock's cap has held it back
+        except Exception as error:
+            self._die(error)
+        else:
+            self._on_end()
+        finally:
+            with self._wake:
+                self._quit = True
+            self._take_calls()
+
+    def _loop(self) -> None:
+        while not self._quit:
+            self._take_calls()
+            wait = self.player.step(time.monotonic())
+            if self.player.ended and not self.player.paused:
+                return
+            if wait > 0.0:
+                with self._wake:
+                    if not self._calls and not self._quit:
+                        self._wake.wait(wait)
+
+    def _take_calls(self) -> None:
+        while self._calls:
+            self._calls.popleft()()
+
+    def _die(self, error: Exception) -> None:
+        self.error = error
+        self._on_end()
+
+    async def _pause(self, _: Any, response: Any) -> Any:
+        return await self._answer(response, self.player.pause)
+
+    async def _resume(self, _: Any, response: Any) -> Any:
+        return await self._answer(response, self.player.resume)
+
+    async def _seek(self, request: Any, response: Any) -> Any:
+        return await self._answer(response, lambda: self.player.seek(request.time))
+
+    async def _answer(self, response: Any, function: Callable[[], None]) -> Any:
+        try:
+            await settled(self._spinner.executor, self.call(function))
+        except ConveyorError as error:
+            response.message = str(error)
+        else:
+            response.success = True
+            response.message = f"at {self.player.time:g} s"
+        return response
