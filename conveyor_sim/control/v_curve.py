@@ -61,9 +61,9 @@ class Neighbour:
 class VCurve:
     """Rates of a line with a bottleneck.
 
-    bottleneck: the command that sets its rate. rate: 1/s. margin: of `rate`, by which a machine may be faster, or
-    must be slower, for each step that it is away. upstream, downstream: the machines on either side, the nearest
-    first.
+    bottleneck: the command that sets its rate. rate: 1/s. margin: of `rate`, by which a machine may be faster, or must
+    be slower, for each step that it is away; its limit must allow that. upstream, downstream: the machines on either
+    side, the nearest first.
     """
 
     bottleneck: str
