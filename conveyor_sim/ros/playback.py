@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.qos import COMMANDS, QOS, Qos
+from conveyor_sim.bag.qos import COMMANDS, LATCHED, QOS, Qos
 from conveyor_sim.bag.reader import Bag, Outcome, to_outcome
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.line import FAULT, WATCHDOG
@@ -58,8 +58,9 @@ class Topic:
 class Playback:
     """The messages of an open bag by ticks: `cue` goes to a tick, `take` then yields tick after tick.
 
-    Commands are not recorded as they were sent. Where the bag lacks their topics they are made from the outcomes, right
-    before these: `belts/<belt>/cmd_speed` for what came that way, else `commands`; refused ones too, as they were sent.
+    What is not recorded, because other topics hold it, is made from these and comes right before them: commands from
+    outcomes (`belts/<belt>/cmd_speed` for what came that way, else `commands`; refused ones too, for they were sent),
+    and `photo_eyes/<eye>` from signals.
     """
 
     def __init__(self, bag: Bag) -> None:
@@ -82,11 +83,17 @@ class Playback:
             if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN
         ]
         known = {topic.name for topic in recorded}
-        made = [Topic("commands", messages.COMMANDS, COMMANDS, None)]
-        made += [Topic(speed_command(belt), messages.SPEED, COMMANDS, None) for belt in bag.line.belts]
-        self._made = {topic.name for topic in made if topic.name not in known} if "outcomes" in known else set()
-        self.topics = (*recorded, *(topic for topic in made if topic.name in self._made))
+        made: list[Topic] = []
+        if "outcomes" in known:
+            made.append(Topic("commands", messages.COMMANDS, COMMANDS, None))
+            made += [Topic(speed_command(belt), messages.SPEED, COMMANDS, None) for belt in bag.line.belts]
+        eyes = _photo_eyes(bag.line.signal_names) if "signals" in known else {}
+        made += [Topic(eye, messages.BOOL, LATCHED, None) for eye in eyes]
+        self.topics = (*recorded, *(topic for topic in made if topic.name not in known))
         self._recorded = known
+        self._made = {topic.name for topic in self.topics} - known
+        self._eyes = {eye: column for eye, column in eyes.items() if eye in self._made}
+        self._seen: dict[str, bool] = {}  # what was told of each eye since the last cue
         self._latched = {topic.name for topic in recorded if topic.latched}
         self._states = {topic.name for topic in recorded if not topic.latched and not topic.event}
         self._cued_ns = 0
@@ -102,6 +109,7 @@ class Playback:
         """Go to a tick; returns what is latched there. The next `take` begins with the state at that tick."""
         after_ns = self.stamp_ns(tick - 1) if tick > self.first_tick else -1
         self._cued_ns = self.stamp_ns(tick)
+        self._seen.clear()
         latched = {}
         for topic, stamp, data in self._bag.raw(self._latched):
             if stamp <= self._cued_ns or topic not in latched:  # the first one, where none came before
@@ -115,16 +123,28 @@ class Playback:
     def take(self, tick: int) -> Iterator[Message]:
         """What is left up to a tick, in the order of recording."""
         due, self._due = self._due, []
-        yield from due
+        for message in due:
+            yield from self._with_made(message)
         stamp_ns = self.stamp_ns(tick)
         while self._next is not None and self._next[1] <= stamp_ns:
             topic, stamp, data = self._next
             self._next = next(self._stream, None)
             if topic in self._latched and stamp <= self._cued_ns:
                 continue
-            if topic == "outcomes":
-                yield from self._sent(data)
-            yield Message(topic, data)
+            yield from self._with_made(Message(topic, data))
+
+    def _with_made(self, message: Message) -> Iterator[Message]:
+        """What is made from a message, and the message."""
+        if message.topic == "outcomes":
+            yield from self._sent(message.data)
+        elif message.topic == "signals" and self._eyes:
+            signals = self._bag.decode("signals", message.data)
+            for eye, column in self._eyes.items():
+                blocked = bool(signals.values[column])
+                if self._seen.get(eye) is not blocked:
+                    self._seen[eye] = blocked
+                    yield Message(eye, messages.bool_message(blocked, _header(signals)))
+        yield message
 
     def _last_before(self, stop_ns: int, topics: set[str]) -> list[Message]:
         """The last message of each topic before a time, in their order."""
@@ -145,9 +165,23 @@ class Playback:
         outcome: Outcome = to_outcome(message)
         if outcome.source in NOT_SENT:
             return
-        stamp = message.header.stamp
-        header = Header(message.tick, stamp.sec * 10**9 + stamp.nanosec, message.header.frame_id)
         if outcome.source in self._made and outcome.names == (outcome.source,) and len(outcome.values) == 1:
             yield Message(outcome.source, messages.speed_message(outcome.values[0]))
         elif "commands" in self._made and outcome.source not in self._recorded:
-            yield Message("commands", messages.commands_message(outcome.names, message.values, header))
+            yield Message("commands", messages.commands_message(outcome.names, message.values, _header(message)))
+
+
+def _header(message: Any) -> Header:
+    """The header of a decoded message."""
+    stamp = message.header.stamp
+    return Header(message.tick, stamp.sec * 10**9 + stamp.nanosec, message.header.frame_id)
+
+
+def _photo_eyes(signal_names: Sequence[str]) -> dict[str, int]:
+    """Where in the signals each photo-eye tells that it is blocked, by the eye's own topic."""
+    ends = ("photo_eyes/", "/blocked")
+    return {
+        name.removesuffix(ends[1]): column
+        for column, name in enumerate(signal_names)
+        if name.startswith(ends[0]) and name.endswith(ends[1])
+    }

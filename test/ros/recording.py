@@ -4,6 +4,7 @@ from pathlib import Path
 
 from bag.small_line import SMALL_LINE, SPEED, TURN
 
+from conveyor_sim.bag import messages as types
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import load_scene
@@ -19,15 +20,35 @@ COMMANDS = {
 """By tick; the last one is refused, and the watchdog of `straight` stops it at tick 50."""
 
 
-def record(folder: Path) -> Path:
-    """Records 60 ticks of the small line."""
-    simulation = Simulation(load_scene(SMALL_LINE))
+EYE = "photo_eyes/entry"
+PHOTO_EYES = {"entry": {"from": [0.7, 0.0], "to": [0.7, 0.4]}}
+MADE = {"commands": types.COMMANDS, SPEED: types.SPEED, TURN: types.SPEED, EYE: types.BOOL}
+"""Topics that are not recorded, by type."""
+
+
+class EyeSink:
+    """What the live line tells of its photo-eye."""
+
+    def __init__(self) -> None:
+        self.told: list[bytes] = []
+
+    def wants(self, topic: str) -> bool:
+        return topic == EYE
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        self.told.append(data)
+
+
+def record(folder: Path) -> list[bytes]:
+    """Records 60 ticks of the small line; what its photo-eye told meanwhile."""
+    simulation = Simulation(load_scene(SMALL_LINE, {"photo_eyes": PHOTO_EYES}))
+    eye = EyeSink()
     with Recorder(folder) as recorder:
-        outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
+        outputs = Outputs(simulation, [recorder, eye], run_id="run", frame_id="hall")
         outputs.start()
         while simulation.tick < TICKS:
             if simulation.tick in COMMANDS:
                 simulation.command(*COMMANDS[simulation.tick])
             simulation.advance()
             outputs.after_tick()
-    return folder
+    return eye.told

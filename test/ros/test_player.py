@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from bag.small_line import SPEED, TURN
-from ros.recording import TICKS, record
+from ros.recording import EYE, MADE, TICKS, record
 
 from conveyor_sim.bag import messages as types
 from conveyor_sim.bag.mcap_file import McapFile, Schema
@@ -22,8 +22,15 @@ from conveyor_sim.ros.player import Player
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bag]:
-    with open_bag(record(tmp_path_factory.mktemp("bags") / "short")) as opened:
+def live(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[bytes]]:
+    """The recording, and what the live line told of its photo-eye."""
+    folder = tmp_path_factory.mktemp("bags") / "short"
+    return folder, record(folder)
+
+
+@pytest.fixture(scope="module")
+def bag(live: tuple[Path, list[bytes]]) -> Iterator[Bag]:
+    with open_bag(live[0]) as opened:
         yield opened
 
 
@@ -62,7 +69,6 @@ def recorded(bag: Bag, after_tick: int = -1) -> list[Message]:
 
 
 LATCHED = {"line", "plant"}
-MADE = {"commands", SPEED, TURN}
 
 
 def write(bag: Bag, folder: Path, messages: list[tuple[str, int]]) -> Path:
@@ -88,7 +94,7 @@ def test_all_is_published_once_in_order_latched_topics_first(bag: Bag) -> None:
 def test_commands_are_made_from_their_outcomes_and_come_before_them(bag: Bag) -> None:
     played = Played(bag, 0.0)
     played.pass_time(1.0)
-    told = [message for message in played.messages if message.topic in {*MADE, "outcomes"}]
+    told = [message for message in played.messages if message.topic in {*MADE, "outcomes"} - {EYE}]
     assert [message.topic for message in told] == [
         *("commands", "outcomes", TURN, "outcomes", "commands", "outcomes", SPEED, "outcomes"),
         "outcomes",  # of the watchdog
@@ -103,6 +109,19 @@ def test_commands_are_made_from_their_outcomes_and_come_before_them(bag: Bag) ->
     assert (both.header.stamp.sec, both.header.stamp.nanosec) == (0, 100_000_000)
     assert content(2, types.SPEED).data == -0.2
     assert content(6, types.SPEED).data == 99.0
+
+
+def test_photo_eyes_are_made_from_the_signals_as_the_live_line_tells_them(
+    bag: Bag, live: tuple[Path, list[bytes]]
+) -> None:
+    played = Played(bag, 0.0)
+    played.pass_time(1.0)
+    told = [message.data for message in played.take() if message.topic == EYE]
+    assert len(told) > 2
+    assert told == live[1]
+    played.player.pause()
+    played.player.seek(0.3)
+    assert len([message for message in played.take() if message.topic == EYE]) == 1
 
 
 @pytest.mark.parametrize("rate", [0.25, 1.0, 8.0])
@@ -163,7 +182,7 @@ def test_a_seek_finds_a_state_that_is_long_past(bag: Bag, tmp_path: Path) -> Non
     with open_bag(path) as sparse:
         playback = Playback(sparse)
         playback.cue(10_000)
-        assert [message.topic for message in playback.take(10_000)] == ["belts", "signals"]
+        assert [message.topic for message in playback.take(10_000)] == ["belts", EYE, "signals"]
 
 
 @pytest.mark.parametrize("time", [-0.01, 0.61, float("nan")])
@@ -196,7 +215,7 @@ def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_ow
         file = McapFile(stream, "bag.mcap", "jazzy")
         for name, kind in {
             "/hall/line": types.LINE,
-            "/hall/signals": types.SIGNALS,
+            "/hall/belts": types.BELTS,
             "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
             "/clock": "rosgraph_msgs/msg/Clock",
         }.items():
@@ -205,7 +224,7 @@ def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_ow
         file.finish()
     with open_bag(tmp_path / "bag.mcap") as spaced:
         assert spaced.namespace == "/hall"
-        assert {topic.name for topic in Playback(spaced).topics} == {"line", "signals", "/diagnostics"}
+        assert {topic.name for topic in Playback(spaced).topics} == {"line", "belts", "/diagnostics"}
 
 
 @pytest.mark.parametrize(

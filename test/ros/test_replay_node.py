@@ -13,11 +13,10 @@ from typing import Any
 
 import pytest
 import rclpy
-from bag.small_line import SPEED, TURN
 from conveyor_msgs.msg import Bottles, Line, Signals
 from conveyor_msgs.srv import Seek
 from ros.line_client import PATIENCE, LineClient, until
-from ros.recording import TICKS, record
+from ros.recording import MADE, TICKS, record
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -30,12 +29,12 @@ from conveyor_sim.ros.playback import Message, Playback
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.replay_node import ReplayNode
 
-MADE = {"commands": types.COMMANDS, SPEED: types.SPEED, TURN: types.SPEED}
-
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bag]:
-    with open_bag(record(tmp_path_factory.mktemp("bags") / "short")) as opened:
+    folder = tmp_path_factory.mktemp("bags") / "short"
+    record(folder)
+    with open_bag(folder) as opened:
         yield opened
 
 
