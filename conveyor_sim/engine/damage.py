@@ -4,7 +4,8 @@ A look at the state between two steps: each bottle lists its closed contacts, wi
 there, and adds up its own; what it shares with another both add up. So no bottle writes to what is another's, no sum
 runs over bottles of several threads, and it is the same for every integrator. Nothing is noted within a step.
 
-Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; the entry, negative, of a rail that moves.
+Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a rail
+that moves.
 """
 
 import math
@@ -36,6 +37,8 @@ def note_damage(world: World, member: Member, dt: float) -> None:
 def _note(world: World, damage: Any, member: Member, dt: float) -> None:
     if damage is None:
         return
+    # Rails that move are put in place by one member just before.
+    wait_for_all(member)
     begin, stop = share(member, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
