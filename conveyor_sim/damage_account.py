@@ -27,7 +27,7 @@ PLACES = {
     "opposed_force": ("crushing", "opposed"),
     "impact_speed": ("impacts", "speed"),
     "impact_force": ("impacts", "force"),
-    "tipping": ("tipping", "index"),
+    "tipping": ("tipping", "ratio"),
 }
 """Group and column of the engine."""
 

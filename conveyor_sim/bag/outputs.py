@@ -150,7 +150,9 @@ class Outputs:
         return outcomes
 
     def after_failure(self) -> list[CommandOutcome]:
-        """Writes what is known of a tick that failed: what became of its commands, what the guard says and what went beyond limits."""
+        """Writes what is known of a tick that failed: what became of its commands, what the guard says, and what went
+        beyond limits.
+        """
         outcomes = self._sim.take_outcomes()
         for outcome in outcomes:
             self.tell(outcome)

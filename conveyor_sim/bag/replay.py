@@ -68,9 +68,9 @@ class _Messages:
 def replay(path: str | Path, progress: Callable[[float, float], None] | None = None) -> ReplayReport:
     """Replays a bag (recorded by this package or, the same topics, by stock rosbag2) and compares.
 
-    Bottles, Contacts, Belts, Signals, Ledgers, Damage, RailWear and CommandOutcomes are compared bit for bit where the engine, versions
-    and machine are those of the recording; elsewhere within compare.TOLERANCE, Contacts, Ledgers, Damage and RailWear left out. Stops at
-    the first difference. progress(done, total) is told simulated times, s.
+    Bottles, Contacts, Belts, Signals, Ledgers, Damage, RailWear and CommandOutcomes are compared bit for bit where the
+    engine, versions and machine are those of the recording; elsewhere within compare.TOLERANCE, those in SENSITIVE left
+    out. Stops at the first difference. progress(done, total) is told simulated times, s.
     Raises BagError, and SceneError if the recorded scene is refused.
     """
     with open_bag(path) as bag:

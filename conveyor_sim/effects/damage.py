@@ -26,8 +26,8 @@ def _tipping(scene: Scene, on: Collection[str]) -> Cause | None:
 
 SCUFFING = Effect(
     name="scuffing",
-    law="sliding work at a bottle's wall, sum of |T s| dt over its contacts and the steps; the same, and the impulse of "
-    "normal forces, for each bin of a rail. A contact counts in full for either side",
+    law="sliding work at a bottle's wall, sum of |T s| dt over its contacts and the steps; the same, and the impulse "
+    "of normal forces, for each bin of a rail. A contact counts in full for either side",
     source="added",
     called_for=_asked("scuffing_work"),
     absent="outputs.damage is 0 and there is no limits.scuffing_work",

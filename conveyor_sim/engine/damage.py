@@ -4,7 +4,8 @@ A look at the state between two steps: each bottle lists its closed contacts, wi
 there, and adds up its own; what it shares with another both add up. So no bottle writes to what is another's, no sum
 runs over bottles of several threads, and it is the same for every integrator. Nothing is noted within a step.
 
-Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; the entry, negative, of a rail that moves.
+Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a rail
+that moves.
 """
 
 import math
@@ -36,6 +37,8 @@ def note_damage(world: World, member: Member, dt: float) -> None:
 def _note(world: World, damage: Any, member: Member, dt: float) -> None:
     if damage is None:
         return
+    # Rails that move are put in place by one member just before.
+    wait_for_all(member)
     begin, stop = share(member, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
@@ -58,10 +61,11 @@ def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, born
     if pairs is None:
         return 0
     count = 0
-    for place in range(i * WIDTH, i * WIDTH + min(int(slots.filled[i]), WIDTH)):
-        count = _list_pair(i, int(slots.entry[place]), world, pairs, impacts, borne, count)
-    for place in range(slots.more_start[i], slots.more_start[i + 1]):
-        count = _list_pair(i, int(slots.more_entry[place]), world, pairs, impacts, borne, count)
+    for place in range(int(slots.filled[i])):
+        # In one loop, or all of the law would be compiled twice.
+        further = int(slots.more_start[i]) + place - WIDTH
+        entry = slots.entry[i * WIDTH + place] if place < WIDTH else slots.more_entry[further]
+        count = _list_pair(i, int(entry), world, pairs, impacts, borne, count)
     return count
 
 
@@ -71,9 +75,10 @@ def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne
     p = entry if entry < pairs.i.size else entry - pairs.i.size
     j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
     reach = bottles.radius[i] + bottles.radius[j]
-    overlap, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
-    if overlap <= 0.0 or count == MOST_BORNE:
+    dx, dy = bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i]
+    if dx * dx + dy * dy >= reach * reach or count == MOST_BORNE:
         return count
+    overlap, nx, ny = normal_and_overlap(dx, dy, reach)
     # The law is that of i and j in the order of the pair.
     sign = 1.0 if entry < pairs.i.size else -1.0
     normal, tangential, slip = pair_contact(
@@ -211,7 +216,7 @@ def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
 @part
 def _bin_at(first: int, end: int, way: float) -> int:
     """Which of the bins first to end lies at a share of the way along them."""
-    return first + min(max(int(math.floor(way * (end - first))), 0), end - first - 1)
+    return first + min(max(math.floor(way * (end - first)), 0), end - first - 1)
 
 
 @part
@@ -335,4 +340,4 @@ def _tip(i: int, bottles: Bottles, tipping: Any, borne: Borne, count: int, dt: f
     weight = dt / (dt + tipping.delay[kind])
     tipping.mean_x[i] += weight * (along * fx - under * tipping.fx[i] - tipping.mean_x[i])
     tipping.mean_y[i] += weight * (along * fy - under * tipping.fy[i] - tipping.mean_y[i])
-    _raise(tipping.index, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))
+    _raise(tipping.ratio, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))

@@ -80,7 +80,8 @@ class Impacts(NamedTuple):
 class Tipping(NamedTuple):
     """Overturning moment over the one that weight can hold."""
 
-    index: Worst
+    ratio: Worst
+    """The index of tipping."""
     mean_x: F8
     """(S,), the smoothed moment, as a vector."""
     mean_y: F8
@@ -140,7 +141,7 @@ def worst_columns(damage: Damage) -> Iterator[Worst]:
     if damage.impacts is not None:
         yield from (damage.impacts.speed, damage.impacts.force)
     if damage.tipping is not None:
-        yield damage.tipping.index
+        yield damage.tipping.ratio
 
 
 def slot_columns(damage: Damage) -> Iterator[NDArray[Any]]:

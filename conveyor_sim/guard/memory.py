@@ -13,7 +13,7 @@ from conveyor_sim.state import State
 
 
 class Memory:
-    """One state of the bottles of a State, with peaks, tangential springs, the books of the energy ledger and damage."""
+    """One state of the bottles of a State, with peaks, tangential springs, the energy ledger's books and damage."""
 
     def __init__(self) -> None:
         self._world: World | None = None

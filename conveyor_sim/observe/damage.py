@@ -68,7 +68,7 @@ class DamageEvent:
     """m, its axis at the end of the tick."""
     y: float
     value: float
-    """In the unit of the limit: the largest of the tick; of scuffing all so far; of clogging the time without passage."""
+    """In the unit of the limit: the largest of the tick; of scuffing, all so far; of clogging, the time so far."""
     limit: float
     text: str
     """One sentence."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Final
 
 import matplotlib
@@ -9,8 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize, PowerNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from conveyor_sim.observe.damage import RailWearColumns
 from conveyor_sim.plot import style
@@ -90,17 +92,17 @@ def bin_lines(plant: Plant, wear: RailWearColumns) -> list[Floats]:
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(course, axis=0).T))])
         ends = np.concatenate([[0.0], np.cumsum(wear.length[wear.rail == rail])])
         ends *= way[-1] / ends[-1]
-        for start, end in zip(ends[:-1], ends[1:], strict=True):
+        for start, end in pairwise(ends.tolist()):
             at = np.linspace(start, end, _POINTS_A_BIN)
             lines.append(np.column_stack([np.interp(at, way, course[:, 0]), np.interp(at, way, course[:, 1])]))
     return lines
 
 
 def _draw_heat(ax: Axes, lines: list[Floats], values: Floats, gid: str, unit: str) -> None:
-    """Bins that bore something, the worst on top."""
+    """Bins that bore something, the worst on top; colours by the square root, for a few bins bear most."""
     order = np.argsort(values, kind="stable")
     order = order[values[order] > 0.0]
-    norm = Normalize(0.0, float(values.max(initial=0.0)) or 1.0)
+    norm = PowerNorm(0.5, 0.0, float(values.max(initial=0.0)) or 1.0)
     collection = LineCollection(
         [lines[index] for index in order], cmap=HEAT, norm=norm, linewidths=5.0, zorder=Z_RAIL + 0.1, gid=gid
     )
@@ -108,7 +110,7 @@ def _draw_heat(ax: Axes, lines: list[Floats], values: Floats, gid: str, unit: st
     ax.add_collection(collection)
     bar = ax.figure.colorbar(ScalarMappable(norm, HEAT), ax=ax, aspect=25, pad=0.02, shrink=0.9)
     bar.set_label(unit)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
 
 
 def _most(plant: Plant, wear: RailWearColumns, values: Floats, unit: str) -> str:
@@ -126,13 +128,10 @@ def _draw_spread(ax: Axes, name: str, values: Floats, limit: float | None) -> No
     ax.set_title(what)
     ax.set_xlabel(f"{name.replace('_', ' ')} ({unit})")
     ax.set_ylabel("bottles")
-    ax.yaxis.get_major_locator().set_params(integer=True)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.grid(True, axis="y")
     ax.set_xlim(0.0, reach)
     if limit is not None:
         beyond = int(np.count_nonzero(values > limit))
         ax.axvline(limit, color=style.FORCE, linewidth=1.4, linestyle="dashed", gid=f"limit {name}")
-        ax.plot(
-            [], [], color=style.FORCE, linestyle="dashed", label=f"limit {limit:g}: {beyond} of {len(values)} beyond"
-        )
-        ax.legend(loc="upper right", fontsize=8.5)
+        ax.set_xlabel(f"{ax.get_xlabel()}; {beyond} of {len(values)} beyond {limit:g}")

@@ -5,7 +5,19 @@ from inspect import getdoc
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import accuracy, belts, contacts, drives, indicators, machines, movers, rails, schema, sensors
+from conveyor_sim.scene import (
+    accuracy,
+    belts,
+    contacts,
+    drives,
+    indicators,
+    limits,
+    machines,
+    movers,
+    rails,
+    schema,
+    sensors,
+)
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -68,6 +80,7 @@ SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
     ("An entry of `bottles`: a grid", schema.Grid),
     ("`grid`", schema.GridOfBottles),
     ("`outputs`", schema.Outputs),
+    ("`limits`", limits.Limits),
 )
 
 

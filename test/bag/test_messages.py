@@ -13,6 +13,7 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns
+from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import balance
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -27,6 +28,10 @@ LEDGER = balance(
     contact_friction=0.25,
     damping=0.125,
 )
+BORNE = DamageColumns(
+    np.arange(4, dtype=np.uint64), np.zeros(4, np.uint16), *np.append(np.arange(31.0), math.nan).reshape(8, 4)
+)
+WEAR = RailWearColumns(np.arange(3, dtype=np.uint32), *np.arange(15.0).reshape(5, 3))
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(5), HEADER)),
     "no bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(0), HEADER)),
@@ -36,6 +41,12 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "signals": (messages.SIGNALS, lambda: messages.signals_message(np.array([1.0, math.nan]), HEADER)),
     "ledger": (messages.LEDGER, lambda: messages.ledger_message(LEDGER, HEADER)),
     "bool": (messages.BOOL, lambda: messages.bool_message(True, HEADER)),
+    "damage": (messages.DAMAGE, lambda: messages.damage_message(BORNE, HEADER)),
+    "rail wear": (messages.RAIL_WEAR, lambda: messages.rail_wear_message(WEAR, HEADER)),
+    "damage event": (
+        messages.DAMAGE_EVENT,
+        lambda: messages.damage_event_message(DamageEvent(9, "tipping", 3, 0.5, -0.25, 1.5, 1.0, "it tips"), HEADER),
+    ),
     "poses": (messages.POSES, lambda: messages.poses_message(bottles(7), HEADER)),
     "no poses": (messages.POSES, lambda: messages.poses_message(bottles(0), HEADER)),
     "outcome": (

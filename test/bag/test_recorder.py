@@ -34,7 +34,7 @@ COUNTS = {
     "/belts": 51,
     "/signals": 101,
 }
-SILENT = {"/guard": 0, "/ledger": 0}
+SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events"), 0)
 """Nothing was to be told, nothing asked for."""
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from scenes import NO_FLOOR, arc, base, belt, bottle, contact, kind, line, scene, segment
+from scenes import NO_FLOOR, NO_OUTPUTS, arc, base, belt, bottle, contact, kind, line, scene, segment
 
 from conveyor_sim.effects import EFFECTS, choose_effects, most_bottles
 from conveyor_sim.errors import SceneError
@@ -153,6 +153,22 @@ def choices(**fields: Any) -> dict[str, str]:
                 "energy_ledger": "outputs.ledger: 5 Hz",
             },
         ),
+        (
+            {"outputs": {**NO_OUTPUTS, "damage": 5}, "limits": {"opposed_force": 20}, "bottles": TWO[:1]},
+            {
+                "scuffing": "outputs.damage: 5 Hz",
+                "crushing": "limits.opposed_force: 20",
+                "impacts": "outputs.damage: 5 Hz",
+            },
+        ),
+        (
+            {
+                "bottle_types": {"bottle": kind(contact_height=0.1, gravity_height=0.08)},
+                "limits": {"tipping": 0.8},
+                "bottles": TWO[:1],
+            },
+            {"tipping": "limits.tipping: 0.8"},
+        ),
     ],
 )  # fmt: skip
 def test_what_calls_for_an_effect(fields: dict[str, Any], expected: dict[str, str]) -> None:
@@ -167,7 +183,7 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
     off = [choice.name for choice in choose_effects(scene(**line())) if not choice.on]
     assert off == [
         "hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction", "tangential_spring",
-        "ring_base", "peaks", "contact_arrays", "energy_ledger",
+        "ring_base", "peaks", "contact_arrays", "energy_ledger", "scuffing", "crushing", "impacts", "tipping",
     ]  # fmt: skip
 
 
