@@ -13,7 +13,7 @@ from .compile import part
 from .keep import keep_deepest
 from .moving_arrays import PHASES, MovingRails
 from .segment import segment_contact
-from .team import UNIT, units
+from .team import UNIT, units, wait_for_all
 
 MOVING = 1 << 40
 """Added to the number of a moving rail, in `RailContacts.entry`."""
@@ -30,12 +30,13 @@ def place_rails(moving: Any, member: Member, dt: float) -> None:
 
 @part
 def pass_step(moving: Any, member: Member, dt: float) -> None:
-    """Move the rails on by a step; right after a `wait_for_all`, and seen by all after the next."""
+    """Move the rails on by a step, right after a `wait_for_all`; all see it on return."""
     if moving is None:
         return
     if member.rank == 0:
         moving.clock[0] += 1.0
         _place(moving, moving.clock[0] * dt)
+    wait_for_all(member)
 
 
 @part

@@ -13,12 +13,12 @@ from conveyor_sim.simulation import Simulation
 STROKE, TOP, ACCELERATION = 0.3, 0.5, 2.0
 
 
-def alone(*bottles: dict[str, Any]) -> Simulation:
+def alone(*bottles: dict[str, Any], **more: Any) -> Simulation:
     """A pusher, and a gate that is open at the start, far away."""
     steel = {"material": "steel", "max_speed": TOP, "acceleration": ACCELERATION}
     pusher = {"from": [0.0, -0.2], "to": [0.0, 0.2], "direction": 0.0, "stroke": STROKE, **steel}
     gate = {"kind": "swing", "from": [9.0, 5.0], "to": [9.5, 5.0], "angle": "-90 deg", "open": True, **steel}
-    return plant(*bottles, pushers={"p": pusher}, gates={"g": gate}, diverters={})
+    return plant(*bottles, pushers={"p": pusher}, gates={"g": gate}, diverters={}, **more)
 
 
 def seen(sim: Simulation, name: str) -> tuple[float, ...]:
@@ -75,3 +75,15 @@ def test_a_jammed_rail_stands_where_it_was_and_goes_on_when_it_is_free() -> None
     way = place * STROKE
     sim.advance(math.ceil(100.0 * 2.0 * math.sqrt(way / ACCELERATION)) + 1)
     assert seen(sim, "pushers/p") == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+
+
+def test_no_bottle_enters_where_a_rail_stands() -> None:
+    """It waits until the pusher is home again."""
+    feed = {"bottle": "bottle", "position": [0.25, 0.0], "direction": 0.0, "speed": 0.2, "rate": 1.0, "start": 1.0}
+    sim = alone(infeeds={"in": feed})
+    sim.command(["pushers/p/push"], [1])
+    sim.advance(110)
+    assert (sim.counts.fed, sim.counts.blocked_ticks) == (0, 11)
+    sim.command(["pushers/p/push"], [0])
+    sim.advance(85)
+    assert sim.counts.fed == 1
