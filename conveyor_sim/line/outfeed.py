@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.schema import Outfeed, Scene
+from conveyor_sim.scene.schema import Outfeed
 
 
 class OutfeedDevice(Device):
@@ -29,11 +29,6 @@ class OutfeedDevice(Device):
     def values(self, now: Now) -> Sequence[float]:
         """Bottles removed so far."""
         return (self.removed,)
-
-
-def outfeed_devices(scene: Scene) -> list[OutfeedDevice]:
-    """One device an outfeed."""
-    return [OutfeedDevice(name, outfeed) for name, outfeed in scene.outfeeds.items()]
 
 
 def in_polygon(corners: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -20,7 +20,8 @@ def eye_line(speed: float = SPEED, xs: tuple[float, ...] = (0.0,), **fields: Any
         "base": base(0.4),
         "contacts": [contact(5000.0, damping=("normal", 5.0))],
         "belts": {"belt": belt(speed, (-4.0, -1.0), 6.0, 2.0), "plate": belt(speed, (2.0, -1.0), 4.0, 2.0)},
-        "bottles": [bottle(x, 0.0, speed) for x in xs],
+        # One that is never in the way, for bottles that can touch are another kernel than one alone.
+        "bottles": [*(bottle(x, 0.0, speed) for x in xs), bottle(-3.8, 0.9, speed)],
     }
     return simulation(**{**given, **fields})
 

@@ -19,7 +19,7 @@ def test_counters_count_by_direction_and_there_and_back() -> None:
     assert read(sim, "counters/there/") == {"forward": 3.0, "backward": 0.0}
     assert read(sim, "counters/turned/") == {"forward": 0.0, "backward": 3.0}
     assert read(sim, "counters/short/") == {"forward": 0.0, "backward": 0.0}
-    assert read(sim)["belts/belt/bottles"] == 3.0
+    assert read(sim)["belts/belt/bottles"] == 4.0
     sim.command([RUN], [-0.5])
     sim.advance(170)
     assert read(sim, "counters/there/") == {"forward": 3.0, "backward": 3.0}

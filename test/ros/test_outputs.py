@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseArray
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from visualization_msgs.msg import Marker, MarkerArray
 
 from conveyor_sim.bag.outputs import OUTPUTS
@@ -95,6 +95,25 @@ def test_the_line_and_the_plant_reach_whoever_joins_late(line: LineClient) -> No
     assert list(told.belts) == ["feeder", "table"]
     assert list(told.command_names) == [FEEDER, "belts/table/cmd_speed"]
     assert {marker.action for marker in plant.markers} <= {Marker.ADD, Marker.DELETEALL}
+
+
+def test_a_photo_eye_has_a_topic_that_tells_changes_and_reaches_who_joins_late(line: LineClient) -> None:
+    simulation, levels = Simulation(load_scene(SMALL_LINE)), [False]
+    while simulation.tick < 200:
+        simulation.advance()
+        levels.append(simulation.photo_eyes()["photo_eyes/entry"])
+    changes = [tick for tick in range(1, 201) if levels[tick] != levels[tick - 1]]
+    assert len(changes) > 3
+    now = 0
+    with line.listen(Bool, "photo_eyes/entry", "photo_eyes") as heard:
+        heard.first()
+        for count, tick in enumerate(changes, start=2):
+            line.step(tick - now)
+            now = tick
+            until(lambda count=count: len(heard.messages) >= count, "a change of the photo-eye")
+        assert [message.data for message in heard.messages] == [False, *(levels[tick] for tick in changes)]
+    with line.listen(Bool, "photo_eyes/entry", "photo_eyes") as late:
+        assert late.first().data is levels[now]
 
 
 def test_markers_show_every_bottle(line: LineClient) -> None:
