@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -23,6 +25,8 @@ from conveyor_sim.plot.views import WIDTH, colour_bar, draw_view, force_scale, i
 
 _ROW: Final = 0.36  # inches, of one trace
 _NAME: Final = 0.3  # and of its name
+_LETTERS: Final = 115  # that fit across
+_LEAST_FORCE: Final = 1e-3  # N; what is left where bottles have come to rest is less
 _DASHES: Final = (0, (2.0, 2.0))
 
 
@@ -48,6 +52,7 @@ def moment_figure(
     plant: Plant,
     frame: Frame,
     title: str,
+    text: str,
     blocked: Collection[str],
     time: Floats,
     traces: Sequence[Trace],
@@ -55,19 +60,22 @@ def moment_figure(
 ) -> Figure:
     """The plant at the time of `frame`; under it the traces, one a row, over `time` (n,) s, which ends at that time.
 
-    blocked: names of the photo-eyes that tell of a bottle then.
+    text: what happened. blocked: names of the photo-eyes that tell of a bottle then.
     """
     box = whole_region(plant, [frame])
     inches = WIDTH - 0.8
     height = float(np.clip(inches * (box[3] - box[1]) / (box[2] - box[0]), 2.0, 7.0))
     figure = style.new_figure(WIDTH, height + 2.6 + (_ROW + _NAME) * len(traces))
     heading(figure, title)
+    happened = "\n".join(wrap(f"{instant(frame)}. {text}", _LETTERS))
     grid = figure.add_gridspec(1 + len(traces), 1, height_ratios=[height, *[_ROW] * len(traces)])
     view = figure.add_subplot(grid[0])
-    norm, forces = speed_scale([frame]), force_scale([frame], inches * 72.0 / (box[2] - box[0]), 0.0)
+    norm, forces = _speeds(plant, frame), None
+    if frame.contacts is not None and frame.contacts.force.max(initial=0.0) >= _LEAST_FORCE:
+        forces = force_scale([frame], inches * 72.0 / (box[2] - box[0]), 0.0)
     draw_view(view, plant, frame, norm, forces, box, inches)
     _draw_blocked(view, plant, blocked)
-    view.set_title(instant(frame), fontweight="normal")
+    view.set_title(happened, fontweight="normal")
     colour_bar(figure, [view], [frame], norm, "horizontal")
     rows = [figure.add_subplot(grid[1 + row]) for row in range(len(traces))]
     for row, (ax, trace) in enumerate(zip(rows, traces, strict=True)):
@@ -84,6 +92,13 @@ def moment_figure(
     labels = mark_labels(plant) + sensor_labels(plant) + belt_labels(plant, frame.belt_speeds)
     place(view, labels, plant, np.stack([frame.x, frame.y], axis=1))
     return figure
+
+
+def _speeds(plant: Plant, frame: Frame) -> Normalize:
+    """Colours from rest to the fastest there is, or was at first: what has come to rest must look it."""
+    norm = speed_scale([frame])
+    fastest = 1.05 * float(np.abs(plant.speeds).max(initial=0.0))
+    return Normalize(0.0, max(norm.vmax or 0.0, fastest)) if fastest else norm
 
 
 def _draw_blocked(ax: Axes, plant: Plant, blocked: Collection[str]) -> LineCollection:

@@ -17,10 +17,6 @@ Condition = Callable[["Present"], Any]
 _PLAIN = (str, int, float)
 
 
-class ConditionFailed(AssertionError):
-    """A condition asserted over simulated time that did not hold; the text says which, when, and the signals."""
-
-
 class Present(Inputs):
     """Signals and alarms at a tick, by name; notes which of them are read."""
 

@@ -18,8 +18,7 @@ PICTURE = "line.png"
 
 EYES = "photo_eyes/"
 
-_LEAST = 10.0  # s of traces
-_BEFORE = 0.2  # of the time for which a condition was asserted, shown before it
+_BEFORE = 20.0  # s of traces, before what was asserted
 _MOST_ROWS = 10
 _MOST_EVENTS = 4
 
@@ -30,20 +29,20 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
     Raises ConveyorError if the file can't be written.
     """
     failed, history, time = scenario.failed, scenario.history, scenario.history.time
-    length = _LEAST if failed is None else max(_LEAST, (1.0 + _BEFORE) * (scenario.time - failed.since))
+    length = _BEFORE + (0.0 if failed is None else scenario.time - failed.since)
     shown = slice(int(np.searchsorted(time, time[-1] - length - 1e-9)), None)
     traces = [Trace(name, history.unit(name), history.kind(name), history[name][shown]) for name in _names(scenario)]
     events = [Event(mark.time, f"{mark.name} = {mark.value:g}") for mark in history.marks][-_MOST_EVENTS:]
     if failed is not None and failed.since < scenario.time:
         events.append(Event(failed.since, f"{failed.word} asserted"))
-    title = ": ".join(filter(None, (scenario.scene.name, scenario.failure)))
     eyes = [name for name in history.names if name.startswith(EYES) and name.endswith("/blocked")]
     blocked = {name.split("/")[1] for name in eyes if history[name][-1]}
     with style.look():
         figure = moment_figure(
             Plant.of(scenario.scene),
             _frame(scenario),
-            title,
+            scenario.scene.name,
+            scenario.failure,
             blocked,
             time[shown],
             traces,

@@ -19,7 +19,7 @@ from conveyor_sim.line.line import FAULT
 from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.testing.conditions import Condition, ConditionFailed, Present, text_of, values
+from conveyor_sim.testing.conditions import Condition, Present, text_of, values
 from conveyor_sim.testing.history import History
 
 CONTROLLER = "controller"
@@ -145,21 +145,24 @@ class Scenario(AbstractContextManager["Scenario"]):
     def run_for(self, seconds: float) -> None:
         """Let time pass, rounded up to whole ticks.
 
-        Raises ConditionFailed for what must always or never be, CommandError for a command of the controller that is
+        Raises AssertionError for what must always or never be, CommandError for a command of the controller that is
         refused, SimulationError.
         """
+        __tracebackhide__ = True
         for _ in range(self._ticks(seconds)):
             self._step()
 
     def run_until(self, condition: Condition, within: float) -> float:
         """Let time pass until a condition is true, and return the seconds that took; none if it is true already.
 
-        For what a scenario needs to begin with; raises ConditionFailed if it takes more than `within` seconds.
+        For what a scenario needs to begin with; raises AssertionError if it takes more than `within` seconds.
         """
+        __tracebackhide__ = True
         return self._wait(Watch(condition, "run_until", self.time), within)
 
     def eventually(self, condition: Condition, within: float) -> float:
         """Assert that a condition comes true within so many seconds, let them pass until then; returns how many."""
+        __tracebackhide__ = True
         return self._wait(Watch(condition, "eventually", self.time), within)
 
     def always(self, condition: Condition, for_: float | None = None) -> None:
@@ -167,10 +170,12 @@ class Scenario(AbstractContextManager["Scenario"]):
 
         for_: None: lets no time pass, and asserts it at every tick of whatever is run later.
         """
+        __tracebackhide__ = True
         self._hold(Watch(condition, "always", self.time), for_)
 
     def never(self, condition: Condition, for_: float | None = None) -> None:
         """Assert that a condition is true at no tick, as `always` does."""
+        __tracebackhide__ = True
         self._hold(Watch(condition, "never", self.time), for_)
 
     def _hold(self, watch: Watch, for_: float | None) -> None:
@@ -207,7 +212,7 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _fail(self, watch: Watch, head: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
         self.failed, self.failure = watch, head
-        raise ConditionFailed(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
+        raise AssertionError(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
 
     def _step(self) -> None:
         __tracebackhide__ = True
