@@ -25,7 +25,7 @@ from conveyor_sim.plot.views import WIDTH, colour_bar, draw_view, force_scale, i
 
 _ROW: Final = 0.36  # inches, of one trace
 _NAME: Final = 0.3  # and of its name
-_LETTERS: Final = 115  # that fit across
+_LETTERS: Final = 120  # that fit across
 _LEAST_FORCE: Final = 1e-3  # N; what is left where bottles have come to rest is less
 _DASHES: Final = (0, (2.0, 2.0))
 
@@ -67,7 +67,7 @@ def moment_figure(
     height = float(np.clip(inches * (box[3] - box[1]) / (box[2] - box[0]), 2.0, 7.0))
     figure = style.new_figure(WIDTH, height + 2.6 + (_ROW + _NAME) * len(traces))
     heading(figure, title)
-    happened = "\n".join(wrap(f"{instant(frame)}. {text}", _LETTERS))
+    happened = "\n".join([instant(frame), *wrap(text, _LETTERS)])
     grid = figure.add_gridspec(1 + len(traces), 1, height_ratios=[height, *[_ROW] * len(traces)])
     view = figure.add_subplot(grid[0])
     norm, forces = _speeds(plant, frame), None

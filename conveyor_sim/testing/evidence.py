@@ -31,7 +31,7 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
     failed, history, time = scenario.failed, scenario.history, scenario.history.time
     length = _BEFORE + (0.0 if failed is None else scenario.time - failed.since)
     shown = slice(int(np.searchsorted(time, time[-1] - length - 1e-9)), None)
-    traces = [Trace(name, history.unit(name), history.kind(name), history[name][shown]) for name in _names(scenario)]
+    traces = [Trace(name, history.unit(name), history.kind(name), history[name][shown]) for name in traced(scenario)]
     events = [Event(mark.time, f"{mark.name} = {mark.value:g}") for mark in history.marks][-_MOST_EVENTS:]
     if failed is not None and failed.since < scenario.time:
         events.append(Event(failed.since, f"{failed.word} asserted"))
@@ -61,7 +61,7 @@ def keep_bag(scenario: Scenario, bag: Path, folder: Path) -> Path:
     return folder
 
 
-def _names(scenario: Scenario) -> list[str]:
+def traced(scenario: Scenario) -> list[str]:
     """What to trace: what the last conditions read, the alarms, the commands in force, what the controller reads."""
     history = scenario.history
     commands = [name for name in scenario.simulation.process_image.command_names if np.isfinite(history[name][-1])]
