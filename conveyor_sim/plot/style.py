@@ -106,6 +106,16 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     return [png, svg]
 
 
+def save_png(figure: Figure, path: Path) -> Path:
+    """Write a PNG alone. Raises ConveyorError if it can't be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=_PNG_DPI, metadata={"Software": None})
+    except OSError as error:
+        raise ConveyorError(f"{path} can't be written: {error.strerror or error}") from error
+    return path
+
+
 def pale(colour: NDArray[np.float64], strength: float) -> NDArray[np.float64]:
     """RGBA colours (..., 4) mixed with white; `strength` 1 leaves them as they are, 0 gives white."""
     mixed = 1.0 - strength * (1.0 - colour)

@@ -20,7 +20,7 @@ from conveyor_sim.plot.plant import draw_plant
 Box = tuple[float, float, float, float]
 Orientation = Literal["horizontal", "vertical"]
 
-_WIDTH: Final = 11.0  # inches
+WIDTH: Final = 11.0  # inches
 _POINTS: Final = 72.0  # an inch
 # With more circles and lines than this an SVG would weigh a megabyte, so it holds them as a picture.
 _MANY: Final = 5000
@@ -35,21 +35,21 @@ def table_figure(plant: Plant, frames: Sequence[Frame], title: str, peak: float 
     width, height = box[2] - box[0], box[3] - box[1]
     columns = _columns(len(frames), height / width)
     rows = -(-len(frames) // columns)
-    panel = (_WIDTH - 1.3) / columns - 0.25
-    figure = style.new_figure(_WIDTH, 0.8 + rows * (panel * height / width + 0.4))
+    panel = (WIDTH - 1.3) / columns - 0.25
+    figure = style.new_figure(WIDTH, 0.8 + rows * (panel * height / width + 0.4))
     _heading(figure, title)
     seen = [frame.within(box) for frame in frames]
     norm = speed_scale(seen)
-    forces = _force_scale(seen, panel * _POINTS / width, peak)
+    forces = force_scale(seen, panel * _POINTS / width, peak)
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for ax, frame in zip(axes.flat, seen, strict=False):
-        _draw(ax, plant, frame, norm, forces, box, panel)
-        ax.set_title(f"{_instant(frame)} in view", fontweight="normal")
+        draw_view(ax, plant, frame, norm, forces, box, panel)
+        ax.set_title(f"{instant(frame)} in view", fontweight="normal")
         ax.label_outer()
     for ax in axes.flat[len(frames) :]:
         ax.set_visible(False)
     _lighten(axes.flat[: len(frames)], seen)
-    _colour_bar(figure, list(axes.flat[: len(frames)]), seen, norm, "vertical")
+    colour_bar(figure, list(axes.flat[: len(frames)]), seen, norm, "vertical")
     if forces is not None:
         forces.legend(figure)
     return figure
@@ -60,18 +60,18 @@ def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> F
 
     `peak` (N) is the largest force of the run, see ForceScale.
     """
-    box = _whole(plant, [frame])
+    box = whole_region(plant, [frame])
     width, height = box[2] - box[0], box[3] - box[1]
-    inches = _WIDTH - 0.8
-    figure = style.new_figure(_WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.6)
+    inches = WIDTH - 0.8
+    figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.6)
     _heading(figure, title)
     norm = speed_scale([frame])
-    forces = _force_scale([frame], inches * _POINTS / width, peak)
+    forces = force_scale([frame], inches * _POINTS / width, peak)
     ax = figure.subplots()
-    _draw(ax, plant, frame, norm, forces, box, inches)
+    draw_view(ax, plant, frame, norm, forces, box, inches)
     _lighten([ax], [frame])
-    ax.set_title(_instant(frame), fontweight="normal")
-    _colour_bar(figure, [ax], [frame], norm, "horizontal")
+    ax.set_title(instant(frame), fontweight="normal")
+    colour_bar(figure, [ax], [frame], norm, "horizontal")
     if forces is not None:
         forces.legend(figure)
     labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant)
@@ -81,16 +81,16 @@ def plant_figure(plant: Plant, frame: Frame, title: str, peak: float = 0.0) -> F
 
 def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
     """The plant as its scene describes it, rails named too, with the bottles that it starts with."""
-    box = _whole(plant, [frame])
+    box = whole_region(plant, [frame])
     width, height = box[2] - box[0], box[3] - box[1]
-    inches = _WIDTH - 0.8
-    figure = style.new_figure(_WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.4)
+    inches = WIDTH - 0.8
+    figure = style.new_figure(WIDTH, float(np.clip(inches * height / width, 3.0, 11.0)) + 1.4)
     _heading(figure, title)
     norm = speed_scale([frame])
     ax = figure.subplots()
-    _draw(ax, plant, frame, norm, None, box, inches)
+    draw_view(ax, plant, frame, norm, None, box, inches)
     _lighten([ax], [frame])
-    _colour_bar(figure, [ax], [frame], norm, "horizontal")
+    colour_bar(figure, [ax], [frame], norm, "horizontal")
     labels = mark_labels(plant) + belt_labels(plant, frame.belt_speeds) + sensor_labels(plant) + rail_labels(plant)
     place(ax, labels, plant, np.stack([frame.x, frame.y], axis=1))
     return figure
@@ -99,7 +99,7 @@ def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
 def table_region(plant: Plant, frames: Sequence[Frame]) -> Box:
     """The box around the widest belt and a bottle's width more; the whole plant if that is nearly all of it."""
     if not plant.belts:
-        return _whole(plant, frames)
+        return whole_region(plant, frames)
     widest = int(np.argmax([belt.width for belt in plant.belts]))
     diameter = 2.0 * max((float(frame.radius.max(initial=0.0)) for frame in frames), default=0.0)
     x0, y0, x1, y1 = box_around(plant.belt_outline(widest))
@@ -107,11 +107,11 @@ def table_region(plant: Plant, frames: Sequence[Frame]) -> Box:
     box = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
     px0, py0, px1, py1 = plant.bounds()
     if (box[2] - box[0]) * (box[3] - box[1]) > 0.7 * (px1 - px0) * (py1 - py0):
-        return _whole(plant, frames, 0.04)
+        return whole_region(plant, frames, 0.04)
     return box
 
 
-def _draw(
+def draw_view(
     ax: Axes, plant: Plant, frame: Frame, norm: Normalize, forces: ForceScale | None, box: Box, inches: float
 ) -> None:
     """Plant, bottles and forces within `box`, on axes that will be about `inches` wide."""
@@ -139,14 +139,14 @@ def _lighten(axes: Iterable[Axes], frames: Sequence[Frame]) -> None:
                     collection.set_rasterized(True)
 
 
-def _force_scale(frames: Sequence[Frame], points_per_metre: float, peak: float) -> ForceScale | None:
+def force_scale(frames: Sequence[Frame], points_per_metre: float, peak: float) -> ForceScale | None:
     """The largest force as wide as half a bottle, so that chains of force don't merge."""
     radii = np.concatenate([frame.radius for frame in frames]) if frames else np.empty(0)
     radius = float(np.median(radii)) if len(radii) else 0.0
     return ForceScale.covering(frames, float(np.clip(radius * points_per_metre, 1.5, 7.0)), peak)
 
 
-def _whole(plant: Plant, frames: Sequence[Frame], share: float = 0.09) -> Box:
+def whole_region(plant: Plant, frames: Sequence[Frame], share: float = 0.09) -> Box:
     """The box around plant and bottles and a margin, of `share` of its size, for names."""
     bounds = [plant.bounds()]
     for frame in frames:
@@ -170,7 +170,7 @@ def _columns(panels: int, aspect: float) -> int:
     return min(range(1, panels + 1), key=shape)
 
 
-def _colour_bar(
+def colour_bar(
     figure: Figure, axes: Sequence[Axes], frames: Sequence[Frame], norm: Normalize, orientation: Orientation
 ) -> None:
     fastest = max(float(frame.speed.max(initial=0.0)) for frame in frames)
@@ -192,7 +192,7 @@ def _heading(figure: Figure, title: str) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=13.0, fontweight="bold")
 
 
-def _instant(frame: Frame) -> str:
+def instant(frame: Frame) -> str:
     """Time and number of bottles, in words; hundredths of a second unless the tick is finer."""
     hundredths = abs(frame.time - round(frame.time, 2)) < 1e-9
     bottles = "1 bottle" if len(frame.x) == 1 else f"{len(frame.x)} bottles"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import CodeType
 from typing import Any
 
-from conveyor_sim.control.scan import ALARMS, Inputs
+from conveyor_sim.control.scan import Inputs
 
 Condition = Callable[["Present"], Any]
 """A plain function of the present signals, true or false: `lambda s: s["belts/table/bottles"] < 40`."""
@@ -17,26 +17,18 @@ Condition = Callable[["Present"], Any]
 _PLAIN = (str, int, float)
 
 
-class ConditionFailed(AssertionError):
-    """A condition asserted over simulated time that did not hold; the text says which, when, and the signals."""
-
-
 class Present(Inputs):
     """Signals and alarms at a tick, by name; notes which of them are read."""
 
-    __slots__ = ("_scanned", "read")
+    __slots__ = ("read",)
 
-    def __init__(self, signals: Mapping[str, float], time: float, tick: int, length: float, scanned: bool) -> None:
-        """scanned: whether alarms are known; until the first scan none stands."""
+    def __init__(self, signals: Mapping[str, float], time: float, tick: int, length: float) -> None:
         super().__init__(signals, time, tick, length)
-        self._scanned = scanned
         self.read: dict[str, None] = {}
         """Names, in the order of the first reading."""
 
     def __getitem__(self, name: str) -> float:
         """The value of a signal, or of an alarm by its whole name. Raises NoSuchSignal, which is a KeyError."""
-        if not self._scanned and name.startswith(ALARMS):
-            return 0.0
         value = super().__getitem__(name)
         self.read[name] = None
         return value

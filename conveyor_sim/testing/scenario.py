@@ -19,7 +19,7 @@ from conveyor_sim.line.line import FAULT
 from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.testing.conditions import Condition, ConditionFailed, Present, text_of, values
+from conveyor_sim.testing.conditions import Condition, Present, text_of, values
 from conveyor_sim.testing.history import History
 
 CONTROLLER = "controller"
@@ -50,8 +50,8 @@ class Watch:
 class Scenario(AbstractContextManager["Scenario"]):
     """A line under test. All times are simulated; conditions are evaluated at every tick.
 
-    The controller's first scan is at the end of the tick after `attach`, as over the service `lockstep`, and then there
-    is one a tick: it sees the signals of a tick, and its commands act from that tick on.
+    The controller's first scan is at the tick at which it is attached, then there is one a tick, as with
+    `controller_node` in lockstep: it sees the signals of a tick, and its commands act from that tick on.
     """
 
     def __init__(
@@ -77,15 +77,16 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.history = History(self.simulation.process_image)
         self.failed: Watch | None = None
         """The condition that failed."""
-        self.of_interest: dict[str, None] = {}
-        """Names that conditions and the controller have read, the last condition's last."""
+        self.failure = ""
+        """What became of it, in words."""
+        self._read: dict[str, None] = {}
+        self._scan_read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag)
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
         self._outputs.start()
         self._controller: Controller | None = None
         self._answer: dict[str, float] = {}
         self._alarms: dict[str, float] = {}
-        self._scanned = False
         self._standing: list[Watch] = []
         self._signals: dict[str, float] = {}
         self._look()
@@ -106,19 +107,27 @@ class Scenario(AbstractContextManager["Scenario"]):
     @property
     def signals(self) -> Present:
         """The present signals by name, alarms among them ("alarms/<name>")."""
-        return Present(
-            {**self._signals, **self._alarms}, self.time, self.simulation.tick, self.scene.tick, self._scanned
-        )
+        return self._present({**self._signals, **self._alarms})
 
     @property
     def alarms(self) -> frozenset[str]:
         """Names of the alarms that stand, as told by the controller's last scan."""
         return frozenset(name.removeprefix(ALARMS) for name, value in self._alarms.items() if value >= ON)
 
+    @property
+    def read_by_conditions(self) -> tuple[str, ...]:
+        """Names of the signals that conditions have read, those of the last one first."""
+        return tuple(self._read)
+
+    @property
+    def read_by_controller(self) -> tuple[str, ...]:
+        """Names of the signals that the controller has read."""
+        return tuple(self._scan_read)
+
     def attach(self, controller: Controller) -> None:
-        """Have a controller scan at every tick from the next one on, in place of the one before."""
-        self._controller, self._answer, self._alarms, self._scanned = controller, {}, {}, False
-        self.history.alarms(dict.fromkeys(self._known_alarms(), 0.0))
+        """Have a controller scan at this tick and every one to come, in place of the one before."""
+        self._controller = controller
+        self._scan(controller)
 
     def command(self, name: str, value: float) -> None:
         """Give a command for the next tick; one of the controller's of the same name comes after it.
@@ -136,21 +145,24 @@ class Scenario(AbstractContextManager["Scenario"]):
     def run_for(self, seconds: float) -> None:
         """Let time pass, rounded up to whole ticks.
 
-        Raises ConditionFailed for what must always or never be, CommandError for a command of the controller that is
+        Raises AssertionError for what must always or never be, CommandError for a command of the controller that is
         refused, SimulationError.
         """
+        __tracebackhide__ = True
         for _ in range(self._ticks(seconds)):
             self._step()
 
     def run_until(self, condition: Condition, within: float) -> float:
         """Let time pass until a condition is true, and return the seconds that took; none if it is true already.
 
-        For what a scenario needs to begin with; raises ConditionFailed if it takes more than `within` seconds.
+        For what a scenario needs to begin with; raises AssertionError if it takes more than `within` seconds.
         """
+        __tracebackhide__ = True
         return self._wait(Watch(condition, "run_until", self.time), within)
 
     def eventually(self, condition: Condition, within: float) -> float:
         """Assert that a condition comes true within so many seconds, let them pass until then; returns how many."""
+        __tracebackhide__ = True
         return self._wait(Watch(condition, "eventually", self.time), within)
 
     def always(self, condition: Condition, for_: float | None = None) -> None:
@@ -158,10 +170,12 @@ class Scenario(AbstractContextManager["Scenario"]):
 
         for_: None: lets no time pass, and asserts it at every tick of whatever is run later.
         """
+        __tracebackhide__ = True
         self._hold(Watch(condition, "always", self.time), for_)
 
     def never(self, condition: Condition, for_: float | None = None) -> None:
         """Assert that a condition is true at no tick, as `always` does."""
+        __tracebackhide__ = True
         self._hold(Watch(condition, "never", self.time), for_)
 
     def _hold(self, watch: Watch, for_: float | None) -> None:
@@ -192,15 +206,13 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     def _true(self, watch: Watch, present: Present) -> bool:
         true = bool(watch.condition(present))
-        for name in present.read:
-            self.of_interest.pop(name, None)
-            self.of_interest[name] = None
+        self._read = {**present.read, **self._read}
         return true
 
     def _fail(self, watch: Watch, head: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
-        self.failed = watch
-        raise ConditionFailed(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
+        self.failed, self.failure = watch, head
+        raise AssertionError(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
 
     def _step(self) -> None:
         __tracebackhide__ = True
@@ -232,18 +244,16 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._signals = dict(zip(self.simulation.process_image.signal_names, now.tolist(), strict=True))
 
     def _scan(self, controller: Controller) -> None:
-        inputs = Present(self._signals, self.time, self.simulation.tick, self.scene.tick, True)
+        inputs = self._present(self._signals)
         answer = controller.scan(inputs)
-        self._scanned = True
-        for name in inputs.read:
-            self.of_interest.setdefault(name)
+        self._scan_read |= inputs.read
         self._answer = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
         told = {name: float(value) for name, value in answer.items() if name.startswith(ALARMS)}
         self._alarms = {**dict.fromkeys(self._alarms, 0.0), **told}
         self.history.alarms(self._alarms)
 
-    def _known_alarms(self) -> list[str]:
-        return [name for name in self.history.names if name.startswith(ALARMS)]
+    def _present(self, values: Mapping[str, float]) -> Present:
+        return Present(values, self.time, self.simulation.tick, self.scene.tick)
 
     def _require(self, name: str, value: float, source: str) -> None:
         if reason := self.simulation.refusal((name,), (value,), source):

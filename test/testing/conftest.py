@@ -1,4 +1,4 @@
-"""The table of these tests: four lanes of bottles, a table, the belt of a packer that can be stopped."""
+"""The table of these tests: three lanes of bottles, a table, a packer that can be stopped."""
 
 from pathlib import Path
 
@@ -8,9 +8,10 @@ from conveyor_sim.testing import Scenario
 
 TABLE = Path(__file__).with_name("table.yaml")
 ON_TABLE = "belts/table/bottles"
-REMOVED = "outfeeds/packed/removed"
+TAKEN = "machines/packer/taken"
 FEEDER = "belts/feeder/cmd_speed"
-PACKER = "belts/packer/cmd_speed"
+
+STOP = "machines/packer/stop"
 
 
 @pytest.fixture

@@ -50,8 +50,7 @@ def test_a_callable_object_is_told_by_its_repr() -> None:
     assert text_of(Full()) == "Full()"
 
 
-def test_reading_is_noted_and_alarms_are_off_before_the_first_scan() -> None:
-    present = Present({"a": 1.0, "b": 2.0}, 0.0, 0, 0.01, scanned=False)
-    assert present["b"] == 2.0 and present.on("a") and present.get("c") is None
-    assert present["alarms/any"] == 0.0
+def test_reading_is_noted() -> None:
+    present = Present({"a": 1.0, "b": 2.0, "c": 3.0}, 0.0, 0, 0.01)
+    assert present["b"] == 2.0 and present.on("a") and present.get("d") is None
     assert list(present.read) == ["b", "a"]

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from testing.conftest import FEEDER, ON_TABLE, PACKER, REMOVED
+from testing.conftest import FEEDER, ON_TABLE, STOP, TAKEN
 from testing.test_scenario import Hold
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.testing import Scenario
-from conveyor_sim.testing.history import Mark
+
+SPEED = "belts/table/cmd_speed"
 
 
 def test_a_row_a_tick(table: Scenario) -> None:
@@ -25,30 +26,33 @@ def test_a_row_a_tick(table: Scenario) -> None:
 def test_it_grows_without_end(table: Scenario) -> None:
     table.run_for(12.0)
     assert len(table.history) == 1201
-    assert (np.diff(table.history[REMOVED]) >= 0).all()
-    assert table.history[REMOVED][-1] == table.signals[REMOVED]
+    assert (np.diff(table.history[TAKEN]) >= 0).all()
+    assert table.history[TAKEN][-1] == table.signals[TAKEN]
 
 
-def test_commands_from_when_they_are_in_force(table: Scenario) -> None:
+def test_commands_and_faults_from_when_they_are_in_force(table: Scenario) -> None:
     table.run_for(0.1)
-    table.command(PACKER, 0.0)
+    table.command(SPEED, 0.1)
+    table.inject(STOP)
     table.run_for(0.1)
-    table.command(PACKER, 0.3)
+    table.command(SPEED, 0.3)
     table.run_for(0.1)
-    command, speed = table.history[PACKER], table.history["belts/packer/speed"]
+    command, speed = table.history[SPEED], table.history["belts/table/speed"]
     assert np.isnan(command[:10]).all()
-    assert (command[10:20] == 0.0).all() and (command[20:] == 0.3).all()
+    assert (command[10:20] == 0.1).all() and (command[20:] == 0.3).all()
     # The belt's speed is told at the end of the tick for which it was commanded.
     assert (speed[11:21] == command[10:20]).all() and speed[10] == 0.4
-    assert table.history.marks == [Mark(pytest.approx(0.1), PACKER, 0.0), Mark(pytest.approx(0.2), PACKER, 0.3)]
+    assert table.history[STOP].tolist() == [0.0] * 10 + [1.0] * 21
+    marks = [(round(mark.time, 9), mark.name, mark.value) for mark in table.history.marks]
+    assert marks == [(0.1, SPEED, 0.1), (0.1, STOP, 1.0), (0.2, SPEED, 0.3)]
 
 
 def test_alarms_are_0_before_they_are_first_told_of(table: Scenario) -> None:
+    table.run_for(0.5)
     table.attach(Hold(1))
     table.run_until(lambda s: s["alarms/full"], within=10)
     table.run_for(0.1)
     full = table.history["alarms/full"]
-    assert full[0] == 0.0  # there was no scan yet
     assert full.tolist() == (table.history[ON_TABLE] >= 1).tolist()
     assert table.history[FEEDER][-2] == 0.0
     assert table.history.marks == []  # the controller's commands are none

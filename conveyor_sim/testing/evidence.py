@@ -1,0 +1,85 @@
+"""What is kept of a scenario that failed: its bag, and a picture of the line at the moment of failure."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from conveyor_sim.control.scan import ALARMS
+from conveyor_sim.plot import style
+from conveyor_sim.plot.data import Frame, Plant
+from conveyor_sim.plot.moment import Event, Trace, moment_figure
+from conveyor_sim.plot.recording import contact_lines
+from conveyor_sim.testing.scenario import Scenario
+
+PICTURE = "line.png"
+
+EYES = "photo_eyes/"
+
+_BEFORE = 20.0  # s of traces, before what was asserted
+_MOST_ROWS = 10
+_MOST_EVENTS = 4
+
+
+def draw_moment(scenario: Scenario, path: Path) -> Path:
+    """Draw the line as it is now, and the last seconds of the signals that its test and controller look at, as a PNG.
+
+    Raises ConveyorError if the file can't be written.
+    """
+    failed, history, time = scenario.failed, scenario.history, scenario.history.time
+    length = _BEFORE + (0.0 if failed is None else scenario.time - failed.since)
+    shown = slice(int(np.searchsorted(time, time[-1] - length - 1e-9)), None)
+    traces = [Trace(name, history.unit(name), history.kind(name), history[name][shown]) for name in traced(scenario)]
+    events = [Event(mark.time, f"{mark.name} = {mark.value:g}") for mark in history.marks][-_MOST_EVENTS:]
+    if failed is not None and failed.since < scenario.time:
+        events.append(Event(failed.since, f"{failed.word} asserted"))
+    eyes = [name for name in history.names if name.startswith(EYES) and name.endswith("/blocked")]
+    blocked = {name.split("/")[1] for name in eyes if history[name][-1]}
+    with style.look():
+        figure = moment_figure(
+            Plant.of(scenario.scene),
+            _frame(scenario),
+            scenario.scene.name,
+            scenario.failure,
+            blocked,
+            time[shown],
+            traces,
+            sorted((event for event in events if event.time >= time[shown][0]), key=lambda event: event.time),
+        )
+        return style.save_png(figure, path)
+
+
+def keep_bag(scenario: Scenario, bag: Path, folder: Path) -> Path:
+    """End a scenario's recording and move it to a folder, in place of one of that name."""
+    scenario.close()
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    shutil.move(bag, folder)
+    return folder
+
+
+def traced(scenario: Scenario) -> list[str]:
+    """What to trace: what the last conditions read, the alarms, the commands in force, what the controller reads."""
+    history = scenario.history
+    commands = [name for name in scenario.simulation.process_image.command_names if np.isfinite(history[name][-1])]
+    alarms = [name for name in history.names if name.startswith(ALARMS)]
+    wanted = dict.fromkeys([*scenario.read_by_conditions, *alarms, *commands, *scenario.read_by_controller])
+    return list(wanted)[:_MOST_ROWS]
+
+
+def _frame(scenario: Scenario) -> Frame:
+    simulation = scenario.simulation
+    bottles = simulation.bottles()
+    return Frame(
+        time=simulation.time,
+        x=bottles.x,
+        y=bottles.y,
+        theta=bottles.theta,
+        radius=np.asarray(simulation.model.type_radius)[bottles.type],
+        speed=np.hypot(bottles.vx, bottles.vy),
+        belt_speeds=simulation.belts().actual,
+        contacts=contact_lines(bottles, simulation.contacts()),
+    )
