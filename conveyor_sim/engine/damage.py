@@ -37,7 +37,7 @@ def note_damage(world: World, member: Member, dt: float) -> None:
 def _note(world: World, damage: Any, member: Member, dt: float) -> None:
     if damage is None:
         return
-    # Rails that move are put in place by one member just before.
+    # Velocity Verlet has just given bottles their velocities, each member those of its own.
     wait_for_all(member)
     begin, stop = share(member, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
