@@ -82,4 +82,5 @@ def _frame(scenario: Scenario) -> Frame:
         speed=np.hypot(bottles.vx, bottles.vy),
         belt_speeds=simulation.belts().actual,
         contacts=contact_lines(bottles, simulation.contacts()),
+        moving=simulation.moving_rails(),
     )

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.metadata import entry_points
 
 import pytest
 from testing.conftest import ON_TABLE, STOP, TABLE
@@ -94,6 +95,11 @@ def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) 
     (place / "bag" / "old").touch()
     pytester.runpytest_inprocess(*PLUGIN, "-k", "test_fails").assert_outcomes(failed=1, deselected=4)
     assert sorted(file.name for file in (place / "bag").iterdir()) == ["bag_1_0.mcap", "metadata.yaml"]
+
+
+def test_pytest_finds_it_by_itself() -> None:
+    """As installed: after an edit of setup.py, `make` brings the environment up to date."""
+    assert PLUGIN[1] in {entry.value for entry in entry_points(group="pytest11")}
 
 
 def test_it_costs_a_run_that_does_not_use_it_nothing() -> None:
