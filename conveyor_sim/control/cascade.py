@@ -2,8 +2,9 @@
 
 A zone is held while bottles stand at its full-eye and the zone ahead has no room for them. So bottles that wait stand
 on belts that stand, and press on nobody; and as the front is taken away, each zone delivers only what the next one has
-room for. Were all started as soon as the machine ahead takes bottles again, the whole row would be pressed. Bottles that
-move nose to tail count as standing ones: it is for lines that run with gaps.
+room for. Were all started as soon as the machine ahead takes bottles again, the whole row would be pressed.
+
+Bottles that move nose to tail count as standing ones: it is for lines that run with gaps.
 """
 
 from __future__ import annotations
