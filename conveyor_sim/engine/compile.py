@@ -7,11 +7,14 @@ Effects that a scene lacks arrive as ``None``: numba prunes ``if argument is Non
 branch is not in the machine code, and each combination is cached on disk under its own signature.
 """
 
+import gc
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
@@ -75,7 +78,23 @@ def entry(function: Any, *arguments: Any) -> Any:
 
     Numba would look at the type of each of a hundred arrays at every call: 20 us against 1.
     """
-    return function.compile(tuple(_typeof(argument) for argument in arguments))
+    with _rare_garbage_collection():
+        return function.compile(tuple(_typeof(argument) for argument in arguments))
+
+
+_collector = RLock()
+
+
+@contextmanager
+def _rare_garbage_collection() -> Iterator[None]:
+    """Numba makes millions of objects and keeps them: to look for garbage at every 700th takes a tenth of the time."""
+    with _collector:  # else one thread could put back what another has raised; numba compiles in one at a time
+        previous = gc.get_threshold()
+        gc.set_threshold(50_000, *previous[1:])
+        try:
+            yield
+        finally:
+            gc.set_threshold(*previous)
 
 
 def part(function: Function) -> Function:
