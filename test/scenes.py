@@ -64,6 +64,33 @@ def contact(
     }
 
 
+def every_law(
+    contacts: list[dict[str, Any]], bottle_types: dict[str, Any] | None = None, **fields: Any
+) -> dict[str, Any]:
+    """Fields of a scene with contacts of glass, and with every law of a contact of two bottles, and what goes with it.
+
+    Two types that nobody puts in have the laws, of which no other bottle feels a bit (test/effects/test_absent.py).
+    Tests of one law each share their compiled kernels so: it takes 10 s of a core for a set of effects.
+    """
+    hertz, table = {"hertz_stiffness": 1e5}, {"table": [[1e-3, 1.0], [2e-3, 4.0]]}
+    normal, onset = {"law": "normal", "restitution": 0.5}, {"law": "onset", "restitution": 0.5, "speed": 1.0}
+    laws = [
+        ("glass", "odd", {"stiffness": 1e3, "damping": {"law": "paper", "coefficient": 1.0}, "friction": 0.1}),
+        ("glass", "rare", {**hertz, "damping": normal}),
+        ("odd", "odd", table),
+        ("odd", "rare", {"stiffness": 1e3, "damping": normal}),
+        ("rare", "rare", {"stiffness": 1e3, "damping": onset}),
+    ]
+    return {
+        **fields,
+        "contacts": [*contacts, *({"between": [a, b], **law} for a, b, law in laws)],
+        "bottle_types": {
+            **(bottle_types or {"bottle": kind()}), "odd": kind(material="odd"), "rare": kind(material="rare"),
+        },
+        "effects": {"peaks": "on", "rotation": "on", "unequal_radii": "on"},
+    }  # fmt: skip
+
+
 def segment(start: tuple[float, float], end: tuple[float, float]) -> dict[str, Any]:
     """A straight rail of steel."""
     return {"kind": "segment", "from": start, "to": end, "material": "steel"}

@@ -10,10 +10,10 @@ from physics.test_turntable import MU, G, distance, turntable
 from scenes import (
     MASS,
     NO_FLOOR,
-    PEAKS,
     RADIUS,
     bottle,
     contact,
+    every_law,
     kind,
     phases,
     rms,
@@ -71,11 +71,12 @@ def head_on() -> Scene:
     """64 pairs for each law, far from each other, that touch at times spread over a step at every scale."""
     types, given = range(len(LAWS)), list(LAWS.values())
     return scene(
-        **PEAKS,
         **NO_FLOOR,
+        # As `every_law` has it, for the kernels.
+        effects={"peaks": "on", "rotation": "on", "unequal_radii": "on"},
         bottle_types={f"t{a}": kind(material=f"m{a}") for a in types},
         contacts=[
-            {"between": [f"m{a}", f"m{b}"], **(given[a] if a == b else {"stiffness": 1.0})}
+            {"between": [f"m{a}", f"m{b}"], **(given[a] if a == b else {"stiffness": 1.0, "friction": 1e-3})}
             for a in types
             for b in types[a:]
         ],
@@ -259,7 +260,7 @@ def test_the_tangential_speed_after_an_impact(integrator: str) -> None:
             slip_limit=0.001,
             tick=CONTACT_TIME,
             accuracy={"per_tick": per_tick, "integrator": integrator},
-            contacts=[contact(k, friction=mu)],
+            **every_law([contact(k, friction=mu)]),
             bottles=[
                 bottle(x, float(row), vx, vy)
                 for row, entry in enumerate((1.0 + phases(PAIRS)) * CONTACT_TIME / steps)

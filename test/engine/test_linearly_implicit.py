@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, polyline, scene, simulation
+from scenes import MASS, RADIUS, base, belt, bottle, contact, every_law, polyline, scene, simulation
 from worlds import ALONE, FAR, state_of
 
 from conveyor_sim.engine.integrators import START
@@ -17,14 +17,16 @@ from conveyor_sim.simulation import Simulation
 
 G, MU = 9.81, 0.4
 METHOD = "linearly_implicit"
-LAWS: dict[str, Any] = {"damping": ("paper", 0.1), "friction": 0.1}
+LAWS: dict[str, Any] = {"damping": ("normal", 0.1), "friction": 0.1}
+EFFECTS = {"peaks": "on", "unequal_radii": "on"}
+"""With them the kernels are those of test_checkpoint.py's queue; `every_law` has those of test_prediction.py."""
 
 
 def test_a_spring_in_contact_keeps_its_energy() -> None:
     """The midpoint rule keeps a quadratic energy, if the tangent is the spring's and the system is solved."""
     stiffness, depth, steps = 5000.0, 0.01, 30
     given = scene(
-        contacts=[contact(stiffness)],
+        **every_law([contact(stiffness)]),
         floor="none",
         accuracy={"integrator": METHOD},
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
@@ -62,6 +64,7 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
         gravity=G,
         accuracy={"integrator": METHOD, "per_tick": 1},
         contacts=[contact(stiffness, **LAWS), contact(2.0 * stiffness, "steel", **LAWS)],
+        effects=EFFECTS,
         base=base(MU),
         belts={"belt": belt(0.25, (-1.0, -1.0), 5.0, 5.0)},
         rails={"walls": polyline(walls)},
@@ -98,6 +101,7 @@ def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> Non
         gravity=G,
         accuracy={"integrator": METHOD, "per_tick": 1},
         contacts=[contact(1e5, **LAWS), contact(2e5, "steel", **LAWS)],
+        effects=EFFECTS,
         base=base(MU),
         belts={"belt": belt(0.5, (-1.0, -1.0), 5.0, 5.0)},
         rails={"far": polyline([(0.0, 3.0), (1.0, 3.0)])},
@@ -120,7 +124,7 @@ def test_momentum_of_a_closed_system() -> None:
     speeds = rng.normal(0.0, 0.5, (25, 2))
     sim = simulation(
         accuracy={"integrator": METHOD, "per_tick": 4},
-        contacts=[contact(1e5, damping=("normal", 5.0), friction=0.3)],
+        **every_law([contact(1e5, damping=("normal", 5.0), friction=0.3)]),
         floor="none",
         bottles=[bottle(x, y, float(u), float(v)) for (x, y), (u, v) in zip(places, speeds, strict=True)],
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenes import RADIUS, base, belt, bottle, contact, simulation
+from scenes import RADIUS, base, belt, bottle, contact, segment, simulation
 
 from conveyor_sim.simulation import Simulation
 
@@ -18,8 +18,10 @@ def eye_line(speed: float = SPEED, xs: tuple[float, ...] = (0.0,), **fields: Any
         "tick": 0.01,
         "accuracy": {"per_tick": 20},
         "base": base(0.4),
-        "contacts": [contact(5000.0, damping=("normal", 5.0))],
+        "contacts": [contact(5000.0, other, ("normal", 5.0)) for other in ("glass", "steel")],
         "belts": {"belt": belt(speed, (-4.0, -1.0), 6.0, 2.0), "plate": belt(speed, (2.0, -1.0), 4.0, 2.0)},
+        # Where no bottle is: with it the kernels are those of test_infeed.py.
+        "rails": {"far": segment((30.0, 30.0), (31.0, 30.0))},
         # One that is never in the way, for bottles that can touch are another kernel than one alone.
         "bottles": [*(bottle(x, 0.0, speed) for x in xs), bottle(-3.8, 0.9, speed)],
     }

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, kind, phases, simulation, stiffness_for
+from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, every_law, kind, phases, simulation, stiffness_for
 
 from conveyor_sim.simulation import Simulation
 
@@ -19,18 +19,21 @@ def cloud(integrator: str, lever_arm: str = "overlap") -> Simulation:
     distance = 0.25 + 0.025 * np.arange(30)
     inward = 1.0 + phases(30)
     return simulation(
+        **every_law(
+            [
+                contact(5000.0, damping=("paper", 2.0), friction=0.3),
+                contact(8000.0, "steel", damping=("normal", 3.0), friction=0.2),
+                {"between": ["steel", "steel"], "stiffness": 3000.0, "friction": 0.5},
+                *({"between": ["steel", other], "stiffness": 1000.0} for other in ("odd", "rare")),
+            ],
+            {
+                name: kind(radius, mass, "glass" if name == "bottle" else "steel", inertia=share * mass * radius**2)
+                for name, (radius, mass, share) in PARTNERS.items()
+            },
+        ),
         tick=0.005,
         accuracy={"per_tick": 250, "integrator": integrator},
         lever_arm=lever_arm,
-        bottle_types={
-            name: kind(radius, mass, "glass" if name == "bottle" else "steel", inertia=share * mass * radius**2)
-            for name, (radius, mass, share) in PARTNERS.items()
-        },
-        contacts=[
-            contact(5000.0, damping=("paper", 2.0), friction=0.3),
-            contact(8000.0, "steel", damping=("normal", 3.0), friction=0.2),
-            {"between": ["steel", "steel"], "stiffness": 3000.0, "friction": 0.5},
-        ],
         bottles=[
             bottle(d * c, d * s, -v * c + 0.3, -v * s - 0.1, type=name, spin=5.0 * v)
             for d, c, s, v, name in zip(
@@ -94,7 +97,7 @@ def test_angular_momentum_gained_in_one_impact(lever_arm: str) -> None:
         accuracy={"per_tick": 6000},
         slip_limit=0.001,
         lever_arm=lever_arm,
-        contacts=[contact(stiffness_for(contact_time, MASS / 2.0), friction=mu)],
+        **every_law([contact(stiffness_for(contact_time, MASS / 2.0), friction=mu)]),
         bottles=[bottle(0.0, 0.0, speed, slide), bottle(2.0 * RADIUS + 1e-6, 0.0)],
         **NO_FLOOR,
     )

@@ -10,7 +10,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, order, phases, rms, segment, simulation, stiffness_for
+from scenes import (
+    MASS,
+    NO_FLOOR,
+    RADIUS,
+    bottle,
+    contact,
+    every_law,
+    order,
+    phases,
+    rms,
+    segment,
+    simulation,
+    stiffness_for,
+)
 from scipy.special import gamma
 
 from conveyor_sim.simulation import Simulation
@@ -36,8 +49,8 @@ def impacts(law: dict[str, Any], speeds: Any, tick: float, steps: int, entries: 
     speeds, entries = np.broadcast_arrays(speeds, entries)
     fields = {"accuracy": {"per_tick": steps}, **NO_FLOOR, **fields}
     return simulation(
+        **every_law([{"between": ["glass", "glass"], **law}]),
         tick=tick,
-        contacts=[{"between": ["glass", "glass"], **law}],
         bottles=[
             one
             for row, (speed, entry) in enumerate(zip(speeds, entries, strict=True))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scenes import NO_FLOOR, PEAKS, bottle, contact, kind, order, phases, rms, simulation, stiffness_for
+from scenes import NO_FLOOR, bottle, contact, every_law, kind, order, phases, rms, simulation, stiffness_for
 
 from conveyor_sim.simulation import Simulation
 
@@ -52,11 +52,9 @@ def collisions(
     touching = a.radius + b.radius
     damping = (law, 2.0 * zeta * math.sqrt(k * m_r)) if zeta else None
     sim = simulation(
-        **PEAKS,
+        **every_law([contact(k, damping=damping)], {"a": kind(a.radius, a.mass), "b": kind(b.radius, b.mass)}),
         tick=tick,
         accuracy={"per_tick": steps, "integrator": integrator},
-        bottle_types={"a": kind(a.radius, a.mass), "b": kind(b.radius, b.mass)},
-        contacts=[contact(k, damping=damping)],
         bottles=[
             bottle(x, float(row), vx, 0.0, type=type_)
             for row, entry in enumerate(entries)

@@ -9,7 +9,7 @@ shorter by the overlap.)
 import math
 
 import pytest
-from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, segment, simulation, stiffness_for
+from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, every_law, segment, simulation, stiffness_for
 
 from conveyor_sim.simulation import Simulation
 
@@ -106,7 +106,7 @@ def test_in_an_equal_pair_each_takes_half(sliding: bool) -> None:
         accuracy={"per_tick": steps},
         slip_limit=slip_limit,
         lever_arm="radius",
-        contacts=[contact(stiffness_for(CONTACT_TIME, MASS / 2.0), friction=MU)],
+        **every_law([contact(stiffness_for(CONTACT_TIME, MASS / 2.0), friction=MU)]),
         bottles=[bottle(0.0, 0.0, V_N, v_t), bottle(2.0 * RADIUS + gap, 0.0)],
         **NO_FLOOR,
     )
