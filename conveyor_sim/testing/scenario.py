@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import ALARMS, ON, Controller
+from conveyor_sim.control.scan import ALARMS, ON, Controller, ControlError
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.line import FAULT
 from conveyor_sim.resources import scene_path
@@ -246,6 +246,8 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _scan(self, controller: Controller) -> None:
         inputs = self._present(self._signals)
         answer = controller.scan(inputs)
+        if not isinstance(answer, Mapping):
+            raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
         self._scan_read |= inputs.read
         self._answer = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
         told = {name: float(value) for name, value in answer.items() if name.startswith(ALARMS)}
