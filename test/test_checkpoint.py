@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, kind, line, polyline, scene
+from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, every_law, kind, line, polyline, scene
 
 from conveyor_sim.checkpoint import FORMAT, versions
 from conveyor_sim.engine.arrays import World
@@ -171,7 +171,7 @@ def test_bottles_put_into_each_other_may_part_after_a_checkpoint_too(tmp_path: P
     sim = Simulation(
         scene(
             accuracy={"per_tick": 200},
-            contacts=[contact(1e3, damping=("normal", 5.0))],
+            **every_law([contact(1e3, damping=("normal", 5.0))]),
             bottles=[bottle(0.0, 0.0), bottle(2.2 * RADIUS, 0.0)],
             **NO_FLOOR,
         )

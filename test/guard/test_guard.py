@@ -18,6 +18,7 @@ from scenes import (
     belt,
     bottle,
     contact,
+    every_law,
     kind,
     segment,
     simulation,
@@ -55,7 +56,7 @@ def against_a_stop(speed: float, stiffness: float, per_tick: int, **fields: Any)
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 @pytest.mark.parametrize("column", ["x", "vy"])
 def test_what_was_not_finite_before_a_step_is_told_at_once(value: float, column: str) -> None:
-    sim = simulation(contacts=[contact(1e3)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.5)], **NO_FLOOR)
+    sim = simulation(**every_law([contact(1e3)]), bottles=[bottle(0.0, 0.0), bottle(1.0, 0.5)], **NO_FLOOR)
     sim.advance(3)
     getattr(sim._state.world.bottles, column)[1] = value
     with pytest.raises(SimulationError) as stopped:
@@ -159,7 +160,7 @@ def test_what_no_step_can_stop_is_told_with_the_stiffness_that_can() -> None:
 def test_two_bottles_that_would_pass_through_each_other() -> None:
     sim = simulation(
         accuracy={"per_tick": 200},
-        contacts=[contact(1e3)],
+        **every_law([contact(1e3)]),
         bottles=[bottle(0.0, 0.0, 8.0), bottle(2.2 * RADIUS, 0.0, -8.0)],
         **NO_FLOOR,
     )
@@ -260,7 +261,8 @@ def test_listening_for_chatter_leaves_no_trace() -> None:
 def test_a_driven_line_has_nothing_to_tell() -> None:
     """Belts do work, bottles fall in and out: no false alarm in a second at the preset."""
     sim = simulation(
-        contacts=[contact(2e5, damping=("normal", 20.0)), contact(2e5, "steel", ("normal", 20.0))],
+        contacts=[contact(2e5, other, ("normal", 20.0), 1e-3) for other in ("glass", "steel")],
+        effects={"peaks": "on", "unequal_radii": "on"},  # the kernels of test_checkpoint.py's queue
         base=base(0.4),
         belts={"belt": belt(1.0)},
         rails=STOP,

@@ -34,12 +34,16 @@ def ledger_of(sim: Simulation) -> Ledger:
 
 
 def pressed(steps: int, integrator: str, **fields: Any) -> Simulation:
-    """Two bottles, one behind the other, that a belt presses against a stop from the first tick on: no force jumps."""
-    damping = ("normal", 10.0)
+    """Two bottles, one behind the other, that a belt presses against a stop from the first tick on: no force jumps.
+
+    With the effects of test_checkpoint.py's queue, and so its kernels; no contact slips.
+    """
+    laws: dict[str, Any] = {"damping": ("normal", 10.0), "friction": 0.2}
+    fields["effects"] = {"peaks": "on", "unequal_radii": "on", **fields.get("effects", {})}
     return simulation(
         tick=0.01,
         accuracy={"per_tick": steps, "integrator": integrator},
-        contacts=[contact(5e3, damping=damping), contact(5e3, "steel", damping)],
+        contacts=[contact(5e3, **laws), contact(5e3, "steel", **laws)],
         base=base(0.4),
         belts={"belt": belt(0.5)},
         rails={"stop": segment((0.0, -1.0), (0.0, 1.0))},
