@@ -36,6 +36,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", glob("config/*.yaml")),
+        (f"share/{NAME}/config/scenarios", glob("config/scenarios/*.yaml")),
         (f"share/{NAME}/config/ros", glob("config/ros/*.yaml")),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
         (f"share/{NAME}/msg_defs", ["msg_defs/package.xml", "msg_defs/CMakeLists.txt"]),

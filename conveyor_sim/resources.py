@@ -36,16 +36,18 @@ def msg_defs_dir() -> Path:
 
 
 def scene_path(name_or_path: str | Path) -> Path:
-    """The scene file meant by a path, or by the name of a shipped scene, with or without `.yaml` or `config/`.
+    """The scene file meant by a path, or by the name of a shipped scene ("paper_plant", "scenarios/zoned_line"), with
+    or without `.yaml` or `config/`.
 
     A file where the caller stands wins over a shipped one. Raises SceneError if there is neither.
     """
     path = Path(name_or_path).expanduser()
     if path.is_file():
         return path
-    name = path.name if path.suffix else f"{path.name}.yaml"
-    shipped = config_dir() / name
-    if path.parent in (Path("."), Path("config")) and shipped.is_file():
+    parts = path.with_suffix(".yaml").parts
+    shipped = config_dir().joinpath(*(parts[1:] if parts[0] == "config" else parts))
+    if not path.is_absolute() and ".." not in parts and shipped.is_file():
         return shipped
-    names = ", ".join(sorted(scene.stem for scene in config_dir().glob("*.yaml")))
+    scenes = [*config_dir().glob("*.yaml"), *config_dir().glob("scenarios/*.yaml")]
+    names = ", ".join(sorted(scene.relative_to(config_dir()).with_suffix("").as_posix() for scene in scenes))
     raise SceneError(f"{name_or_path}: no such scene file; expected a path, or the name of a shipped scene ({names})")

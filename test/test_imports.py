@@ -23,9 +23,9 @@ FLOORS = [
     ["simulation"],
     ["bag", "price", "accuracy", "achieved", "stopped"],
     ["progress", "summary", "plot", "explain"],
-    ["runner", "report", "testing"],
+    ["runner", "report"],
     ["ros"],
-    ["cli"],
+    ["cli", "testing"],
 ]
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 ONLY_IN = {"rclpy": "ros", "matplotlib": "plot", "numba": "engine"}

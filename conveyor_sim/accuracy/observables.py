@@ -58,7 +58,7 @@ class Record:
     def take(self) -> None:
         """Look at the state after a tick."""
         simulation = self._simulation
-        if self.scene.outfeeds:
+        if any(self.scene.exits()):
             self.removed = simulation.counts.removed
             if simulation.tick <= self.scene.duration_ticks // 2:
                 self.removed_by_half = self.removed
@@ -95,7 +95,7 @@ class Observable:
 
 
 def _throughput(record: Record) -> float | None:
-    if record.scene.outfeeds:
+    if any(record.scene.exits()):
         ticks = record.scene.duration_ticks
         return (record.removed - record.removed_by_half) * 60.0 / ((ticks - ticks // 2) * record.scene.tick)
     if len(record.scene.belts) < LOOP:
@@ -143,7 +143,7 @@ OBSERVABLES = (
     Observable(
         "throughput",
         "1/min",
-        "Bottles removed by outfeeds in the second half of the run, a minute; on a line without outfeeds and with at "
+        "Bottles removed in the second half of the run, a minute; on a line where none is removed and with at "
         "least three belts, bottles that came back to the belt with the most returns.",
         _throughput,
     ),

@@ -3,6 +3,8 @@
 A zone is held while bottles stand at its full-eye and the zone ahead has no room for them. So bottles that wait stand
 on belts that stand, and press on nobody; and as the front is taken away, each zone delivers only what the next one has
 room for. Were all started as soon as the machine ahead takes bottles again, the whole row would be pressed.
+
+Bottles that move nose to tail count as standing ones: it is for lines that run with gaps.
 """
 
 from __future__ import annotations
@@ -39,9 +41,9 @@ class Cascade:
 
     zones: tuple[Zone, ...]
     takes: str
-    full_delay: float = 0.5
-    clear_delay: float = 0.0
-    start_delay: float = 0.3
+    full_delay: float = 0.3
+    clear_delay: float = 0.2
+    start_delay: float = 0.0
     _full: tuple[COVERED, ...] = field(init=False, repr=False)
     _ahead: tuple[TON, ...] = field(init=False, repr=False)
     _held: list[bool] = field(init=False, repr=False)

@@ -144,4 +144,6 @@ def _nearest(name: str, signals: Mapping[str, float]) -> str:
     """What of the same kind there is, in words."""
     kind = name.split("/")[0] + "/"
     alike = [signal for signal in signals if signal.startswith(kind)]
-    return f"expected one of {', '.join(alike)}" if alike else f"which has no {kind}"
+    if alike:
+        return f"expected one of {', '.join(alike)}"
+    return "which a controller has to tell in every scan" if kind == ALARMS else f"which has no {kind}"

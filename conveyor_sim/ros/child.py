@@ -1,29 +1,24 @@
-"""A ROS node as a child process: its output goes to a log file, and it ends when asked to."""
+"""A child process: its output goes to a log file, and it ends when asked to."""
 
 from __future__ import annotations
 
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 PATIENCE = 20.0  # s of wall time that a process has for an orderly end
 TAIL = 15  # lines of a log shown when its process fails
 
 
-class Child:
+class Process:
     """One process, from its start until stop()."""
 
-    def __init__(
-        self, name: str, parameters: Mapping[str, object], environment: Mapping[str, str], log_folder: Path
-    ) -> None:
-        """Runs `conveyor_sim.ros.<name>` with ROS parameters; its output goes to `<log_folder>/<name>.log`."""
+    def __init__(self, name: str, command: Sequence[str], environment: Mapping[str, str], log_folder: Path) -> None:
+        """Runs a command; its output goes to `<log_folder>/<name>.log`. Raises OSError if it can't be run."""
         self.name = name
         self.log = log_folder / f"{name}.log"
-        command = [sys.executable, "-m", f"conveyor_sim.ros.{name}", "--ros-args"]
-        for parameter, value in parameters.items():
-            command += ["-p", f"{parameter}:={_yaml(value)}"]
         with self.log.open("wb") as output:
             # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children in order.
             self._process = subprocess.Popen(
@@ -55,12 +50,29 @@ class Child:
                 self._process.kill()
                 self._process.wait()
 
+    def last_words(self) -> str:
+        """The end of its log, indented."""
+        lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()[-TAIL:]
+        return "\n".join(f"  {line}" for line in lines or ["(empty)"])
+
     def obituary(self) -> str:
         """How it ended, and the end of its log."""
         code = self.exit_code
         how = f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
-        lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()[-TAIL:]
-        return "\n".join([f"{self.name} {how}; the end of its log:", *(f"  {line}" for line in lines or ["(empty)"])])
+        return f"{self.name} {how}; the end of its log:\n{self.last_words()}"
+
+
+class Child(Process):
+    """A node of this package."""
+
+    def __init__(
+        self, name: str, parameters: Mapping[str, object], environment: Mapping[str, str], log_folder: Path
+    ) -> None:
+        """Runs `conveyor_sim.ros.<name>` with ROS parameters; its output goes to `<log_folder>/<name>.log`."""
+        command = [sys.executable, "-m", f"conveyor_sim.ros.{name}", "--ros-args"]
+        for parameter, value in parameters.items():
+            command += ["-p", f"{parameter}:={_yaml(value)}"]
+        super().__init__(name, command, environment, log_folder)
 
 
 def _yaml(value: object) -> str:

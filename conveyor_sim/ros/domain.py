@@ -6,7 +6,7 @@ import fcntl
 import os
 import socket
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -52,20 +52,37 @@ def private_domain() -> Iterator[int]:
     Nodes created meanwhile see each other, on this machine only. Yields the ROS_DOMAIN_ID; the environment is put back
     at the end. Raises ConveyorError if every domain is taken.
     """
-    before = dict(os.environ)
+    with own_domain() as environment, in_environment(environment):
+        yield int(environment["ROS_DOMAIN_ID"])
+
+
+@contextmanager
+def own_domain() -> Iterator[dict[str, str]]:
+    """Hold such a domain, and leave this process's environment as it is; yields that of processes in the domain.
+
+    Raises ConveyorError if every domain is taken.
+    """
     with _free_domain() as domain, tempfile.TemporaryDirectory(prefix="conveyor_sim_dds_") as folder:
         profile = Path(folder) / "fast_discovery.xml"
         profile.write_text(_FAST_DISCOVERY, encoding="utf-8")
-        for name in _SCRUBBED:
-            os.environ.pop(name, None)
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        os.environ[_profile_variable()] = str(profile)
-        try:
-            yield domain
-        finally:
-            os.environ.clear()
-            os.environ.update(before)
+        environment = {name: value for name, value in os.environ.items() if name not in _SCRUBBED}
+        environment["ROS_DOMAIN_ID"] = str(domain)
+        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        environment[_profile_variable()] = str(profile)
+        yield environment
+
+
+@contextmanager
+def in_environment(environment: Mapping[str, str]) -> Iterator[None]:
+    """Let this process's environment be another one; it is put back at the end."""
+    before = dict(os.environ)
+    os.environ.clear()
+    os.environ.update(environment)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 def _profile_variable() -> str:

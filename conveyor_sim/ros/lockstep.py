@@ -10,12 +10,16 @@ from __future__ import annotations
 import struct
 from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
+
+if TYPE_CHECKING:
+    from conveyor_sim.simulation import Simulation
 
 
 class Refused(ConveyorError):
@@ -50,6 +54,13 @@ class LockstepAnswer:
     signals: npt.NDArray[np.float64]
     state_hash: int
     outcomes: tuple[CommandOutcome, ...]  # since the last answer
+
+    @staticmethod
+    def of(simulation: Simulation, outcomes: tuple[CommandOutcome, ...] = ()) -> LockstepAnswer:
+        """What a simulation is now."""
+        return LockstepAnswer(
+            simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes
+        )
 
 
 class Lockstep:

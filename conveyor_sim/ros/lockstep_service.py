@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import array
+from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,15 +20,33 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.services import settled
-from conveyor_sim.ros.stepper import Stepper
+from conveyor_sim.simulation import Simulation
+
+T = TypeVar("T")
 
 NS = 1_000_000_000
+
+
+class Stepped(Protocol):
+    """A simulation that one thread steps."""
+
+    @property
+    def simulation(self) -> Simulation: ...
+
+    def call(self, function: Callable[[], T]) -> Future[T]:
+        """From any thread: have a function called in that thread, between two ticks."""
+
+    def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
+        """In that thread: advance as a controller asks. Raises Refused."""
+
+    def present(self) -> LockstepAnswer:
+        """In that thread: what the simulation is now, without outcomes."""
 
 
 class LockstepService:
     """Serves one controller's scans."""
 
-    def __init__(self, node: Node, executor: Executor, stepper: Stepper, frame_id: str) -> None:
+    def __init__(self, node: Node, executor: Executor, stepper: Stepped, frame_id: str) -> None:
         self._executor = executor
         self._stepper = stepper
         self._frame_id = frame_id
@@ -52,8 +71,8 @@ class LockstepService:
             answer = await settled(self._executor, coming)
         except ConveyorError as error:
             response.reason = str(error)
-            response.tick = self._stepper.session.simulation.tick
-            response.time = to_time(self._stepper.session.simulation.stamp_ns)
+            response.tick = self._stepper.simulation.tick
+            response.time = to_time(self._stepper.simulation.stamp_ns)
             return response
         response.accepted = not response.reason
         self._fill(response, answer)
@@ -67,7 +86,7 @@ class LockstepService:
         response.signals.tick = answer.tick
         response.signals.values = _doubles(answer.signals)
         response.state_hash = answer.state_hash
-        tick_ns = self._stepper.session.simulation.model.tick_ns
+        tick_ns = self._stepper.simulation.model.tick_ns
         response.outcomes = [_outcome(outcome, tick_ns, self._frame_id) for outcome in answer.outcomes]
 
 

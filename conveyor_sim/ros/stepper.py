@@ -12,7 +12,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -22,6 +22,7 @@ from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.pacing import Pacer
 from conveyor_sim.ros.session import Session
+from conveyor_sim.simulation import Simulation
 
 T = TypeVar("T")
 IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens
@@ -98,6 +99,11 @@ class Stepper:
         self._wake = threading.Condition()
         self._quit = False
         self._thread = threading.Thread(target=self._run, name="stepper", daemon=True)
+
+    @property
+    def simulation(self) -> Simulation:
+        """That of the present session."""
+        return self.session.simulation
 
     # From any thread
 
@@ -231,17 +237,14 @@ class Stepper:
 
         def done() -> None:
             outcomes, self._outcomes = tuple(self._outcomes), []
-            answer.set_result(replace(self.present(), outcomes=outcomes))
+            answer.set_result(LockstepAnswer.of(simulation, outcomes))
 
         self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
 
     def present(self) -> LockstepAnswer:
         """What the simulation is now, without outcomes."""
-        simulation = self.session.simulation
-        return LockstepAnswer(
-            simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes=()
-        )
+        return LockstepAnswer.of(self.simulation)
 
     def _leave(self, reason: str) -> None:
         """End this run, whatever is under way in it."""

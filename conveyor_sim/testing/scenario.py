@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import ALARMS, ON, Controller
+from conveyor_sim.control.scan import ALARMS, ON, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.line import FAULT
 from conveyor_sim.resources import scene_path
@@ -22,11 +22,20 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing.conditions import Condition, Present, text_of, values
 from conveyor_sim.testing.history import History
 
+if TYPE_CHECKING:
+    from conveyor_sim.ros.attached import AttachedNode
+
 CONTROLLER = "controller"
 """Source of the attached controller's commands, in the bag's outcomes."""
 
+LOCKSTEP = "lockstep"
+"""The same of an attached node, as `sim_node` has it."""
+
 TEST = "test"
 """Source of commands that the test itself gives."""
+
+PATIENCE = 60.0
+"""s of wall time that an attached node has for each request."""
 
 _ROUNDING = 1e-9
 
@@ -85,6 +94,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
         self._outputs.start()
         self._controller: Controller | None = None
+        self._node: AttachedNode | None = None
         self._answer: dict[str, float] = {}
         self._alarms: dict[str, float] = {}
         self._standing: list[Watch] = []
@@ -95,7 +105,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.close()
 
     def close(self) -> None:
-        """End the recording, if there is one; it can't run on then."""
+        """End an attached node, and the recording, if there is one; it can't run on then."""
+        self._end_node()
         if self._recorder is not None:
             self._recorder.close()
 
@@ -126,8 +137,37 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     def attach(self, controller: Controller) -> None:
         """Have a controller scan at this tick and every one to come, in place of the one before."""
+        self._end_node()
         self._controller = controller
         self._scan(controller)
+
+    def attach_node(
+        self,
+        command: Sequence[str],
+        *,
+        namespace: str = "",
+        domain: int | None = None,
+        patience: float = PATIENCE,
+    ) -> None:
+        """Have a controller that is a ROS node in lockstep scan from this tick on, in place of the one before.
+
+        command: starts it, in the environment of its domain; empty: others start it. namespace: in which it looks for
+        `line` and `lockstep`. domain: ROS_DOMAIN_ID; None: one of its own, on this machine only. patience: s of wall
+        time that it has for each request.
+
+        Raises ControlError without ROS 2, or if no request comes, as every later tick does; CommandError, ConveyorError
+        and OSError as `AttachedNode`.
+        """
+        try:
+            from conveyor_sim.ros.attached import AttachedNode
+        except ImportError as error:
+            raise ControlError(f"a node can't be attached here: {error}; expected ROS 2 and conveyor_msgs") from error
+        self._end_node()
+        self._node = node = AttachedNode(
+            self.simulation, command, namespace=namespace, domain=domain, patience=patience
+        )
+        self._controller = node
+        self._scan(node)
 
     def command(self, name: str, value: float) -> None:
         """Give a command for the next tick; one of the controller's of the same name comes after it.
@@ -217,14 +257,18 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _step(self) -> None:
         __tracebackhide__ = True
         if self._answer:
-            self.simulation.command(tuple(self._answer), tuple(self._answer.values()), CONTROLLER)
+            source = CONTROLLER if self._node is None else LOCKSTEP
+            self.simulation.command(tuple(self._answer), tuple(self._answer.values()), source)
         try:
             self.simulation.advance()
         except SimulationError:
             self._outputs.after_failure()
             raise
         refused = []
-        for outcome in self._outputs.after_tick():
+        outcomes = self._outputs.after_tick()
+        if self._node is not None:
+            self._node.note(outcomes)
+        for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
             else:
@@ -237,6 +281,11 @@ class Scenario(AbstractContextManager["Scenario"]):
         for watch in self._standing:
             self._check(watch)
 
+    def _end_node(self) -> None:
+        if self._node is not None:
+            self._node.close()
+            self._node = None
+
     def _look(self) -> None:
         """Read the signals of a tick that is reached."""
         now = self.simulation.signals()
@@ -246,6 +295,8 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _scan(self, controller: Controller) -> None:
         inputs = self._present(self._signals)
         answer = controller.scan(inputs)
+        if not isinstance(answer, Mapping):
+            raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
         self._scan_read |= inputs.read
         self._answer = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
         told = {name: float(value) for name, value in answer.items() if name.startswith(ALARMS)}

@@ -31,8 +31,8 @@ def running(answer: dict[str, float]) -> str:
 
 
 def test_bottles_on_their_way_stop_nothing(scans: Scans) -> None:
-    moving = [(2.0, {eye(name): 1.0}) for name in NAMES]
-    assert [running(answer) for answer in scans.table(moving)] == ["abc"] * 3
+    eyes = [{eye(name): blocked for name in NAMES} for blocked in (1.0, 0.0)]
+    assert [running(answer) for answer in scans.table([(0.9, eyes[0]), (0.3, eyes[1])] * 3)] == ["abc"] * 6
 
 
 def test_zones_stop_as_they_fill_each_after_its_delay(scans: Scans) -> None:
@@ -44,18 +44,29 @@ def test_zones_stop_as_they_fill_each_after_its_delay(scans: Scans) -> None:
     assert running(scans.hold(0.1)) == ""
 
 
-def test_they_start_from_the_front_one_after_the_other(scans: Scans) -> None:
+def test_each_starts_when_the_next_one_has_room(scans: Scans) -> None:
+    full = {eye(name): 1.0 for name in NAMES}
+    scans.hold(2.0, {TAKES: 0.0, **full})
+    assert scans.until(speed("c"), 0.3, 2.0, {TAKES: 1.0}) == pytest.approx(0.7)
+    assert running(scans.hold(5.0)) == "c"  # it is full yet
+    # Free for 0.2 s, and then room for 0.7 s.
+    assert scans.until(speed("b"), 0.3, 2.0, {eye("c"): 0.0}) == pytest.approx(0.9)
+    assert scans.until(speed("a"), 0.3, 2.0, {eye("b"): 0.0}) == pytest.approx(0.9)
+    assert running(scans.hold(5.0)) == "abc"
+
+
+def test_it_stops_again_when_the_next_one_is_full_again(scans: Scans) -> None:
     scans.hold(2.0, {TAKES: 0.0, **{eye(name): 1.0 for name in NAMES}})
-    # A zone's eye may stay blocked by the bottles that come after: only the delays count.
-    started = [scans.until(speed(name), 0.3, 2.0, {TAKES: 1.0}) for name in reversed(NAMES)]
-    assert started == pytest.approx([0.7, 0.69, 0.69])  # the second is counted from the scan after the first
+    assert running(scans.hold(2.0, {TAKES: 1.0, eye("c"): 0.0})) == "bc"
+    assert scans.until(speed("b"), 0.0, 2.0, {eye("c"): 1.0}) == pytest.approx(1.0)
+    assert running(scans.hold(2.0)) == "c"
 
 
 def test_a_zone_that_got_room_runs_although_nothing_is_taken(scans: Scans) -> None:
     scans.hold(2.0, {TAKES: 0.0, **{eye(name): 1.0 for name in NAMES}})
     assert scans.until(speed("b"), 0.3, 1.0, {eye("b"): 0.0}) == pytest.approx(0.2)
     assert running(scans.hold(0.6)) == "b"
-    assert running(scans.hold(0.2)) == "ab"  # b takes what a holds
+    assert running(scans.hold(0.2)) == "ab"  # b has room for what a holds
 
 
 def test_a_short_release_does_not_start_the_row(scans: Scans) -> None:

@@ -51,7 +51,7 @@ class LineClient:
         until(self._clients[name].service_is_ready, f"the service {name}")
         return self._clients[name]
 
-    def call(self, kind: Any, name: str, **fields: Any) -> Any:
+    def call(self, kind: Any, name: str, /, **fields: Any) -> Any:
         """The response of a service."""
         response = self.client(kind, name).call(kind.Request(**fields), timeout_sec=PATIENCE)
         assert response is not None, f"no response of {name}"

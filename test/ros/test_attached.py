@@ -1,0 +1,119 @@
+"""A ROS node attached to a scenario as its controller, over real DDS."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conveyor_msgs import srv
+from ros.conftest import SMALL_LINE
+from ros.line_client import LineClient
+from ros.small_line_controller import make
+
+from conveyor_sim.control import ControlError
+from conveyor_sim.errors import CommandError
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.testing import Scenario
+
+HIGH = 13  # bottles on the table at which the feeder is held
+FEEDER = "belts/feeder/cmd_speed"
+STUCK = "photo_eyes/entry/stuck_on"
+NODE = [sys.executable, "-m", "conveyor_sim.ros.controller_node", "--ros-args", "-r", "__ns:=/cell"]
+NODE += ["-p", f"controller:={Path(__file__).with_name('small_line_controller.py')}:make"]
+NODE += ["-p", f"parameters:='{{high: {HIGH}}}'"]
+
+
+@pytest.fixture
+def scenario() -> Iterator[Scenario]:
+    """The small line."""
+    with Scenario(SMALL_LINE) as scenario:
+        yield scenario
+
+
+def test_a_node_gives_the_bits_of_its_scan_function(scenario: Scenario) -> None:
+    environment = dict(os.environ)
+    with Scenario(SMALL_LINE, {"duration": 1.0}) as other:  # a test is as long as it says, whatever the scene says
+        scenario.attach(make(HIGH))
+        other.attach_node(NODE, namespace="/cell")
+        assert os.environ == environment
+        for line in (scenario, other):
+            line.run_for(3.0)
+        for name in (FEEDER, "belts/table/cmd_speed", "belts/table/bottles"):
+            assert np.array_equal(other.history[name], scenario.history[name])
+        assert other.simulation.state_hash() == scenario.simulation.state_hash()
+        assert np.ptp(other.history[FEEDER]) > 0.0  # it did act
+
+
+def test_it_is_served_as_by_the_simulation_s_own_node(scenario: Scenario, domain: int, client: LineClient) -> None:
+    def scans() -> dict[str, Any]:
+        return {
+            "probe": client.lockstep(0),
+            "five": client.lockstep(5, names=[FEEDER], values=[0.25]),
+            "again": client.lockstep(5, names=[FEEDER], values=[0.25]),
+            "stranger": client.lockstep(6, run_id="other"),
+            "seven": client.lockstep(7, release=True),
+        }
+
+    with ThreadPoolExecutor(1) as pool:
+        node = pool.submit(scans)
+        scenario.attach_node((), domain=domain)
+        scenario.inject(STUCK)
+        scenario.run_for(0.3)
+        answers = node.result()
+
+    engine = Simulation(load_scene(SMALL_LINE))
+    engine.command([FEEDER], [0.25])
+    engine.inject(STUCK, 1.0)
+    for name, tick in (("probe", 0), ("five", 5), ("stranger", 5), ("seven", 7)):
+        engine.advance(tick - engine.tick)
+        answer = answers[name]
+        assert (answer.tick, answer.state_hash) == (tick, engine.state_hash() if tick else answer.state_hash)
+        assert answer.signals.tick == tick
+    assert np.array_equal(answers["seven"].signals.values, engine.signals())
+    assert answers["again"] == answers["five"]
+    assert [(each.source, list(each.names), each.accepted) for each in answers["five"].outcomes] == [
+        ("fault", [STUCK], True),
+        ("lockstep", [FEEDER], True),
+    ]
+    assert not (answers["probe"].accepted or answers["stranger"].accepted)
+    assert "stale: target_tick 0 given" in answers["probe"].reason
+    assert "owned by run 'test'" in answers["stranger"].reason
+    engine.advance(30 - engine.tick)  # released, it goes on alone
+    assert scenario.simulation.state_hash() == engine.state_hash()
+
+
+def test_a_refused_command_fails(scenario: Scenario, domain: int, client: LineClient) -> None:
+    def ask() -> None:
+        request = srv.Lockstep.Request(run_id="test", target_tick=1, names=[FEEDER], values=[])
+        client.client(srv.Lockstep, "/cell/lockstep").call_async(request)
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(ask)
+        with pytest.raises(CommandError, match=r"^at 0\.00 s a command was refused: 1 names and 0 values given"):
+            scenario.attach_node((), namespace="/cell", domain=domain)
+
+
+def test_a_node_that_never_asks(scenario: Scenario, tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    sleeps = f"import os, pathlib, time; pathlib.Path({str(file)!r}).write_text(str(os.getpid())); time.sleep(600)"
+    with pytest.raises(ControlError) as failure:
+        scenario.attach_node([sys.executable, "-c", sleeps], namespace="/cell", patience=2.0)
+    text = str(failure.value)
+    assert text.startswith("at 0.00 s no request for a tick after 0 within 2 s of wall time, expected at the service ")
+    assert "the service /cell/lockstep in ROS domain " in text
+    scenario.close()
+    assert not Path("/proc", file.read_text()).exists()
+
+
+def test_a_node_that_ends(scenario: Scenario) -> None:
+    with pytest.raises(ControlError) as failure:
+        scenario.attach_node([sys.executable, "-c", "raise SystemExit('no such recipe')"])
+    ended = "controller ended with exit code 1; the end of its log:\n  no such recipe"
+    assert str(failure.value) == f"at 0.00 s no controller: {ended}"
