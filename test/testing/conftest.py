@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numba
 import pytest
 
 from conveyor_sim.testing import Scenario
@@ -17,3 +18,9 @@ STOP = "machines/packer/stop"
 @pytest.fixture
 def table() -> Scenario:
     return Scenario(TABLE)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def numba_is_loaded() -> None:
+    """pytester forgets the modules that a run within this process has imported; numba can't be imported twice."""
+    numba.njit(lambda: 0)()
