@@ -1,4 +1,4 @@
-"""Two ways to combine two lanes into single file, at two bottles a second.
+"""Two ways to combine two lanes into single file, for a machine that needs two bottles a second.
 
 With pressure: a backlog is pressed between converging rails and leaves nose to tail. Without: the lanes slide along a
 rail over faster and faster belts, get gaps, and mesh. Both keep the rate; what bottles rub off each other and the rails
@@ -17,7 +17,7 @@ from conveyor_sim.testing import Scenario
 from conveyor_sim.testing.plugin import Lines
 
 RATE = 2.0  # 1/s, that the next machine needs
-DISCHARGE = 0.15  # m/s, of the fault: bottles of 80 mm leave at 1.9 a second at most
+DISCHARGE = 0.16  # m/s, of the fault: just nose to tail, bottles of 80 mm
 FILL = 25.0  # s until the line is as it stays
 SPAN = 60.0  # s, that are looked at
 
@@ -90,6 +90,7 @@ def test_without_pressure_it_does_so_with_half_the_scuffing(line: Lines, pressed
 
 def test_a_discharge_belt_that_is_too_slow_backs_up_and_presses(line: Lines, pressed: Result) -> None:
     result = run(line("scenarios/pressureless_combiner"), speeds(0.35, 0.5, DISCHARGE))
-    assert result.rate < DISCHARGE / 0.08
-    with pytest.raises(AssertionError, match="rate"):
+    assert result.rate < 0.98 * RATE
+    assert result.scuffing > 0.5 * pressed.scuffing
+    with pytest.raises(AssertionError):
         check(result, pressed)

@@ -81,7 +81,7 @@ def test_the_number_may_change_from_tick_to_tick() -> None:
     crew, sizes = other._integration._crew, [1, 3, 2, 2, 1, 3, 1, 2, 3]
     for size in sizes:
         steps = other.model.steps_per_tick
-        other._apply_commands()
+        other._line.begin(other.tick)
         assert crew.advance(size, other._integration._advance, other._state.world, steps, other.model.dt, 0) == steps
         other.tick += 1
     assert other.state_hash() == one.state_hash()
