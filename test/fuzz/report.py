@@ -33,17 +33,22 @@ class Figures:
     """By kind."""
     files: dict[str, str] = field(default_factory=dict)
     """The smallest case of each kind of failure."""
+    attacks: dict[str, Counter[str]] = field(default_factory=dict)
+    """Cases by what came of them, for each target of `targets/`."""
 
-    def add(self, number: int, tally: dict[str, Any]) -> None:
-        """Adds what one family came to."""
+    def add(self, tally: dict[str, Any]) -> None:
+        """Adds what one portion came to: a family of scenes, or seeds of a target."""
+        self.failures += Counter(tally["failures"])
+        self.files |= tally["shrunk"]
+        if (target := tally.get("target")) is not None:
+            self.attacks[target] = self.attacks.get(target, Counter()) + Counter(tally["counts"])
+            return
         self.families += 1
         self.simulated += tally["simulated"]
         self.largest = max(self.largest, tally["largest"])
         self.counts += Counter(tally["counts"])
         self.integrators[tally["integrator"]] += tally["counts"].get("run", 0)
         self.stopped += Counter(tally["stopped"])
-        self.failures += Counter(tally["failures"])
-        self.files |= tally["shrunk"]
 
     def crashed(self, kind: str, file: Path) -> None:
         """Adds a process that ended before its time."""
@@ -54,8 +59,9 @@ class Figures:
         """A table, and the failures by kind."""
         counts = self.counts
         tried = sum(counts[how] for how in ("run", "refused", "stopped", "too long", "failed"))
-        rows = [
-            ("wall time", f"{self.minutes:.0f} min, seeds {self.seed} to {self.seed + max(self.families, 1) - 1}"),
+        rows = [("wall time", f"{self.minutes:.0f} min")]
+        scenes = [
+            ("seeds", f"{self.seed} to {self.seed + max(self.families, 1) - 1}"),
             ("mixtures of effects and integrator", f"{self.families}"),
             ("scenes tried", f"{tried:,}"),
             ("run as they should", f"{counts['run']:,}"),
@@ -71,7 +77,10 @@ class Figures:
             ("bottles x ticks checked", f"{counts['bottle_ticks']:,}"),
             ("bags replayed", f"{counts['replayed']:,}"),
         ]  # fmt: skip
+        if self.families:
+            rows += scenes
         lines = ["| | |", "| --- | --- |", *(f"| {name} | {value} |" for name, value in rows), ""]
+        lines += [f"- {target}: {_said(counts)}" for target, counts in sorted(self.attacks.items())]
         lines += [f"- {number} stopped: {kind}" for kind, number in self.stopped.most_common()]
         lines += [f"- {number} **failed**: {kind}" for kind, number in self.failures.most_common()]
         return "\n".join(lines).rstrip() + "\n"
@@ -90,3 +99,8 @@ class Figures:
         page = folder / "fuzz.md"
         before, _, rest = (page.read_text(encoding="utf-8") if page.exists() else f"{BEGIN}{END}\n").partition(BEGIN)
         page.write_text(f"{before}{BEGIN}\n{self.markdown()}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+
+
+def _said(counts: Counter[str]) -> str:
+    kinds = ", ".join(f"{number:,} {kind}" for kind, number in counts.most_common())
+    return f"{counts.total():,} cases: {kinds}"
