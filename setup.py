@@ -37,7 +37,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", glob("config/*.yaml")),
         (f"share/{NAME}/config/scenarios", glob("config/scenarios/*.yaml")),
-        (f"share/{NAME}/config/ros", glob("config/ros/*.yaml")),
+        (f"share/{NAME}/config/ros", glob("config/ros/*")),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
         (f"share/{NAME}/msg_defs", ["msg_defs/package.xml", "msg_defs/CMakeLists.txt"]),
         (f"share/{NAME}/msg_defs/msg", glob("msg_defs/msg/*.msg")),

@@ -33,7 +33,7 @@ class Process:
         lead = [sys.executable, "-I", "-S", str(LIFELINE), str(watched), str(PATIENCE)]
         try:
             with self.log.open("wb") as output:
-                # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children in order.
+                # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children.
                 self._process = subprocess.Popen(
                     [*lead, *command],
                     env=dict(environment),

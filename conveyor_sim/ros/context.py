@@ -32,6 +32,16 @@ def start_ros(context: Context | None = None) -> None:
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
+@contextmanager
+def running_ros() -> Iterator[None]:
+    """ROS in the default context for as long as the context lasts. Raises ConveyorError as start_ros()."""
+    start_ros()
+    try:
+        yield
+    finally:
+        rclpy.shutdown()
+
+
 def new_node(name: str, **options: Any) -> Node:
     """rclpy's Node(name, **options). Raises ConveyorError if DDS or ROS refuses it."""
     with _one_sentence():

@@ -1,4 +1,4 @@
-"""Warns of others on the ROS graph that would mix with a simulation: of the same names, or with a clock of their own."""
+"""Warns of others on the ROS graph that mix with a simulation: of the same names, or with a clock of their own."""
 
 from __future__ import annotations
 

@@ -2,11 +2,11 @@
 
     python -I -S lifeline.py DESCRIPTOR PATIENCE COMMAND...
 
-It becomes the command, as the leader of a session of its own. A watcher stays behind in the command's process group: when
-the other end of the pipe DESCRIPTOR is closed, which only a parent's end does, it interrupts the group as Ctrl-C would, so that
-a recording is completed, and kills what is left after PATIENCE seconds. When the command ends, so does whatever it
-left in its group. The kernel's own "signal at the parent's death" goes by the thread that started the command and
-reaches none of the command's own children.
+It becomes the command, as the leader of a session of its own. A watcher stays behind in the command's process group.
+The other end of the pipe DESCRIPTOR is the parent's alone: when it is closed, by the parent or by its death, the
+watcher interrupts the group as Ctrl-C would, so that a recording is completed, and kills what is left after PATIENCE
+seconds. When the command ends, so does whatever it left in its group. The kernel's own signal at the parent's death
+goes by the thread that started the command, and reaches none of the command's children.
 
 A program of its own, of the standard library only: it is there in 20 ms, before any of ROS is loaded.
 """

@@ -10,13 +10,12 @@ from collections.abc import Mapping
 from contextlib import closing, suppress
 from typing import Any
 
-import rclpy
 
 from conveyor_sim.control.level import Count, LevelControl
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.process_image import speed_command
-from conveyor_sim.ros.context import new_node, start_ros
+from conveyor_sim.ros.context import new_node, running_ros
 from conveyor_sim.ros.controller import ControllerRun, Stopped
 from conveyor_sim.ros.declared import Entry, declare_table
 from conveyor_sim.ros.stop_request import StopRequest
@@ -64,13 +63,10 @@ def main() -> None:
     """Exits with 0 at the end or after Ctrl-C or SIGTERM, with 1 and one sentence if the controller can't go on."""
     with StopRequest() as stop:
         try:
-            start_ros()
-            run(stop)
+            with running_ros():
+                run(stop)
         except ConveyorError as error:
             sys.exit(f"plc_node: {error}")
-        finally:
-            if rclpy.ok():
-                rclpy.shutdown()
 
 
 if __name__ == "__main__":

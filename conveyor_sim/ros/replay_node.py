@@ -63,7 +63,9 @@ class ReplayNode:
         self._quit = False
         playback = Playback(bag)
         self._spinner = Spinner(context, died=self._die)
-        self._node = new_node("conveyor_replay", context=context, namespace=bag.namespace, cli_args=list(arguments) or None)
+        self._node = new_node(
+            "conveyor_replay", context=context, namespace=bag.namespace, cli_args=list(arguments) or None
+        )
         try:
             self._publishers = self._advertise(bag, playback.topics)
             clock = ClockPublisher(self._node, CLOCK_RATE)
