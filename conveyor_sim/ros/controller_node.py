@@ -12,7 +12,6 @@ import sys
 from contextlib import closing, suppress
 from typing import Any
 
-
 from conveyor_sim.control.load import load
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from contextlib import closing, suppress
 from typing import Any
 
-
 from conveyor_sim.control.level import Count, LevelControl
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError

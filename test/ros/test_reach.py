@@ -1,4 +1,4 @@
-"""What another machine on the network can do, measured: docs/ros.md, Security. Two network namespaces stand for two machines."""
+"""What another machine on the network can do (docs/ros.md, Security). Network namespaces stand for machines."""
 
 from __future__ import annotations
 
