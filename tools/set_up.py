@@ -188,7 +188,8 @@ def set_up(distro: str, tools: str) -> None:
     if environment.state.get("packages") != packages:
         say(f"ROS 2 {distro.capitalize()} and Python packages: about 1 GB on disk, one to three minutes ...")
         environment.pip_install(
-            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot,test]"], "installing ROS 2 and Python packages"
+            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot,test]"],
+            "installing ROS 2 and Python packages",
         )
         environment.write_state(packages=packages)
     if environment.state.get("messages") != messages:

@@ -56,6 +56,18 @@ def test_of_the_simulation(arguments: list[str], environment: Mapping[str, str],
     assert ".c:" not in text
 
 
+def test_of_a_keystore_that_cannot_be_used(tmp_path: Path) -> None:
+    """The wheels are built without security; where it is there, these files are no certificates."""
+    enclave = tmp_path / "enclaves"
+    enclave.mkdir()
+    for name in ("identity_ca.cert", "cert", "key", "permissions_ca.cert"):
+        (enclave / f"{name}.pem").write_text("none")
+    for name in ("governance", "permissions"):
+        (enclave / f"{name}.p7s").write_text("none")
+    text = refused(SIM_NODE, {**ENFORCE, "ROS_SECURITY_KEYSTORE": str(tmp_path)})
+    assert text.startswith("sim_node: ROS can't start: ")
+
+
 @pytest.mark.parametrize("name", ["plc_node", "controller_node"])
 def test_of_a_controller(name: str) -> None:
     assert refused(["-m", f"conveyor_sim.ros.{name}"], MISSING) == f"{name}: {NO_FOLDER}"

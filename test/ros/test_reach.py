@@ -140,10 +140,12 @@ def test_localhost_keeps_out_who_does_not_name_this_machine_and_the_profile_ever
         assert here.start(stack, "-c", LISTEN, *domains, environment=LOCALHOST)[1] == "heard default localhost profile"
 
 
-def test_by_default_another_machine_can_reset_the_simulation(machines: tuple[Machine, Machine]) -> None:
+def test_localhost_alone_lets_a_machine_that_names_this_one_reset_the_simulation(
+    machines: tuple[Machine, Machine],
+) -> None:
     here, there = machines
-    environment = {"ROS_DOMAIN_ID": "33"}
+    domain = {"ROS_DOMAIN_ID": "33"}
     node = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", "-p", f"scene:={SMALL_LINE}", "-p", "start_paused:=true"]
     with ExitStack() as stack:
-        here.start(stack, *node, environment=environment)
-        assert there.start(stack, "-c", RESET, environment=environment)[1] == "result 1"  # RESULT_OK
+        here.start(stack, *node, environment={**domain, **LOCALHOST})
+        assert there.start(stack, "-c", RESET, environment={**domain, **STRANGER})[1] == "result 1"  # RESULT_OK
