@@ -37,7 +37,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", glob("config/*.yaml")),
         (f"share/{NAME}/config/scenarios", glob("config/scenarios/*.yaml")),
-        (f"share/{NAME}/config/ros", glob("config/ros/*.yaml")),
+        (f"share/{NAME}/config/ros", glob("config/ros/*")),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
         (f"share/{NAME}/msg_defs", ["msg_defs/package.xml", "msg_defs/CMakeLists.txt"]),
         (f"share/{NAME}/msg_defs/msg", glob("msg_defs/msg/*.msg")),
@@ -46,7 +46,7 @@ setup(
     zip_safe=False,
     python_requires=">=3.10",
     install_requires=requirements("run"),
-    extras_require={"plot": requirements("plot"), "bench": requirements("bench")},
+    extras_require={"plot": requirements("plot"), "bench": requirements("bench"), "test": requirements("pytest")},
     entry_points={
         "console_scripts": [
             "conveyor-sim = conveyor_sim.cli:main",

@@ -93,6 +93,40 @@ def test_package_xml_names_every_ros_package_that_is_imported() -> None:
     assert ros | {"rclpy"} <= declared | {"simulation_interfaces"}  # served only where it is installed
 
 
+def test_ros_finds_the_package_in_the_environment_of_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `ros2 pkg prefix`, `ros2 run` and `ros2 launch` look for it; set up twice, as after a change."""
+    index = pytest.importorskip("ament_index_python", reason="needs ROS 2")
+    spec = importlib.util.spec_from_file_location("set_up", ROOT / "tools" / "set_up.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    distribution = importlib.metadata.distribution("conveyor_sim")
+    installed = tmp_path / "lib" / "python3.11" / "site-packages" / "conveyor_sim-0.dist-info"
+    installed.mkdir(parents=True)
+    (installed / "entry_points.txt").write_text(distribution.read_text("entry_points.txt") or "")
+    (tmp_path / "bin").symlink_to(Path(sys.executable).parent)
+    environment = module.Environment("jazzy")
+    environment.path = tmp_path
+    for _ in range(2):
+        environment.register()
+
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    assert index.get_package_prefix("conveyor_sim") == str(tmp_path)
+    share = Path(index.get_package_share_directory("conveyor_sim"))
+    assert (share / "launch" / "line.launch.py").is_file()
+    assert ElementTree.parse(share / "package.xml").findtext("name") == "conveyor_sim"
+    executables = list((tmp_path / "lib" / "conveyor_sim").iterdir())
+    assert {file.name for file in executables} == {"controller_node", "conveyor-sim", "plc_node", "sim_node"}
+    assert all(os.access(file, os.X_OK) for file in executables)
+
+
+def test_an_extra_brings_what_scenarios_run_with(tmp_path: Path) -> None:
+    described = run(sys.executable, "setup.py", "-q", "egg_info", "--egg-base", tmp_path, cwd=ROOT)
+    assert described.returncode == 0, described.stderr
+    extras = (tmp_path / "conveyor_sim.egg-info" / "requires.txt").read_text().partition("[test]\n")[2]
+    assert extras.startswith("pytest")
+
+
 def test_colcon_lists_both_packages() -> None:
     listed = run(COLCON, "--log-base", "/dev/null", "list", "--base-paths", ".", "msg_defs", "--names-only", cwd=ROOT)
     assert sorted(listed.stdout.split()) == ["conveyor_msgs", "conveyor_sim"]

@@ -5,6 +5,7 @@ from msg_defs/. `set-up.json` in the environment holds a key of what each stage 
 still holds is skipped. The file is away while pip works, so an environment that was interrupted is made afresh.
 """
 
+import configparser
 import fcntl
 import hashlib
 import json
@@ -18,6 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
 TOOLS = {"test": "the test tools", "bench": "what is compared with"}
+SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, where ROS looks for a package's share
 STRIP = ROOT / "tools" / "strip_missing_includes.cmake"
 
 
@@ -102,6 +104,25 @@ class Environment:
         command([cmake, "-G", "Ninja", "-S", ROOT / "msg_defs", "-B", build, *defines], what, log, env)
         command([cmake, "--build", build, "--target", "install"], what, log, env)
 
+    def register(self) -> None:
+        """Lets ROS find the package by name (`ros2 pkg prefix`, `ros2 run`, `ros2 launch`): pip, editable, leaves out
+        share/, and puts executables into bin/ only.
+        """
+        index = self.path / "share" / "ament_index" / "resource_index" / "packages"
+        share, executables = self.path / "share" / "conveyor_sim", self.path / "lib" / "conveyor_sim"
+        for folder in (share, executables):
+            shutil.rmtree(folder, ignore_errors=True)
+        for folder in (index, share, executables):
+            folder.mkdir(parents=True, exist_ok=True)
+        for name in SHARED:
+            (share / name).symlink_to(ROOT / name)
+        scripts = configparser.ConfigParser()
+        scripts.optionxform = str
+        scripts.read(self.path.glob("lib/python3*/site-packages/conveyor_sim-*.dist-info/entry_points.txt"))
+        for name in scripts["console_scripts"]:
+            (executables / name).symlink_to(self.path / "bin" / name)
+        (index / "conveyor_sim").touch()
+
 
 def say(text: str) -> None:
     print(f"[set-up] {text}", flush=True)
@@ -150,10 +171,11 @@ def set_up(distro: str, tools: str) -> None:
     environment = Environment(distro)
     requirements = ROOT / "requirements"
     build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
-    described = ("requirements/run.txt", "requirements/plot.txt", "setup.py", "setup.cfg", "conveyor_sim/version.py")
+    lists = ("run", "plot", "pytest")
+    described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/version.py")
     packages = key(*build, *(ROOT / name for name in described))
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
-    needed = {"packages": packages, "messages": messages}
+    needed = {"packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
     if tools:
         needed[tools] = key(requirements / f"{tools}.txt")
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
@@ -166,7 +188,8 @@ def set_up(distro: str, tools: str) -> None:
     if environment.state.get("packages") != packages:
         say(f"ROS 2 {distro.capitalize()} and Python packages: about 1 GB on disk, one to three minutes ...")
         environment.pip_install(
-            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot]"], "installing ROS 2 and Python packages"
+            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot,test]"],
+            "installing ROS 2 and Python packages",
         )
         environment.write_state(packages=packages)
     if environment.state.get("messages") != messages:
@@ -174,6 +197,10 @@ def set_up(distro: str, tools: str) -> None:
         environment.forget("messages")
         environment.build_messages()
         environment.write_state(messages=messages)
+    if environment.state.get("index") != needed["index"]:
+        environment.forget("index")
+        environment.register()
+        environment.write_state(index=needed["index"])
     if tools and environment.state.get(tools) != needed[tools]:
         say(f"{TOOLS[tools]} ...")
         environment.pip_install(["-r", requirements / f"{tools}.txt"], f"installing {TOOLS[tools]}")

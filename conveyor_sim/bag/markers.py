@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from conveyor_sim.scene.sensor_shapes import SensorShape
 
 ARROW, LINE_STRIP, SPHERE_LIST, TEXT_VIEW_FACING, TRIANGLE_LIST = 0, 4, 7, 9, 11
-ADD, DELETE = 0, 2
+ADD, DELETEALL = 0, 3
 
 Colour = tuple[float, float, float, float]
 BELT_COLOURS: tuple[Colour, ...] = ((0.45, 0.52, 0.58, 1.0), (0.53, 0.60, 0.66, 1.0))
@@ -59,11 +59,16 @@ class Marker:
     action: int = ADD
 
 
+CLEAR = Marker("", 0, ARROW, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), action=DELETEALL)
+
+
 def marker_array(markers: Sequence[Marker], header: Header) -> bytes:
-    """A MarkerArray as CDR bytes."""
+    """A MarkerArray as CDR bytes: the whole picture. It begins by deleting what the topic has shown before, which may
+    be of another scene: a viewer stays open while simulations come and go.
+    """
     writer = CdrWriter()
-    writer.pack("I", len(markers))
-    for marker in markers:
+    writer.pack("I", 1 + len(markers))
+    for marker in (CLEAR, *markers):
         _write(writer, marker, header)
     return writer.finish()
 
@@ -94,17 +99,16 @@ def _write(writer: CdrWriter, marker: Marker, header: Header) -> None:
 def bottles_markers(
     columns: BottleColumns, radii: NDArray[np.float64], moving: Sequence[RailShape], header: Header
 ) -> bytes:
-    """What moves: one SPHERE_LIST a bottle type, resting on the belts (z = 0), deleted where a type has no bottles; and
-    rails that move.
-    """
+    """What moves: one SPHERE_LIST a bottle type that has bottles, resting on the belts (z = 0); and rails that move."""
     markers = []
     for index, radius in enumerate(radii):
         chosen = columns.type == index
+        if not chosen.any():
+            continue
         points = xyz_rows(np.column_stack((columns.x[chosen], columns.y[chosen])), z=float(radius))
         colour = BOTTLE_COLOURS[index % len(BOTTLE_COLOURS)]
-        action = ADD if len(points) else DELETE
         size = 2.0 * float(radius)
-        markers.append(Marker("bottles", index, SPHERE_LIST, (size, size, size), colour, points, action=action))
+        markers.append(Marker("bottles", index, SPHERE_LIST, (size, size, size), colour, points))
     return marker_array([*markers, *_rails("moving_rails", moving)], header)
 
 

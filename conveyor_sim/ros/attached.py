@@ -22,9 +22,7 @@ from typing import TypeVar
 import rclpy
 from conveyor_msgs.msg import Line
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
-from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.bag.messages import LINE, Header, line_message
 from conveyor_sim.bag.qos import QOS
@@ -33,6 +31,7 @@ from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.ros.child import Process
+from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.lockstep_service import LockstepService
@@ -119,9 +118,9 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
     def _serve(self, stack: ExitStack, namespace: str) -> str:
         """Start the node; the whole name of its service."""
         context = Context()
-        rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+        start_ros(context)
         stack.callback(rclpy.shutdown, context=context)
-        node = Node("conveyor_sim", context=context, namespace=namespace)
+        node = new_node("conveyor_sim", context=context, namespace=namespace)
         stack.callback(node.destroy_node)
         lines = node.create_publisher(Line, "line", ros_qos(QOS["line"]))
         check_type(node, lines.topic_name, LINE, default_distro())

@@ -1,7 +1,10 @@
-"""A child process: its output goes to a log file, and it ends when asked to."""
+"""A child process: its output goes to a log file; it ends when asked to, and with its parent at the latest."""
 
 from __future__ import annotations
 
+import errno
+import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 PATIENCE = 20.0  # s of wall time that a process has for an orderly end
+LIFELINE = Path(__file__).with_name("lifeline.py")
 TAIL = 15  # lines of a log shown when its process fails
 
 
@@ -16,19 +20,34 @@ class Process:
     """One process, from its start until stop()."""
 
     def __init__(self, name: str, command: Sequence[str], environment: Mapping[str, str], log_folder: Path) -> None:
-        """Runs a command; its output goes to `<log_folder>/<name>.log`. Raises OSError if it can't be run."""
+        """Runs a command; its output goes to `<log_folder>/<name>.log`. Raises OSError if there is no such command.
+
+        When this process ends, even by SIGKILL, the command is interrupted as by stop().
+        """
+        if shutil.which(command[0], path=environment.get("PATH")) is None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), command[0])
         self.name = name
         self.log = log_folder / f"{name}.log"
-        with self.log.open("wb") as output:
-            # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children in order.
-            self._process = subprocess.Popen(
-                command,
-                env=dict(environment),
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
+        watched, lifeline = os.pipe()
+        self._lifeline: int | None = lifeline
+        lead = [sys.executable, "-I", "-S", str(LIFELINE), str(watched), str(PATIENCE)]
+        try:
+            with self.log.open("wb") as output:
+                # A session of its own: Ctrl-C at the terminal reaches the parent alone, which ends its children.
+                self._process = subprocess.Popen(
+                    [*lead, *command],
+                    env=dict(environment),
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                    pass_fds=[watched],
+                )
+        except BaseException:
+            os.close(lifeline)
+            raise
+        finally:
+            os.close(watched)
 
     @property
     def pid(self) -> int:
@@ -41,14 +60,17 @@ class Process:
         return self._process.poll()
 
     def stop(self) -> None:
-        """End it if it still runs, orderly if it lets itself be."""
+        """End it and what it has started, if it still runs, orderly if it lets itself be."""
         if self.exit_code is None:
-            self._process.send_signal(signal.SIGINT)
+            os.killpg(self.pid, signal.SIGINT)
             try:
                 self._process.wait(PATIENCE)
             except subprocess.TimeoutExpired:
-                self._process.kill()
+                os.killpg(self.pid, signal.SIGKILL)
                 self._process.wait()
+        if self._lifeline is not None:
+            os.close(self._lifeline)
+            self._lifeline = None
 
     def last_words(self) -> str:
         """The end of its log, indented."""

@@ -17,6 +17,8 @@ class ClockPublisher:
 
     def __init__(self, node: Node, rate: float) -> None:
         self._publisher = node.create_publisher(Clock, "/clock", ros_qos(QOS["clock"]))
+        self.topic: str = self._publisher.topic_name
+        """Its whole name, remapped or not."""
         self._cap = RateCap(rate)
 
     def beat(self, stamp_ns: int, now: float) -> None:

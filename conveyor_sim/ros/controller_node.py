@@ -12,13 +12,10 @@ import sys
 from contextlib import closing, suppress
 from typing import Any
 
-import rclpy
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-
 from conveyor_sim.control.load import load
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.context import new_node, running_ros
 from conveyor_sim.ros.controller import ControllerRun, Stopped
 from conveyor_sim.ros.declared import Entry, declare_table
 from conveyor_sim.ros.stop_request import StopRequest
@@ -38,7 +35,7 @@ PARAMETERS = (
 
 def run(stop: StopRequest) -> None:
     """Control until the end of the run, or until asked to stop. Raises ConveyorError."""
-    node = Node(NAME)
+    node = new_node(NAME)
     given = declare_table(node, PARAMETERS)
     if given["mode"] not in MODES:
         raise ConveyorError(f"parameter mode: {given['mode']!r} given, expected {' or '.join(MODES)}")
@@ -70,13 +67,11 @@ def _mapping(text: str) -> dict[str, object]:
 def main() -> None:
     """Exits with 0 at the end or after Ctrl-C or SIGTERM, with 1 and one sentence if the controller can't go on."""
     with StopRequest() as stop:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         try:
-            run(stop)
+            with running_ros():
+                run(stop)
         except ConveyorError as error:
             sys.exit(f"controller_node: {error}")
-        finally:
-            rclpy.shutdown()
 
 
 if __name__ == "__main__":

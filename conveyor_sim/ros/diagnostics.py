@@ -10,6 +10,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.qos import QOS
+from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import RosSink, ros_qos
 from conveyor_sim.ros.stepper import State, Stepper
@@ -20,13 +21,14 @@ WALL = "wall time from first to last tick (s)"
 
 
 class Diagnostics:
-    """Level WARN after a second with overruns, refused commands or a word of the guard, ERROR while it can
-    not go on.
+    """Level WARN after a second with overruns, refused commands or a word of the guard, and while others on the graph
+    mix with it; ERROR while it can not go on.
     """
 
-    def __init__(self, node: Node, stepper: Stepper, sink: RosSink) -> None:
+    def __init__(self, node: Node, stepper: Stepper, sink: RosSink, graph: GraphWatch) -> None:
         self._stepper = stepper
         self._sink = sink
+        self._graph = graph
         self._name = f"{node.get_name()}: simulation"
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", ros_qos(QOS["diagnostics"]))
         self._last_wall = time.monotonic()
@@ -48,6 +50,10 @@ class Diagnostics:
         noticed = stepper.guard_events - self._last_guard_events
         status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
         status.level, status.message = _verdict(stepper, overruns, refused, noticed)
+        not_alone = self._graph.look()
+        if not_alone and status.level != DiagnosticStatus.ERROR:
+            status.level = DiagnosticStatus.WARN
+            status.message = f"{status.message}; not alone in this ROS domain"
         values = {
             "state": stepper.state.name,
             "run_id": session.run_id,
@@ -70,6 +76,7 @@ class Diagnostics:
             "bottles fed": counts.fed,
             "bottles removed": counts.removed,
             "recording": session.bag or "",
+            "not alone": "; ".join(not_alone),
         }
         values |= {f"published {topic}": count for topic, count in sorted(self._sink.published.items())}
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.resources import config_dir
 
 # Above 101 the UDP ports of a domain meet Linux's ephemeral ones; 0 is everybody's default.
 _DOMAINS = range(101, 0, -1)
@@ -33,18 +34,6 @@ _SCRUBBED = (
 )
 
 
-# Announced by itself every 3 s only, a participant that misses another's first announcements is found that much later.
-_FAST_DISCOVERY = """<?xml version="1.0" encoding="UTF-8"?>
-<profiles xmlns="http://www.eprosima.com">
-  <participant profile_name="fast_discovery" is_default_profile="true">
-    <rtps><builtin><discovery_config>
-      <leaseAnnouncement><sec>0</sec><nanosec>250000000</nanosec></leaseAnnouncement>
-    </discovery_config></builtin></rtps>
-  </participant>
-</profiles>
-"""
-
-
 @contextmanager
 def private_domain() -> Iterator[int]:
     """Put this process's environment, and so its children's, into a ROS domain that nothing else on this machine uses.
@@ -62,13 +51,12 @@ def own_domain() -> Iterator[dict[str, str]]:
 
     Raises ConveyorError if every domain is taken.
     """
-    with _free_domain() as domain, tempfile.TemporaryDirectory(prefix="conveyor_sim_dds_") as folder:
-        profile = Path(folder) / "fast_discovery.xml"
-        profile.write_text(_FAST_DISCOVERY, encoding="utf-8")
+    with _free_domain() as domain:
         environment = {name: value for name, value in os.environ.items() if name not in _SCRUBBED}
         environment["ROS_DOMAIN_ID"] = str(domain)
         environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        environment[_profile_variable()] = str(profile)
+        # LOCALHOST alone keeps out only who does not name this machine as a peer.
+        environment[_profile_variable()] = str(config_dir() / "ros" / "this_machine_only.xml")
         yield environment
 
 

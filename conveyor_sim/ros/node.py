@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from conveyor_sim.bag.outputs import OUTPUTS, photo_eye_outputs
@@ -17,8 +16,10 @@ from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.commands import subscribe_commands
+from conveyor_sim.ros.context import new_node
 from conveyor_sim.ros.diagnostics import Diagnostics
 from conveyor_sim.ros.fault_service import FaultService
+from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import RosSink
@@ -43,7 +44,7 @@ class SimNode:
         self.error: Exception | None = None
         self._on_stop = on_stop
         self._spinner = Spinner(context, died=self._die)
-        self._node = Node("conveyor_sim", context=context, cli_args=list(arguments) if arguments else None)
+        self._node = new_node("conveyor_sim", context=context, cli_args=list(arguments) if arguments else None)
         try:
             self.stepper = self._build()
         except BaseException:
@@ -94,7 +95,7 @@ class SimNode:
         CheckpointServices(node, executor, stepper)
         FaultService(node, executor, stepper)
         LockstepService(node, executor, stepper, given.frame_id)
-        Diagnostics(node, stepper, sink)
+        Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
         def on_set(changed: list[Parameter]) -> None:
             for parameter in changed:

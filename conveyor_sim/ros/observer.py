@@ -8,11 +8,10 @@ from contextlib import AbstractContextManager
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.bag.qos import QOS
+from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.diagnostics import TICK, WALL
 from conveyor_sim.ros.publishers import ros_qos
 
@@ -27,8 +26,8 @@ class Observer(AbstractContextManager["Observer"]):
         self.time = 0.0  # s, simulated
         self.wall: float | None = None  # s from the first tick to the last one, once that has passed
         self._last_tick = last_tick
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node("observer")
+        start_ros()
+        self._node = new_node("observer")
         self._node.create_subscription(Clock, "/clock", self._on_clock, ros_qos(QOS["clock"]))
         self._node.create_subscription(
             DiagnosticArray, "/diagnostics", self._on_diagnostics, ros_qos(QOS["diagnostics"])

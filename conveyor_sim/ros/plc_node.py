@@ -10,14 +10,11 @@ from collections.abc import Mapping
 from contextlib import closing, suppress
 from typing import Any
 
-import rclpy
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-
 from conveyor_sim.control.level import Count, LevelControl
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.ros.context import new_node, running_ros
 from conveyor_sim.ros.controller import ControllerRun, Stopped
 from conveyor_sim.ros.declared import Entry, declare_table
 from conveyor_sim.ros.stop_request import StopRequest
@@ -39,7 +36,7 @@ SCANNING = (
 
 def run(stop: StopRequest) -> None:
     """Control until the end of the run, or until asked to stop. Raises ConveyorError."""
-    node = Node("plc_node")
+    node = new_node("plc_node")
     settings = declare_table(node, SETTINGS)
     scanning = declare_table(node, SCANNING)
     controller = ControllerRun(node, lambda line: level_control(line, settings), **scanning, stop=stop)
@@ -64,13 +61,11 @@ def level_control(line: Any, settings: Mapping[str, Any]) -> Controller:
 def main() -> None:
     """Exits with 0 at the end or after Ctrl-C or SIGTERM, with 1 and one sentence if the controller can't go on."""
     with StopRequest() as stop:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         try:
-            run(stop)
+            with running_ros():
+                run(stop)
         except ConveyorError as error:
             sys.exit(f"plc_node: {error}")
-        finally:
-            rclpy.shutdown()
 
 
 if __name__ == "__main__":

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import click
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.progress import ProgressBar
+from conveyor_sim.ros.context import start_ros
 from conveyor_sim.ros.keys import Keys, readable
 from conveyor_sim.ros.replay_node import ReplayNode
 from conveyor_sim.ros.stop_request import StopRequest
@@ -30,7 +30,7 @@ def publish_bag(path: Path, rate: float, start: float | None, paused: bool, argu
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         bag = stack.enter_context(open_bag(path))
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        start_ros()
         stack.callback(rclpy.shutdown)
         node = ReplayNode(bag, rate, start, paused, stop.request, arguments=arguments)
         stack.callback(node.close)

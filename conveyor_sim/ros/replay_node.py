@@ -11,15 +11,18 @@ from typing import Any, TypeVar
 
 from conveyor_msgs.srv import Seek
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.ros.clock import ClockPublisher
+from conveyor_sim.ros.context import new_node
+from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.playback import Message, Playback, Topic
 from conveyor_sim.ros.player import Player
@@ -30,6 +33,7 @@ from conveyor_sim.ros.spinner import Spinner
 T = TypeVar("T")
 
 CLOCK_RATE = 100.0  # messages a wall second at most, as the live node's default
+LOOK = 1.0  # s of wall time between two looks at who else is there
 LAST_WORDS = 1.0  # s of wall time that reliable subscribers have to receive the last messages
 
 
@@ -59,7 +63,9 @@ class ReplayNode:
         self._quit = False
         playback = Playback(bag)
         self._spinner = Spinner(context, died=self._die)
-        self._node = Node("conveyor_replay", context=context, namespace=bag.namespace, cli_args=list(arguments) or None)
+        self._node = new_node(
+            "conveyor_replay", context=context, namespace=bag.namespace, cli_args=list(arguments) or None
+        )
         try:
             self._publishers = self._advertise(bag, playback.topics)
             clock = ClockPublisher(self._node, CLOCK_RATE)
@@ -68,6 +74,9 @@ class ReplayNode:
             self._spinner.close()
             self._node.destroy_node()
             raise
+        watch = GraphWatch(self._node, clock.topic)
+        # A steady clock: with use_sim_time the node's own would stand still while paused.
+        self._node.create_timer(LOOK, watch.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         group = ReentrantCallbackGroup()
         self._node.create_service(Trigger, "pause", self._pause, callback_group=group)
         self._node.create_service(Trigger, "resume", self._resume, callback_group=group)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.context import start_ros
 from conveyor_sim.ros.node import SimNode
 from conveyor_sim.ros.stop_request import StopRequest
 
@@ -15,8 +15,8 @@ from conveyor_sim.ros.stop_request import StopRequest
 def main() -> None:
     """Exits with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
     with StopRequest() as stop:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         try:
+            start_ros()
             node = SimNode(on_stop=stop.request)
         except ConveyorError as error:
             sys.exit(f"sim_node: {error}")

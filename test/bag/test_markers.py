@@ -7,7 +7,7 @@ import pytest
 from bag.hand_made import HEADER, bottles
 from bag.ros_decode import assert_same, deserialize
 
-from conveyor_sim.bag.markers import ADD, DELETE, LINE_STRIP, TRIANGLE_LIST, bottles_markers, plant_markers
+from conveyor_sim.bag.markers import ADD, DELETEALL, LINE_STRIP, TRIANGLE_LIST, bottles_markers, plant_markers
 from conveyor_sim.bag.messages import MARKERS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
@@ -18,30 +18,36 @@ RADII = np.array([0.03, 0.05, 0.04, 0.06])
 
 
 def decode(data: bytes) -> list[Any]:
-    """The markers, as rosbags reads them; ROS must read the same."""
+    """What is shown, as rosbags reads it; ROS must read the same.
+
+    Whatever was shown before goes first: a viewer outlives the scenes. RViz refuses a DELETEALL anywhere else.
+    """
     message: Any = typestore().deserialize_cdr(data, MARKERS)
     assert_same(deserialize(MARKERS, data), message)
-    return list(message.markers)
+    clear, *markers = message.markers
+    assert (clear.action, clear.ns) == (DELETEALL, "")
+    assert all(marker.action == ADD for marker in markers)
+    return markers
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 1000])
 def test_bottles_are_one_list_of_spheres_a_type(count: int) -> None:
     columns = bottles(count)
     markers = decode(bottles_markers(columns, RADII, (), HEADER))
-    assert [marker.id for marker in markers] == [0, 1, 2, 3]
-    for index, marker in enumerate(markers):
+    assert [marker.id for marker in markers] == [index for index in range(4) if (columns.type == index).any()]
+    for marker in markers:
+        index = marker.id
         chosen = columns.type == index
         assert [point.x for point in marker.points] == columns.x[chosen].tolist()
         assert [point.y for point in marker.points] == columns.y[chosen].tolist()
         assert marker.scale.x == marker.scale.y == 2.0 * RADII[index]
-        assert marker.action == (ADD if chosen.any() else DELETE)
         assert marker.header.frame_id == "hall"
 
 
 def test_rails_that_move_are_drawn_with_the_bottles() -> None:
     rail = RailShape("gates/g", "steel", (SegmentPiece((1.0, 2.0), (3.0, 5.0)),))
     *others, marker = decode(bottles_markers(bottles(3), RADII, [rail], HEADER))
-    assert (len(others), marker.ns, marker.type) == (4, "moving_rails", LINE_STRIP)
+    assert (len(others), marker.ns, marker.type) == (3, "moving_rails", LINE_STRIP)
     assert [(point.x, point.y) for point in marker.points] == [(1.0, 2.0), (3.0, 5.0)]
 
 

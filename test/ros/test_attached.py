@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -13,8 +14,9 @@ import numpy as np
 import pytest
 from conveyor_msgs import srv
 from ros.conftest import SMALL_LINE
-from ros.line_client import LineClient
+from ros.line_client import LineClient, until
 from ros.small_line_controller import make
+from ros.test_lifeline import runs
 
 from conveyor_sim.control import ControlError
 from conveyor_sim.errors import CommandError
@@ -109,6 +111,18 @@ def test_a_node_that_never_asks(scenario: Scenario, tmp_path: Path) -> None:
     assert "the service /cell/lockstep in ROS domain " in text
     scenario.close()
     assert not Path("/proc", file.read_text().strip()).exists()
+
+
+def test_a_test_that_is_killed_takes_its_node_with_it(tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    code = "import sys; from conveyor_sim.testing import Scenario; "
+    code += "Scenario(sys.argv[1]).attach_node(sys.argv[2:], patience=600)"
+    node = ["sh", "-c", f"echo $$ > {file}; exec sleep 600"]
+    test = subprocess.Popen([sys.executable, "-c", code, str(SMALL_LINE), *node])
+    until(lambda: file.exists() and file.read_text().strip(), "the node")
+    test.kill()
+    test.wait()
+    until(lambda: not runs(int(file.read_text())), "the end of the node")
 
 
 def test_a_node_that_ends(scenario: Scenario) -> None:

@@ -1,0 +1,83 @@
+"""Starting ROS in a process: what rcl or DDS refuses becomes one sentence."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from conveyor_sim.errors import ConveyorError
+
+LAST_DOMAIN = 232  # beyond it the UDP ports of a domain (DDSI-RTPS 9.6.1.1) would be above 65535
+# rcl appends where in its sources an error came up, once a layer.
+_SOURCES = re.compile(r",? at \S+\.(?:c|cpp|h|hpp):\d+")
+
+
+def start_ros(context: Context | None = None) -> None:
+    """rclpy.init() of a context (None: the default one), with the signals left alone.
+
+    Raises ConveyorError if the environment or the arguments (`--ros-args ...`) keep ROS from starting.
+    """
+    _check_domain()
+    _check_keystore()
+    with _one_sentence():
+        rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+
+
+@contextmanager
+def running_ros() -> Iterator[None]:
+    """ROS in the default context for as long as the context lasts. Raises ConveyorError as start_ros()."""
+    start_ros()
+    try:
+        yield
+    finally:
+        rclpy.shutdown()
+
+
+def new_node(name: str, **options: Any) -> Node:
+    """rclpy's Node(name, **options). Raises ConveyorError if DDS or ROS refuses it."""
+    with _one_sentence():
+        return Node(name, **options)
+
+
+def _check_domain() -> None:
+    """Fast DDS ends the process for a domain that is too high."""
+    given = os.environ.get("ROS_DOMAIN_ID", "")
+    if given and not (given.isdecimal() and int(given) <= LAST_DOMAIN):
+        raise ConveyorError(f"ROS_DOMAIN_ID: {given!r} given, expected a whole number from 0 to {LAST_DOMAIN}")
+
+
+def _check_keystore() -> None:
+    """Without ROS_SECURITY_STRATEGY=Enforce ROS itself goes on unprotected; with it, not every cause is named."""
+    if os.environ.get("ROS_SECURITY_ENABLE") != "true" or os.environ.get("ROS_SECURITY_STRATEGY") != "Enforce":
+        return
+    keystore = os.environ.get("ROS_SECURITY_KEYSTORE", "")
+    if not keystore:
+        found = "not set"
+    elif not Path(keystore, "enclaves").is_dir():
+        found = f"{keystore!r} given, which has no folder enclaves/"
+    else:
+        return
+    raise ConveyorError(
+        f"ROS_SECURITY_KEYSTORE: {found}, expected a keystore made by `ros2 security create_keystore`, "
+        "because ROS_SECURITY_STRATEGY is Enforce"
+    )
+
+
+@contextmanager
+def _one_sentence() -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # rclpy's own classes, and RuntimeError for what a library of C++ raises
+        text = " ".join(_SOURCES.sub("", str(error)).split())
+        if "security libraries" in text:
+            text = "this Fast DDS was built without security, which ROS_SECURITY_ENABLE asks for"
+        raise ConveyorError(f"ROS can't start: {text or type(error).__name__}") from error

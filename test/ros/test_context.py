@@ -1,0 +1,78 @@
+"""ROS that can't start says why in one sentence."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from ros.conftest import SMALL_LINE
+from ros.recording import record
+
+SIM_NODE = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", "-p", f"scene:={SMALL_LINE}"]
+CONVEYOR_SIM = str(Path(sys.executable).with_name("conveyor-sim"))
+ENFORCE = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
+MISSING = {**ENFORCE, "ROS_SECURITY_KEYSTORE": "/no/such"}
+NO_FOLDER = (
+    "ROS_SECURITY_KEYSTORE: '/no/such' given, which has no folder enclaves/, expected a keystore made by "
+    "`ros2 security create_keystore`, because ROS_SECURITY_STRATEGY is Enforce"
+)
+ALONE = {"ROS_DOMAIN_ID": "99", "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+
+
+def refused(arguments: list[str], environment: Mapping[str, str]) -> str:
+    """The sentence with which a program ends."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, **ALONE, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    return done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "environment", "sentence"),
+    [
+        ([], MISSING, NO_FOLDER),
+        ([], ENFORCE, "ROS_SECURITY_KEYSTORE: not set, expected a keystore"),
+        ([], {"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID: '233' given, expected a whole number from 0 to 232"),
+        (["--params-file", "no_such.yaml"], {}, "Couldn't parse params file: '--params-file no_such.yaml'"),
+        (["--no-such-option"], {}, "ROS can't start: ['--no-such-option']"),
+    ],
+    ids=["keystore", "no keystore", "domain", "parameters", "option"],
+)
+def test_of_the_simulation(arguments: list[str], environment: Mapping[str, str], sentence: str) -> None:
+    text = refused([*SIM_NODE, *arguments], environment)
+    assert text.startswith("sim_node: ")
+    assert sentence in text
+    assert ".c:" not in text
+
+
+def test_of_a_keystore_that_cannot_be_used(tmp_path: Path) -> None:
+    """The wheels are built without security; where it is there, these files are no certificates."""
+    enclave = tmp_path / "enclaves"
+    enclave.mkdir()
+    for name in ("identity_ca.cert", "cert", "key", "permissions_ca.cert"):
+        (enclave / f"{name}.pem").write_text("none")
+    for name in ("governance", "permissions"):
+        (enclave / f"{name}.p7s").write_text("none")
+    text = refused(SIM_NODE, {**ENFORCE, "ROS_SECURITY_KEYSTORE": str(tmp_path)})
+    assert text.startswith("sim_node: ROS can't start: ")
+
+
+@pytest.mark.parametrize("name", ["plc_node", "controller_node"])
+def test_of_a_controller(name: str) -> None:
+    assert refused(["-m", f"conveyor_sim.ros.{name}"], MISSING) == f"{name}: {NO_FOLDER}"
+
+
+def test_of_a_playback(tmp_path: Path) -> None:
+    record(tmp_path / "bag")
+    assert NO_FOLDER in refused([CONVEYOR_SIM, "replay", str(tmp_path / "bag"), "--publish"], MISSING)
