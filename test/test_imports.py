@@ -21,6 +21,7 @@ FLOORS = [
     ["guard", "line", "energy_account", "damage_account"],
     ["integration"],
     ["simulation"],
+    ["compilation"],
     ["bag", "price", "accuracy", "achieved", "stopped"],
     ["progress", "summary", "plot", "explain"],
     ["runner", "report"],

@@ -15,7 +15,7 @@ import stat
 import sys
 import threading
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -42,23 +42,27 @@ class NotCached(Exception):
 
 
 class KernelFolder:
-    """Files by name in a folder; without a folder there are none."""
+    """Files by name in a folder. What can't be written, or without a folder, can be sent to another process instead."""
 
     def __init__(self, path: Path | None, remark: str) -> None:
         """remark: logged when the first kernel is needed, "" for nothing."""
         self.path = path
         self._remark = remark
         self._full = False
+        self.received: dict[str, bytes] = {}
+        """What a process that compiles for this one has sent."""
+        self.send: Callable[[str, bytes], object] | None = None
+        """To that process, in the one that compiles."""
 
-    def use(self, path: Path) -> None:
-        """Another folder from now on."""
+    def use(self, path: Path | None) -> None:
+        """Another folder from now on, or none."""
         self.path, self._remark = path, ""
 
     def read(self, name: str) -> bytes | None:
         """What was written under a name; None if there is nothing that can be used."""
         self._tell_remark()
-        if self.path is None:
-            return None
+        if self.path is None or name in self.received:
+            return self.received.get(name)
         path = self.path / name
         try:
             content, why = _read_own(path)
@@ -83,20 +87,16 @@ class KernelFolder:
 
     def write(self, name: str, content: bytes) -> None:
         """Replace a file in one go. If it can't be written that is logged once, and the kernel is compiled again."""
-        if self.path is None:
-            return
-        temporary = self.path / f"{name}.{uuid.uuid4().hex}.tmp"
         try:
-            try:
-                with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-                    file.write(MAGIC + _checksum(content) + content)
-                temporary.replace(self.path / name)
-            finally:
-                temporary.unlink(missing_ok=True)
+            if self.path is not None:
+                _replace(self.path / name, MAGIC + _checksum(content) + content)
+                return
         except OSError as error:
             if not self._full:
                 self._full = True
                 LOG.warning("%s: kernels can't be cached (%s)", self.path, error.strerror)
+        if self.send is not None:
+            self.send(name, content)
 
     def _tell_remark(self) -> None:
         remark, self._remark = self._remark, ""
@@ -184,6 +184,19 @@ def _source(path: str) -> bytes:
 
 def _checksum(content: bytes) -> bytes:
     return hashlib.blake2b(content, digest_size=CHECKSUM).digest()
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file in one go, for this user only."""
+    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex}.tmp")
+    try:
+        with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(content)
+        temporary.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
 
 
 def _read_own(path: Path) -> tuple[bytes, str]:
