@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from rich.table import Table
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.progress import ProgressBar
+from conveyor_sim.signals import HandledOnce
 from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
@@ -35,8 +37,10 @@ class _Group(click.Group):
 
 @click.group(cls=_Group)
 @click.version_option(__version__, prog_name="conveyor-sim")
-def main() -> None:
+@click.pass_context
+def main(context: click.Context) -> None:
     """Bottles on industrial conveyors, simulated by force."""
+    context.with_resource(HandledOnce([signal.SIGINT], signal.default_int_handler))
 
 
 @main.command()
