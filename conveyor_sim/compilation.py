@@ -54,32 +54,31 @@ class Compilation:
         self._say = say
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
-        self._cancelled = False
+        self._cancelled = self._compiles = False
         self._began = time.monotonic()
         self._expected = seconds_to_compile(build_model(scene))
 
     @property
     def progress(self) -> str:
-        """How long it has taken so far."""
-        return f"compiling, {time.monotonic() - self._began:.0f} s of about {self._expected:.0f} s"
+        """What is under way."""
+        if not self._compiles:
+            return "loading the kernels"
+        return f"compiling the kernels, {time.monotonic() - self._began:.0f} s of about {self._expected:.0f} s"
 
     def run(self) -> None:
         """Return once the kernels are here; interrupted by Ctrl-C in the main thread within a moment.
 
         Raises Cancelled, and SimulationError if the scene does not get through its first tick.
         """
+        KERNELS.before_read = self._require_wanted
         try:
-            with cached_only():
+            if not self._load():
+                self._compiles = True
+                self._say(compiling(self._expected))
+                self._compile_aside()
                 compile_kernels(self._scene)
-                return
-        except NotCached:
-            self._say(compiling(self._expected))
-        try:
-            self._compile_aside()
-            if self._cancelled:
-                raise Cancelled
-            compile_kernels(self._scene)
         finally:
+            KERNELS.before_read = None
             KERNELS.received.clear()
 
     def cancel(self) -> None:
@@ -88,6 +87,19 @@ class Compilation:
             self._cancelled = True
             if self._process is not None:
                 self._process.kill()
+
+    def _require_wanted(self) -> None:
+        if self._cancelled:
+            raise Cancelled
+
+    def _load(self) -> bool:
+        """Take the kernels from the cache, if all are there."""
+        try:
+            with cached_only():
+                compile_kernels(self._scene)
+        except NotCached:
+            return False
+        return True
 
     def _compile_aside(self) -> None:
         """Have the kernels compiled; what goes wrong in that is found again here, by compiling in this process."""

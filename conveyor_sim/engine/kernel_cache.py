@@ -53,6 +53,8 @@ class KernelFolder:
         """What a process that compiles for this one has sent."""
         self.send: Callable[[str, bytes], object] | None = None
         """To that process, in the one that compiles."""
+        self.before_read: Callable[[], object] | None = None
+        """Called before each kernel; what it raises ends the compiling or loading under way."""
 
     def use(self, path: Path | None) -> None:
         """Another folder from now on, or none."""
@@ -60,6 +62,8 @@ class KernelFolder:
 
     def read(self, name: str) -> bytes | None:
         """What was written under a name; None if there is nothing that can be used."""
+        if self.before_read is not None:
+            self.before_read()
         self._tell_remark()
         if self.path is None or name in self.received:
             return self.received.get(name)
