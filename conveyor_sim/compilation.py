@@ -6,6 +6,8 @@ kernels in the cache, from which this process loads them in less than a second.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import pickle
 import subprocess
@@ -24,6 +26,9 @@ from conveyor_sim.simulation import compile_kernels
 
 BASE_SECONDS, EFFECT_SECONDS = 6.0, 1.5
 """s of a core to compile, and for each effect that is on: a fit to scenes of 5 to 13 effects, measured in 2026."""
+
+# As it ends, Python looks through all objects for garbage: numba's are so many that it takes half a second.
+atexit.register(gc.freeze)
 
 CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.compilation import child; child()"
 
