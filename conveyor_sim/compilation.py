@@ -81,7 +81,9 @@ class Compilation:
                 self._compiles = True
                 self._say(compiling(self._expected))
                 self._compile_aside()
-                compile_kernels(self._scene)
+                if not self._load():
+                    self._say("the process that compiles has ended early; compiling in this one")
+                    compile_kernels(self._scene)
         finally:
             KERNELS.before_read = None
             KERNELS.received.clear()
@@ -107,7 +109,7 @@ class Compilation:
         return True
 
     def _compile_aside(self) -> None:
-        """Have the kernels compiled; what goes wrong in that is found again here, by compiling in this process."""
+        """Have the kernels compiled; what goes wrong in that is found again by compiling in this process."""
         with self._lock:
             if self._cancelled:
                 return

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -89,6 +90,18 @@ def test_what_compiles_ends_with_a_node_that_was_killed(cold_node: Child, tmp_pa
     os.kill(cold_node.pid, signal.SIGKILL)
     until(lambda: not Path(f"/proc/{compiler}/cmdline").exists() or _is_zombie(compiler), "the end of the compiler")
     assert not finished(tmp_path / "cache")
+
+
+def test_a_compiler_that_dies_is_told_and_replaced(cold_node: Child) -> None:
+    os.kill(child_of(cold_node.pid), signal.SIGKILL)
+    until(lambda: "has ended early; compiling in this one" in cold_node.log.read_text(), "its word")
+    os.kill(cold_node.pid, signal.SIGINT)
+    time.sleep(0.5)  # not to be one signal for the operating system
+    if cold_node.exit_code is None:  # there is no way to interrupt the compiler
+        os.kill(cold_node.pid, signal.SIGINT)
+    until(lambda: cold_node.exit_code is not None, "the end of the node")
+    assert cold_node.exit_code in (0, -signal.SIGINT)
+    assert "Traceback" not in cold_node.log.read_text()
 
 
 def test_ctrl_c_ends_a_command_inside_the_compiler(tmp_path: Path) -> None:
