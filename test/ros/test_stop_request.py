@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -50,6 +52,16 @@ IN_A_NODE = "from conveyor_sim.ros.stop_request import StopRequest\nstop = StopR
 IN_A_RUN = "from conveyor_sim.runner import _stop_request\nstop = _stop_request()\nstop.__enter__()\n"
 
 
+@contextmanager
+def started(code: str) -> Iterator[subprocess.Popen[str]]:
+    """A process that runs code, ended for good at the end."""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
 @pytest.mark.parametrize(
     ("code", "first", "second"),
     [
@@ -61,7 +73,7 @@ IN_A_RUN = "from conveyor_sim.runner import _stop_request\nstop = _stop_request(
     ids=["twice Ctrl-C", "twice SIGTERM", "Ctrl-C and SIGTERM", "a run"],
 )
 def test_a_second_signal_ends_what_hangs(code: str, first: signal.Signals, second: signal.Signals) -> None:
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+    with started(code) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "hangs\n"
         process.send_signal(first)
@@ -84,7 +96,7 @@ def hang():
         c.pthread_mutex_lock(lock)
 main(["hang"])
 """
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+    with started(code) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "hangs\n"
         process.send_signal(signal.SIGINT)
