@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,8 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.progress import COMPILING, ProgressBar, told_if_long
+from conveyor_sim.progress import ProgressBar
+from conveyor_sim.signals import HandledOnce
 from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
@@ -35,8 +37,10 @@ class _Group(click.Group):
 
 @click.group(cls=_Group)
 @click.version_option(__version__, prog_name="conveyor-sim")
-def main() -> None:
+@click.pass_context
+def main(context: click.Context) -> None:
     """Bottles on industrial conveyors, simulated by force."""
+    context.with_resource(HandledOnce([signal.SIGINT], signal.default_int_handler))
 
 
 @main.command()
@@ -83,11 +87,10 @@ def explain(scene: str, price: bool, at: float | None) -> None:
     _print(explanation(loaded, build_model(loaded)))
     if not price:
         return
+    from conveyor_sim.compilation import Compilation
     from conveyor_sim.price import Pricing
-    from conveyor_sim.simulation import compile_kernels
 
-    with told_if_long(COMPILING):
-        compile_kernels(loaded)
+    Compilation(loaded, _say).run()
     pricing = Pricing(loaded, at)
     with ProgressBar(f"{loaded.name}, to a warm state", 0.0) as bar:
         pricing.warm_up(bar.update)
@@ -107,21 +110,23 @@ def explain(scene: str, price: bool, at: float | None) -> None:
 def run(scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
     from conveyor_sim.achieved import achieved
+    from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.compilation import Compilation
     from conveyor_sim.explain import setting_line
     from conveyor_sim.model import build_model
     from conveyor_sim.report import report
     from conveyor_sim.resources import scene_path
     from conveyor_sim.runner import run_scene
     from conveyor_sim.scene import load_scene
-    from conveyor_sim.simulation import compile_kernels
 
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration})
     model = build_model(loaded)
     click.echo(setting_line(model))
     folder = None if no_record else out or new_run_folder()
-    with told_if_long(COMPILING):
-        compile_kernels(loaded)
+    if folder is not None:
+        require_recordable(folder)  # not only once everything has been compiled
+    Compilation(loaded, _say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
         done = run_scene(loaded, folder, bar.update, threads)
     if done.interrupted:
@@ -268,6 +273,11 @@ def _publish(bag: Path, rate: float, start: float | None, paused: bool, ros_argu
             "environment that `make` sets up"
         ) from error
     publish_bag(bag, rate, start, paused, ros_arguments)
+
+
+def _say(sentence: str) -> None:
+    """What is happening, beside the results."""
+    click.echo(sentence, err=True)
 
 
 def _print(content: RenderableType) -> None:

@@ -17,8 +17,6 @@ PLAIN_SHARE = 0.1
 SILENCE = 2.0
 """s of wall time without a word after which people wonder."""
 
-COMPILING = "compiling the kernels for this kind of scene, up to a minute; the next run finds them in the cache"
-
 
 @contextmanager
 def told_if_long(sentence: str) -> Iterator[None]:

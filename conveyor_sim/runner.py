@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
 from conveyor_sim.achieved import PeakWatch
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
+from conveyor_sim.signals import HandledOnce
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stopped import keep_stopped
 
@@ -44,7 +44,7 @@ def run_scene(
     """Runs a scene for its duration and records it to the folder `bag`, if given.
 
     progress(simulated time, s) is told after every tick. threads: to step with, None has them chosen. Ctrl-C ends the
-    run at the next tick, with a whole bag.
+    run at the next tick, with a whole bag; a second one ends the process.
     Raises SceneError, SimulationError, and BagError if the recording can't be written.
     """
     simulation = Simulation(scene, threads)
@@ -75,16 +75,5 @@ def run_scene(
 def _stop_request() -> Iterator[threading.Event]:
     """An event that Ctrl-C and SIGTERM set; a KeyboardInterrupt could strike in the middle of a write."""
     stop = threading.Event()
-
-    def request(_number: int, _frame: FrameType | None) -> None:
-        stop.set()
-
-    if threading.current_thread() is not threading.main_thread():
-        yield stop  # signals are only the main thread's to handle
-        return
-    before = {number: signal.signal(number, request) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    with HandledOnce((signal.SIGINT, signal.SIGTERM), lambda _number, _frame: stop.set()):
         yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

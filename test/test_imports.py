@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
-    ["errors", "version", "machine"],
+    ["errors", "version", "machine", "signals"],
     ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
@@ -21,6 +21,7 @@ FLOORS = [
     ["guard", "line", "energy_account", "damage_account"],
     ["integration"],
     ["simulation"],
+    ["compilation"],
     ["bag", "price", "accuracy", "achieved", "stopped"],
     ["progress", "summary", "plot", "explain"],
     ["runner", "report"],

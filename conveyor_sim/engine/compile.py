@@ -1,7 +1,8 @@
 """How the kernels are compiled: to disk, once for each version of the engine's sources.
 
 Numba keys its cache by the file of the function alone, so an edit in a helper would be served stale. Here the
-cache folder itself is named by a hash over all sources of the engine.
+cache folder itself is named by a hash over all sources of the engine; which folder that is, see `cache_folder.py`, and
+what is in it, `kernel_cache.py`.
 
 Effects that a scene lacks arrive as ``None``: numba prunes ``if argument is None`` before it compiles, so the absent
 branch is not in the machine code, and each combination is cached on disk under its own signature.
@@ -9,8 +10,6 @@ branch is not in the machine code, and each combination is cached on disk under 
 
 import gc
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +18,9 @@ from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
 import numba
+
+from .cache_folder import choose_cache_folder
+from .kernel_cache import KernelCache, KernelFolder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -33,22 +35,10 @@ def engine_hash() -> str:
     return digest.hexdigest()
 
 
-def cache_dir() -> Path:
-    """Where compiled kernels are kept: under NUMBA_CACHE_DIR, XDG_CACHE_HOME or the home's cache, else a temporary."""
-    try:
-        base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-        folder = Path(base) / "conveyor_sim" / ENGINE_HASH
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except (OSError, RuntimeError):  # RuntimeError: nobody knows this user's home
-        return Path(tempfile.gettempdir()) / f"conveyor_sim-{os.getuid()}" / ENGINE_HASH
-
-
 ENGINE_HASH = engine_hash()
-CACHE_DIR = cache_dir()
+KERNELS = KernelFolder(*choose_cache_folder(ENGINE_HASH))
 
-# Numba's type stubs know neither CACHE_DIR nor _nrt.
+# Numba's type stubs know neither SLP_VECTORIZE nor _nrt.
 _config: Any = numba.config
 _njit: Any = numba.njit
 _typeof: Any = numba.typeof
@@ -103,21 +93,18 @@ def part(function: Function) -> Function:
 
 
 def _compiled(function: Function, **options: bool) -> Function:
-    previous = _config.CACHE_DIR
-    _config.CACHE_DIR = str(CACHE_DIR)
-    try:
-        compiled: Function = _njit(
-            nogil=True,
-            cache=not options["no_cpython_wrapper"],
-            error_model="numpy",
-            forceinline=True,
-            no_cfunc_wrapper=True,
-            _nrt=False,
-            **options,
-        )(function)
-    finally:
-        _config.CACHE_DIR = previous
-    return compiled
+    compiled: Any = _njit(
+        nogil=True,
+        error_model="numpy",
+        forceinline=True,
+        no_cfunc_wrapper=True,
+        _nrt=False,
+        **options,
+    )(function)
+    if not options["no_cpython_wrapper"]:
+        compiled._cache = KernelCache(function, options, KERNELS)
+    kept: Function = compiled
+    return kept
 
 
 @part

@@ -13,8 +13,10 @@ from pathlib import Path
 import click
 
 from conveyor_sim.bag.recorder import new_run_folder
+from conveyor_sim.compilation import compiling, seconds_to_compile
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.progress import COMPILING, ProgressBar, told_if_long
+from conveyor_sim.model import build_model
+from conveyor_sim.progress import ProgressBar, told_if_long
 from conveyor_sim.report import report
 from conveyor_sim.resources import scene_path
 from conveyor_sim.ros.child import Child
@@ -65,7 +67,7 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
         def going_on() -> bool:
             return node.exit_code is None and plc.exit_code is None and not stop.requested
 
-        with told_if_long(COMPILING):
+        with told_if_long(compiling(seconds_to_compile(build_model(scene)))):
             while not observer.started and going_on():
                 observer.wait(LOOK)
         with ProgressBar(scene.name, scene.duration) as progress:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError
 from pathlib import Path
 
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
+from conveyor_sim.bag.folder import require_recordable
 from conveyor_sim.bag.outputs import OUTPUTS, photo_eye_outputs
 from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.compilation import Cancelled, Compilation
 from conveyor_sim.explain import setting_line
 from conveyor_sim.resources import scene_path
 from conveyor_sim.ros import parameters
@@ -28,11 +34,17 @@ from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.scene import load_scene
-from conveyor_sim.simulation import Simulation, compile_kernels
+from conveyor_sim.simulation import Simulation
+
+REPORT = 10.0  # s of wall time between two words about what is being compiled
 
 
 class SimNode:
-    """The node, with the two threads that run it: one spins the executor, one steps the simulation."""
+    """The node, with the threads that run it: one spins the executor, one steps the simulation.
+
+    A third gets the kernels first, which may have to be compiled. Until they are there the node answers for its
+    parameters and its state; /clock, messages and all that is done with a run come when it starts.
+    """
 
     def __init__(
         self, on_stop: Callable[[], None], *, context: Context | None = None, arguments: Sequence[str] | None = None
@@ -43,55 +55,78 @@ class SimNode:
         """
         self.error: Exception | None = None
         self._on_stop = on_stop
+        self._stepper: Stepper | None = None
         self._spinner = Spinner(context, died=self._die)
         self._node = new_node("conveyor_sim", context=context, cli_args=list(arguments) if arguments else None)
         try:
-            self.stepper = self._build()
+            self._prepare()
         except BaseException:
             self._spinner.close()
             self._node.destroy_node()
             raise
+        self._starter = threading.Thread(target=self._start, name="starter", daemon=True)
         self._spinner.start(self._node)
-        self._node.get_logger().info(_greeting(self.stepper))
-        self.stepper.start()
+        self._starter.start()
 
     def close(self) -> None:
-        """End orderly: the tick under way is finished, the recording completed."""
-        self.stepper.shutdown()
+        """End orderly: the tick under way is finished, the recording completed. What is being compiled is given up."""
+        self._compilation.cancel()
+        self._starter.join()
+        if self._stepper is not None:
+            self._stepper.shutdown()
         self._spinner.close()
         self._node.destroy_node()
 
-    def _build(self) -> Stepper:
+    def _prepare(self) -> None:
+        """All that can be found wrong before anything is compiled. Raises ConveyorError."""
         node, executor = self._node, self._spinner.executor
-        given = parameters.declare(node)
-        distro = default_distro()
-        scene = load_scene(scene_path(given.scene), given.overrides())
-        compile_kernels(scene)  # before the run starts: its first tick would be a long overrun
-        sink = RosSink(
-            node, distro, {"markers": RateCap(given.marker_rate)}, {**OUTPUTS, **photo_eye_outputs(scene.photo_eyes)}
-        )
+        self._given = parameters.declare(node)
+        self._distro = default_distro()
+        self._scene = load_scene(scene_path(self._given.scene), self._given.overrides())
+        if self._given.record is not None:
+            require_recordable(self._given.record)
+        topics = {**OUTPUTS, **photo_eye_outputs(self._scene.photo_eyes)}
+        self._sink = RosSink(node, self._distro, {"markers": RateCap(self._given.marker_rate)}, topics)
+        self._compilation = Compilation(self._scene, node.get_logger().info)
+        self._reports = node.create_timer(REPORT, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+        def quit_soon() -> None:
+            executor.create_task(self._on_stop)  # runs after the answer to the request has been sent
+
+        self._services = Services(node, executor, waiting_for=lambda: self._compilation.progress, quit_soon=quit_soon)
+
+    def _start(self) -> None:
+        """Get the kernels, and have the run started by the thread of the executor, whose callbacks it adds to."""
+        try:
+            self._compilation.run()
+            self._spinner.call(self._run).result()
+        except (Cancelled, CancelledError):  # the latter: the executor has ended, and said why
+            pass
+        except Exception as error:
+            self._die(error)
+
+    def _run(self) -> None:
+        """Open the first run, offer what can be done with it, and let it go. Raises ConveyorError."""
+        node, executor, given, sink = self._node, self._spinner.executor, self._given, self._sink
+        node.destroy_timer(self._reports)
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
         def open_session(runs: int, checkpoint: Path | None) -> Session:
-            threads = given.threads or None
+            scene, threads = self._scene, given.threads or None
             new = Simulation(scene, threads) if checkpoint is None else Simulation.load(checkpoint, threads, scene)
-            return Session(new, sink, bag_folder(given.record, runs), given.frame_id, distro)
+            return Session(new, sink, bag_folder(given.record, runs), given.frame_id, self._distro)
 
-        stepper = Stepper(
+        stepper = self._stepper = Stepper(
             open_session,
-            real_time_factor=given.real_time_factor,
+            real_time_factor=float(node.get_parameter("real_time_factor").value),  # it may have been set meanwhile
             playing=not given.start_paused,
             lockstep_max_ticks=given.lockstep_max_ticks,
             beat=clock.beat if clock else lambda stamp_ns, now: None,
             died=self._die,
             log=node.get_logger(),
         )
-
-        def quit_soon() -> None:
-            executor.create_task(self._on_stop)  # runs after the answer to the request has been sent
-
         subscribe_commands(node, stepper)
-        Services(node, executor, stepper, quit_soon=quit_soon)
+        self._services.serve(stepper)
         CheckpointServices(node, executor, stepper)
         FaultService(node, executor, stepper)
         LockstepService(node, executor, stepper, given.frame_id)
@@ -103,7 +138,11 @@ class SimNode:
                     stepper.set_real_time_factor(float(parameter.value))
 
         node.add_post_set_parameters_callback(on_set)
-        return stepper
+        node.get_logger().info(_greeting(stepper))
+        stepper.start()
+
+    def _report(self) -> None:
+        self._node.get_logger().info(self._compilation.progress)
 
     def _die(self, error: Exception) -> None:
         self.error = error

@@ -53,32 +53,50 @@ async def settled(executor: Executor, future: Future[T]) -> T:
 
 
 class Services:
-    """Answers requests by asking the stepper."""
+    """Answers requests by asking the stepper. Before there is one: what the simulator is, and that it is STOPPED."""
 
-    def __init__(self, node: Node, executor: Executor, stepper: Stepper, quit_soon: Callable[[], None]) -> None:
-        """`quit_soon`: ends the node once the answer has been sent."""
+    def __init__(
+        self, node: Node, executor: Executor, *, waiting_for: Callable[[], str], quit_soon: Callable[[], None]
+    ) -> None:
+        """`waiting_for`: why there is no run yet. `quit_soon`: ends the node once the answer has been sent."""
+        self._node = node
         self._executor = executor
-        self._stepper = stepper
+        self._waiting_for = waiting_for
         self._quit_soon = quit_soon
+        self._quitting = False
+        self._stepper: Stepper | None = None
         # Reentrant: a service that waits for its ticks must not hold up the others.
-        group = ReentrantCallbackGroup()
-        real_srv = _real_types()
-        for name, handler in (
-            ("GetSimulatorFeatures", self._get_features),
-            ("GetSimulationState", self._get_state),
-            ("SetSimulationState", self._set_state),
-            ("StepSimulation", self._step),
-            ("ResetSimulation", self._reset),
-        ):
-            topic = _snake_case(name)
-            node.create_service(getattr(own_srv, name), topic, handler, callback_group=group)
-            if real_srv is not None:
-                node.create_service(getattr(real_srv, name), PREFIX + topic, handler, callback_group=group)
-        node.create_service(Trigger, "pause", self._pause, callback_group=group)
-        node.create_service(Trigger, "resume", self._resume, callback_group=group)
+        self._group = ReentrantCallbackGroup()
+        self._real_srv = _real_types()
+        self._create("GetSimulatorFeatures", self._get_features)
+        self._create("GetSimulationState", self._get_state)
+        self._create("SetSimulationState", self._set_state)
+
+    def serve(self, stepper: Stepper) -> None:
+        """There is a run: offer what can be done with it, too."""
+        self._stepper = stepper
+        self._create("StepSimulation", self._step)
+        self._create("ResetSimulation", self._reset)
+        self._node.create_service(Trigger, "pause", self._pause, callback_group=self._group)
+        self._node.create_service(Trigger, "resume", self._resume, callback_group=self._group)
+
+    def _create(self, name: str, handler: Callable[[Any, Any], Any]) -> None:
+        topic = _snake_case(name)
+        self._node.create_service(getattr(own_srv, name), topic, handler, callback_group=self._group)
+        if self._real_srv is not None:
+            self._node.create_service(
+                getattr(self._real_srv, name), PREFIX + topic, handler, callback_group=self._group
+            )
+
+    @property
+    def _run(self) -> Stepper:
+        """What steps the run. Raises Refused if there is none yet."""
+        if self._stepper is None:
+            raise Refused(f"{self._waiting_for()}; expected once get_simulation_state answers PAUSED or PLAYING")
+        return self._stepper
 
     async def _ask(self, function: Callable[[], T]) -> T:
-        return await settled(self._executor, self._stepper.call(function))
+        return await settled(self._executor, self._run.call(function))
 
     def _get_features(self, _: Any, response: Any) -> Any:
         # conveyor_msgs' response is flat; the real one keeps its fields in `features`.
@@ -88,17 +106,23 @@ class Services:
         return response
 
     def _get_state(self, _: Any, response: Any) -> Any:
-        response.state.state = int(self._stepper.state)
-        response.result.result = OK
-        return response
+        state = State.STOPPED if self._stepper is None else self._stepper.state
+        response.state.state = int(State.QUITTING if self._quitting else state)
+        return _set(response, OK, self._waiting_for() if self._stepper is None else "")
 
     async def _set_state(self, request: Any, response: Any) -> Any:
-        stepper, wanted = self._stepper, request.state.state
-        actions = {State.STOPPED: stepper.stop, State.PLAYING: stepper.play, State.PAUSED: stepper.pause}
+        wanted = request.state.state
         if wanted == State.QUITTING:
-            stepper.state = State.QUITTING
+            self._quitting = True
+            if self._stepper is not None:
+                self._stepper.state = State.QUITTING
             self._quit_soon()
             return _set(response, OK)
+        try:
+            stepper = self._run
+        except Refused as error:
+            return _set(response, INCORRECT_STATE, str(error))
+        actions = {State.STOPPED: stepper.stop, State.PLAYING: stepper.play, State.PAUSED: stepper.pause}
         if wanted not in actions:
             text = f"state: {wanted} given, expected STOPPED (0), PLAYING (1), PAUSED (2) or QUITTING (3)"
             return _set(response, UNSUPPORTED, text)
@@ -108,7 +132,7 @@ class Services:
 
     async def _step(self, request: Any, response: Any) -> Any:
         async def step() -> None:
-            await settled(self._executor, await self._ask(lambda: self._stepper.step(request.steps)))
+            await settled(self._executor, await self._ask(lambda: self._run.step(request.steps)))
 
         return await self._carry_out(response, step(), OPERATION_FAILED)
 
@@ -117,13 +141,13 @@ class Services:
         if request.scope != SCOPE_DEFAULT and request.scope & both != both:
             text = f"scope: {request.scope} given, expected 0 or 255 (all): time and state are reset together"
             return _set(response, UNSUPPORTED, text)
-        return await self._carry_out(response, self._ask(self._stepper.reset), OPERATION_FAILED)
+        return await self._carry_out(response, self._ask(self._run.reset), OPERATION_FAILED)
 
     async def _pause(self, _: Any, response: Any) -> Any:
-        return await self._trigger(response, self._stepper.pause)
+        return await self._trigger(response, self._run.pause)
 
     async def _resume(self, _: Any, response: Any) -> Any:
-        return await self._trigger(response, self._stepper.play)
+        return await self._trigger(response, self._run.play)
 
     async def _trigger(self, response: Any, function: Callable[[], None]) -> Any:
         try:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import sys
 
-import rclpy
-
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.context import start_ros
-from conveyor_sim.ros.node import SimNode
 from conveyor_sim.ros.stop_request import StopRequest
 
 
 def main() -> None:
     """Exits with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
     with StopRequest() as stop:
+        # Only here: Ctrl-C may come while they are being loaded.
+        import rclpy
+
+        from conveyor_sim.ros.context import start_ros
+        from conveyor_sim.ros.node import SimNode
+
         try:
             start_ros()
             node = SimNode(on_stop=stop.request)
@@ -23,6 +25,8 @@ def main() -> None:
         stop.wait()
         node.close()
         rclpy.shutdown()
+    if isinstance(node.error, ConveyorError):
+        sys.exit(f"sim_node: {node.error}")
     if node.error is not None:
         sys.exit(f"sim_node: {type(node.error).__name__}: {node.error}")
 

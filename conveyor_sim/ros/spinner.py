@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+
+T = TypeVar("T")
 
 
 class Spinner:
@@ -18,12 +22,30 @@ class Spinner:
         self.executor = SingleThreadedExecutor(context=context)
         self._died = died
         self._closing = threading.Event()
+        self._calls: list[Future[Any]] = []
         self._thread = threading.Thread(target=self._spin, name="executor", daemon=True)
 
     def start(self, node: Node) -> None:
         """Begin to run the callbacks of `node`."""
         self.executor.add_node(node)
         self._thread.start()
+
+    def call(self, function: Callable[[], T]) -> Future[T]:
+        """From any other thread: have `function` called between two callbacks; cancelled if that thread has ended."""
+        future: Future[T] = Future()
+
+        def run() -> None:
+            if future.set_running_or_notify_cancel():
+                try:
+                    future.set_result(function())
+                except Exception as error:
+                    future.set_exception(error)
+
+        self._calls.append(future)
+        self.executor.create_task(run)
+        if not self._thread.is_alive():
+            future.cancel()
+        return future
 
     def close(self) -> None:
         """Return once the callback under way has ended and none will follow."""
@@ -42,3 +64,6 @@ class Spinner:
             if self._died is None:
                 raise
             self._died(error)
+        finally:
+            for future in self._calls:
+                future.cancel()

@@ -10,13 +10,16 @@ import signal
 import socket
 from contextlib import AbstractContextManager
 
+from conveyor_sim.signals import HandledOnce
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopRequest(AbstractContextManager["StopRequest"]):
     """A signal, or a call of request(), whichever comes first; nothing is interrupted half done.
 
-    For the main thread; signals are handled as before once the context ends.
+    A second signal ends the process, whatever hangs. For the main thread; signals are handled as before once the
+    context ends.
     """
 
     def __init__(self) -> None:
@@ -24,7 +27,7 @@ class StopRequest(AbstractContextManager["StopRequest"]):
         self._writer.setblocking(False)
         # Written to in C, whichever thread the signal meets: numpy and DDS have threads of their own.
         self._wakeup_before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
-        self._handlers_before = {number: signal.signal(number, lambda _number, _frame: None) for number in SIGNALS}
+        self._signals = HandledOnce(SIGNALS, lambda _number, _frame: None)
 
     @property
     def requested(self) -> bool:
@@ -40,8 +43,7 @@ class StopRequest(AbstractContextManager["StopRequest"]):
         select.select([self._reader], [], [])
 
     def __exit__(self, *_: object) -> None:
-        for number, handler in self._handlers_before.items():
-            signal.signal(number, handler)
+        self._signals.__exit__()
         signal.set_wakeup_fd(self._wakeup_before)
         self._reader.close()
         self._writer.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -30,7 +31,8 @@ def domain() -> Iterator[int]:
 def start_node(client: LineClient, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Child]]:
     """Starts `sim_node` with ROS parameters: unless they say else on the small line, paused, as fast as possible.
 
-    One at a time: the one before must have been stopped.
+    Returns when its run has started, however long its kernels take to compile. One at a time: the one before must have
+    been stopped.
     """
     children: list[Child] = []
 
@@ -39,8 +41,12 @@ def start_node(client: LineClient, tmp_path_factory: pytest.TempPathFactory) -> 
         until(lambda: not client.node.count_services("lockstep"), "the end of the node before")
         given = {"scene": SMALL_LINE, "start_paused": True, "real_time_factor": 0.0, **parameters}
         logs = tmp_path_factory.mktemp("logs")
-        children.append(Child("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs))
-        return children[-1]
+        child = Child("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs)
+        children.append(child)
+        while child.exit_code is None and client.compiling():
+            time.sleep(0.05)
+        assert child.exit_code is None, child.obituary()
+        return child
 
     yield start
     for child in children:

@@ -8,6 +8,7 @@ from typing import Any
 
 import rclpy
 from conveyor_msgs import srv
+from conveyor_msgs.msg import SimulationState
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -16,7 +17,7 @@ from conveyor_sim.bag.qos import QOS
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 
-PATIENCE = 60.0  # s of wall time; only a failing test waits so long (kernels may have to be compiled)
+PATIENCE = 60.0  # s of wall time; only a failing test waits so long
 
 
 def until(condition: Callable[[], Any], what: str) -> Any:
@@ -93,6 +94,11 @@ class LineClient:
     def state(self) -> int:
         """The state's number."""
         return int(self.call(srv.GetSimulationState, "get_simulation_state").state.state)
+
+    def compiling(self) -> str:
+        """What keeps the run from starting, "" once it has started."""
+        response = self.call(srv.GetSimulationState, "get_simulation_state")
+        return "" if response.state.state != SimulationState.STATE_STOPPED else str(response.result.error_message)
 
     def lockstep(self, target: int, run_id: str = "test", **fields: Any) -> Any:
         """The response of one scan."""

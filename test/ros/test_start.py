@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from conveyor_msgs.msg import SimulationState
@@ -44,16 +45,19 @@ def test_a_request_to_quit_is_answered_and_followed(start_node: Callable[..., Ch
     ids=["record", "scene", "parameter", "rate"],
 )
 def test_a_start_that_cannot_be_ends_with_one_sentence(
-    domain: int, parameters: dict[str, object], sentence: str
+    domain: int, parameters: dict[str, object], sentence: str, tmp_path: Path
 ) -> None:
+    """Before anything is compiled."""
     command = [sys.executable, "-m", "conveyor_sim.ros.sim_node", "--ros-args"]
     for name, value in {"scene": SMALL_LINE, **parameters}.items():
         command += ["-p", f"{name}:={value}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ, check=False)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("sim_node: ")
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
+    assert not list(tmp_path.rglob("*.kernel"))
 
 
 def test_the_setting_and_what_was_reached_are_logged(start_node: Callable[..., Child], client: LineClient) -> None:

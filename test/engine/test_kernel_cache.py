@@ -1,0 +1,143 @@
+"""Files of compiled kernels: whatever is wrong with one, it is compiled again."""
+
+import os
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+
+from conveyor_sim.engine.kernel_cache import (
+    CHECKSUM,
+    MAGIC,
+    KernelCache,
+    KernelFolder,
+    NotCached,
+    _checksum,
+    cached_only,
+)
+
+
+def twice(x: float) -> float:
+    """What is compiled."""
+    return 2.0 * x
+
+
+def compiled(folder: Path | None) -> Any:
+    """The function as a process finds it that has not used it yet."""
+    function = numba.njit(twice)
+    function._cache = KernelCache(twice, {}, KernelFolder(folder, ""))
+    return function
+
+
+def counts(function: Any) -> tuple[int, int]:
+    """Calls it; how many kernels were loaded, and how many compiled."""
+    assert function(1.5) == 3.0
+    return sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values())
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The kernel's file."""
+    assert counts(compiled(tmp_path)) == (0, 1)
+    (found,) = tmp_path.iterdir()
+    assert counts(compiled(tmp_path)) == (1, 0)
+    return found
+
+
+def flipped(content: bytes, place: float) -> bytes:
+    changed = bytearray(content)
+    changed[int(place * (len(content) - 1))] ^= 1
+    return bytes(changed)
+
+
+def with_checksum(payload: bytes) -> bytes:
+    return MAGIC + _checksum(payload) + payload
+
+
+HEADER = len(MAGIC) + CHECKSUM
+
+DAMAGE: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda content: b"",
+    "cut in the header": lambda content: content[: HEADER - 5],
+    "only a header": lambda content: content[:HEADER],
+    "cut by half": lambda content: content[: len(content) // 2],
+    "a byte more": lambda content: content + b"\0",
+    **{f"flipped at {place}": lambda content, place=place: flipped(content, place) for place in (0.0, 0.01, 0.5, 1.0)},
+    "a text": lambda content: "Zuführung\n".encode("latin-1") * 100,
+    "zeros": lambda content: bytes(len(content)),
+    "no pickle": lambda content: with_checksum(b"\x80\x04 not a pickle"),
+    "another pickle": lambda content: with_checksum(pickle.dumps({"one": 1})),
+    "other types": lambda content: with_checksum(pickle.dumps((("another", "key"), ()))),
+    "of a module that is gone": lambda content: with_checksum(b"cno_such_module\nThing\n."),
+    "no machine code": lambda content: with_checksum(
+        pickle.dumps((pickle.loads(content[HEADER:])[0], ("not", "a", "kernel")))
+    ),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE.keys())
+def test_a_damaged_file_is_compiled_again(
+    file: Path, damage: Callable[[bytes], bytes], caplog: pytest.LogCaptureFixture
+) -> None:
+    file.write_bytes(damage(file.read_bytes()))
+    assert counts(compiled(file.parent)) == (0, 1)
+    (line,) = caplog.messages
+    assert line.startswith(f"{file}: cached kernel not used, for it ")
+    assert counts(compiled(file.parent)) == (1, 0)
+    assert len(caplog.messages) == 1
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder", "open to others"])
+def test_a_file_that_another_could_have_put_is_compiled_again(
+    file: Path, kind: str, caplog: pytest.LogCaptureFixture, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    if kind == "open to others":
+        file.chmod(0o666)
+    else:
+        elsewhere = file.rename(tmp_path_factory.mktemp("elsewhere") / file.name)
+        {
+            "link": lambda: file.symlink_to(elsewhere),
+            "pipe": lambda: os.mkfifo(file),
+            "folder": lambda: file.mkdir(),
+        }[kind]()
+    assert counts(compiled(file.parent)) == (0, 1)
+    assert caplog.messages[0].startswith(f"{file}: cached kernel not used, for ")
+    assert counts(compiled(file.parent)) == ((0, 1) if kind == "folder" else (1, 0))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files of another user")
+def test_a_file_of_another_user_is_compiled_again(file: Path) -> None:
+    os.chown(file, 65534, 65534)
+    assert counts(compiled(file.parent)) == (0, 1)
+    assert file.stat().st_uid == 0
+    assert counts(compiled(file.parent)) == (1, 0)
+
+
+def test_files_are_of_this_user_only(file: Path) -> None:
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_folder_that_takes_nothing_is_told_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    folder = KernelFolder(tmp_path / "gone", "")
+    folder.write("one", b"1")
+    folder.write("two", b"2")
+    assert caplog.messages == [f"{tmp_path}/gone: kernels can't be cached (No such file or directory)"]
+    assert counts(compiled(tmp_path / "gone")) == (0, 1)
+
+
+def test_without_a_folder_everything_is_compiled(caplog: pytest.LogCaptureFixture) -> None:
+    assert counts(compiled(None)) == (0, 1)
+    assert counts(compiled(None)) == (0, 1)
+    assert not caplog.messages
+
+
+def test_what_is_not_cached_is_not_compiled_where_that_is_not_wanted(file: Path) -> None:
+    with cached_only():
+        assert counts(compiled(file.parent)) == (1, 0)
+        file.unlink()
+        with pytest.raises(NotCached, match="twice"):
+            compiled(file.parent)(1.5)
+    assert counts(compiled(file.parent)) == (0, 1)
