@@ -117,7 +117,7 @@ def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path)
     assert_refused(command("replay", "bag"), "conveyor-sim recover")
     recovered = command("recover", "bag")
     assert recovered.exit_code == 0, recovered.output
-    assert "whole again with" in recovered.output
+    assert "repaired, with" in recovered.output
     assert "bag_0.mcap.damaged and may be deleted" in recovered.output
     assert command("replay", "bag").exit_code == 0
 

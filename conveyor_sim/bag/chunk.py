@@ -86,9 +86,9 @@ def chunk_at(data: Data, position: int) -> Chunk | None:
     return Chunk(position, content + compressed, content, start_ns, end_ns, size, crc, compression.decode())
 
 
-def next_chunk(data: Data, position: int) -> Chunk | None:
-    """The first chunk that begins at a byte or later and lies within the file."""
-    while (found := BEGINNING.search(data, position)) is not None:
+def next_chunk(data: Data, position: int, stop: int) -> Chunk | None:
+    """The first chunk that begins in a span of bytes and ends within the file."""
+    while (found := BEGINNING.search(data, position, stop)) is not None:
         chunk = chunk_at(data, found.start())
         if chunk is not None and chunk.stop <= len(data):
             return chunk

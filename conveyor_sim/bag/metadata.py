@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path, PurePath
 from typing import Any
@@ -96,8 +97,9 @@ def to_yaml(value: Any) -> str:
     return stream.getvalue()
 
 
+@lru_cache(maxsize=64)
 def from_yaml(text: str) -> Any:
-    """Parses YAML; None if it is none."""
+    """Parses YAML; None if it is none. Not to be changed: topics share what their profiles are parsed to."""
     try:
         return YAML(typ="safe").load(text)
     except Exception:  # damaged text makes the parser raise more than its own YAMLError

@@ -91,9 +91,12 @@ def parse(opcode: int, body: bytes) -> McapRecord | None:
     try:
         if opcode == Opcode.MESSAGE:
             return Message.read(stream, len(body))
-        return _READERS[Opcode(opcode)](stream) if opcode in _READERS else None
+        record: McapRecord | None = _READERS[Opcode(opcode)](stream) if opcode in _READERS else None
     except (McapError, struct.error, ValueError) as error:  # a UnicodeDecodeError is a ValueError
         raise Malformed("a record can't be read") from error
+    if record is not None and stream.count != len(body):
+        raise Malformed("a record does not end where it should")
+    return record
 
 
 def records(data: Data, start: int, stop: int) -> Iterator[tuple[int, int, McapRecord | None]]:

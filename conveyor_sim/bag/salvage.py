@@ -126,8 +126,7 @@ class Salvage:
         while position < size:
             chunk = chunk_at(self._data, position)
             if chunk is not None:
-                self._take(chunk)
-                position = min(chunk.stop, size)
+                position = self._take(chunk)
                 continue
             head = head_at(self._data, position, size)
             if head is not None and head[0] == Opcode.DATA_END and head[1] == position + DATA_END.size:
@@ -138,9 +137,10 @@ class Salvage:
                 position = self._resume(position)
         return None
 
-    def _take(self, chunk: Chunk) -> None:
+    def _take(self, chunk: Chunk) -> int:
+        """Takes a chunk in, if it is sound; returns where to go on."""
         self._last = None
-        if chunk.stop > len(self._data):
+        if chunk.stop > len(self._data) and self._chunk_in(chunk) is None:
             had = read_cut(self._data, chunk)
             share = f"{len(had)} of {chunk.size} bytes" if had else "nothing"
             self.damage.append(
@@ -150,16 +150,17 @@ class Salvage:
             counts = Counter(record.channel_id for record in records if isinstance(record, Message))
             self._found.append(_Found(chunk, counts, cut=True))
             self._learn(records)
-            return
+            return len(self._data)
         try:
             content = survey(read_content(self._data, chunk))
         except Malformed as error:
             self.damage.append(f"the chunk at byte {chunk.start} is damaged: {error}")
             self._holes.append((len(self._found), None))
-            return
+            inner = self._chunk_in(chunk)
+            return inner.start if inner else chunk.stop
         if (content.digest, chunk.size) in self._digests:
             self.damage.append(f"the chunk at byte {chunk.start} repeats another one")
-            return
+            return chunk.stop
         self._digests.add((content.digest, chunk.size))
         if content.count and content.span != (chunk.start_ns, chunk.end_ns):
             self.damage.append(f"the chunk at byte {chunk.start} states other times than its messages")
@@ -167,6 +168,11 @@ class Salvage:
         self._last = content
         self._found.append(_Found(chunk, {channel: len(places) for channel, places in content.places.items()}))
         self._learn((*content.schemas, *content.channels))
+        return chunk.stop
+
+    def _chunk_in(self, chunk: Chunk) -> Chunk | None:
+        """The next chunk, if it begins before a damaged one ends: where bytes of that were lost."""
+        return next_chunk(self._data, chunk.start + 1, chunk.stop)
 
     def _learn(self, records: Iterable[object]) -> None:
         for record in records:
@@ -178,6 +184,8 @@ class Salvage:
     def _top_level(self, opcode: int, start: int, stop: int) -> bool:
         """Takes a record outside of chunks in; whether it is one."""
         body = start + RECORD_HEAD.size
+        if (opcode >= PRIVATE or opcode == Opcode.MESSAGE) and next_chunk(self._data, start + 1, stop) is not None:
+            return False  # with a damaged length
         if opcode >= PRIVATE:
             return True
         if opcode not in (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.MESSAGE_INDEX,
@@ -219,7 +227,7 @@ class Salvage:
 
     def _resume(self, position: int) -> int:
         """Where the next record begins that can be trusted to be one: a chunk, or the end of the data."""
-        chunk = next_chunk(self._data, position + 1)
+        chunk = next_chunk(self._data, position + 1, len(self._data))
         following = chunk.start if chunk else len(self._data)
         end = self._data.find(DATA_END_HEAD, position + 1, following)
         while end >= 0 and not self._is_end(end):
