@@ -59,7 +59,7 @@ def read_index(data: Data) -> Index | None:
     opcode, length, stated, _, crc = FOOTER.unpack(data[footer:end])
     if (opcode, length) != (Opcode.FOOTER, FOOTER.size - 9):
         return None
-    # Where bytes before it were lost or added, it begins elsewhere than the footer says, but still after the data's end.
+    # Where bytes before it were lost or added, it begins elsewhere than the footer says, but still after DataEnd.
     for start in (stated, data.rfind(DATA_END_HEAD, 0, footer) + DATA_END.size):
         if not len(MAGIC) <= start <= footer or (crc and checksum(data, start, end - CRC_SIZE) != crc):
             continue

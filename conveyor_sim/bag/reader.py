@@ -276,7 +276,8 @@ def open_bag(path: str | Path) -> Bag:
         raise BagError(f"{path}: no such bag; expected a rosbag2 folder or an .mcap file")
     with in_one_sentence(path):
         files = _checked_files(path)
-        verified = all([_verify(path, file) for file in files]) if files else False
+        seals = [_verify(path, file) for file in files]
+        verified = bool(seals) and all(seals)
         # By its files, if it is MCAP: these repeat, under a checksum, what metadata.yaml says.
         reader = AnyReader(files or [path], default_typestore=typestore())
         reader.open()

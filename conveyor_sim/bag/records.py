@@ -32,7 +32,7 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")
 """Opcode, length of what follows."""
 LIMIT = 1 << 28
-"""Bytes of one record or one chunk's content, at most; recorders write about 1 MiB. A damaged size can't ask for more."""
+"""Bytes of one record or one chunk's content, at most, so that a damaged size can't ask for more; 1 MiB is usual."""
 PIECE = 1 << 20
 """Bytes taken into a checksum at a time."""
 
@@ -59,13 +59,15 @@ def mapped(path: Path) -> Iterator[Data]:
     """A file's bytes, not read before they are used. Raises BagError if it can't be opened."""
     try:
         with path.open("rb") as file:
-            if path.stat().st_size == 0:
-                yield b""
-                return
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                yield data
+            empty = path.stat().st_size == 0
+            data = None if empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise BagError(f"{path}: can't be read ({error.strerror or error})") from error
+    if data is None:
+        yield b""
+        return
+    with data:
+        yield data
 
 
 def checksum(data: Data, start: int, stop: int) -> int:
@@ -90,7 +92,8 @@ def parse(opcode: int, body: bytes) -> McapRecord | None:
     stream = ReadDataStream(BytesIO(body))
     try:
         if opcode == Opcode.MESSAGE:
-            return Message.read(stream, len(body))
+            message: McapRecord = Message.read(stream, len(body))
+            return message
         record: McapRecord | None = _READERS[Opcode(opcode)](stream) if opcode in _READERS else None
     except (McapError, struct.error, ValueError) as error:  # a UnicodeDecodeError is a ValueError
         raise Malformed("a record can't be read") from error

@@ -213,10 +213,9 @@ class Salvage:
         if self._holes and self._holes[-1][0] == len(self._found):
             at, count = self._holes[-1]
             self._holes[-1] = (at, (count or 0) + len(record.records))
-        elif self._last is not None:
-            # Writers may put the entries in the order of time.
-            if sorted(record.records) != sorted(self._last.places.get(record.channel_id, [])):
-                self._once("the index of a chunk's messages is damaged")
+        # Writers may put the entries in the order of time.
+        elif self._last is not None and sorted(record.records) != sorted(self._last.places.get(record.channel_id, [])):
+            self._once("the index of a chunk's messages is damaged")
 
     def _attach(self, record: Attachment, start: int, stop: int) -> None:
         crc = int.from_bytes(self._data[stop - CRC_SIZE : stop], "little")

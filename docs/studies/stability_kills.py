@@ -1,6 +1,6 @@
-"""Recordings that are killed (SIGKILL), at full speed and at real time: what of them is lost, and whether the rest replays.
+"""Recordings that are killed (SIGKILL), at full speed and at real time: what is lost, and whether the rest replays.
 
-    python docs/studies/stability_kills.py        # the study alone, into docs/stability/kills.csv: some minutes
+python docs/studies/stability_kills.py        # the study alone, into docs/stability/kills.csv: some minutes
 """
 
 from __future__ import annotations

@@ -236,7 +236,9 @@ def test_disk_that_is_full_from_the_start_is_told_and_leaves_nothing_behind(tmp_
     assert done.stderr == ""
     no_bytes, there, no_message, still_there, later = done.stdout.splitlines()
     assert re.fullmatch(r".*full/deep/deep_0\.mcap: can't be written \(File too large\)", no_bytes)
-    assert no_message.startswith(f"{folder}: can't be recorded to (File too large): there is no room for the first message")
+    assert no_message.startswith(
+        f"{folder}: can't be recorded to (File too large): there is no room for the first message"
+    )
     assert there == still_there == "False"
     assert "recording stopped at 0.00 s (File too large)" in later
     with open_bag(folder) as bag:

@@ -105,7 +105,7 @@ def test_no_flipped_bit_goes_unnoticed(folder: Path) -> None:
     content = file_of(folder).read_bytes()
     for at in range(0, len(content), 997):
         flip(folder, at)
-        with pytest.raises(BagError, match="damaged|begin"):
+        with pytest.raises(BagError, match=r"damaged|begin"):
             open_bag(folder)
         file_of(folder).write_bytes(content)
     assert recover(folder).healthy
@@ -252,7 +252,9 @@ def test_what_carries_no_checksum_is_never_called_whole(folder: Path, tmp_path: 
             out.write(topics[topic], time, data)
     report = recover(bare)
     assert report.healthy
-    assert report.unverified == tuple(f"bare.mcap: {what}" for what in ("what is outside of chunks", "the index", "chunks"))
+    assert report.unverified == tuple(
+        f"bare.mcap: {what}" for what in ("what is outside of chunks", "the index", "chunks")
+    )
     assert replay(bare).difference is None
 
 

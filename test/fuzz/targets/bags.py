@@ -1,4 +1,4 @@
-"""Recorded bags, damaged: cut, flipped, rearranged. What is read of them is what was recorded, or a sentence says why not."""
+"""Recorded bags, damaged: cut, flipped, rearranged. What is read of them was recorded, else a sentence says why."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def folder() -> Path:
 
 @cache
 def bases() -> tuple[Base, ...]:
-    """Our own recording, one that was killed, and what stock recorders make: without a checksum over all, without any."""
+    """Our own recording, one that was killed, and what stock recorders make: with few checksums, and with none."""
     own = folder() / "own"
     record(load_scene(SMALL_LINE), own, TICKS, ticks_a_chunk=10)
     bag = _base("own", own, checked=True, sealed=True)
