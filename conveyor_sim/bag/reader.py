@@ -304,8 +304,9 @@ def _checked_files(path: Path) -> list[Path]:
         names = [] if information is None else file_names(information)
     except (KeyError, TypeError):
         names = []
-    if names and all(PurePath(name).suffix != ".mcap" for name in names):
-        return []  # such as files that were compressed as a whole
+    compressed = information is not None and str(information.get("compression_mode") or "none").lower() != "none"
+    if names and (compressed or all(PurePath(name).suffix != ".mcap" for name in names)):
+        return []  # rosbags unpacks what was compressed message by message or file by file
     if sorted(names) != sorted(file.name for file in files):
         raise BagError(f"{path}: {FILE_NAME} does not fit the MCAP files beside it; `conveyor-sim recover` repairs it")
     return files

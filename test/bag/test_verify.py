@@ -20,10 +20,12 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as StockWriter
 
+from conveyor_sim.bag.mcap_file import McapFile, Schema
+from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
 from conveyor_sim.plot.recording import Recording
@@ -289,6 +291,34 @@ def test_a_damaged_metadata_file_is_told_and_written_anew(folder: Path, text: by
     assert metadata.read_text() == before
     assert report.kept == (folder / "metadata.yaml.damaged",)
     assert (folder / "metadata.yaml.damaged").read_bytes() == text
+
+
+def test_a_bag_of_several_files_is_read_and_repaired_as_one(folder: Path, tmp_path: Path) -> None:
+    before = messages(folder)
+    split = tmp_path / "split"
+    split.mkdir()
+    half = len(before) // 2
+    for number, part in enumerate((before[:half], before[half:])):
+        name = f"split_{number}.mcap"
+        with (split / name).open("wb") as stream:
+            file = McapFile(stream, name, "jazzy")
+            topics = {
+                topic: file.add_topic(
+                    f"/{topic}", Schema(output.type, "ros2msg", definition(output.type).encode()), "cdr", {}
+                )
+                for topic, output in OUTPUTS.items()
+            }
+            for topic, time, data in part:
+                file.add_message(topics[topic], data, time, time)
+            file.finish()
+    assert recover(split).damage == ("metadata.yaml was missing or did not fit",)
+    assert sorted(messages(split)) == sorted(before)
+    assert replay(split).difference is None
+    os.truncate(split / "split_1.mcap", (split / "split_1.mcap").stat().st_size - 60)
+    with pytest.raises(BagError, match=r"split_1\.mcap: is damaged"):
+        open_bag(split)
+    assert recover(split).message_count == len(before)
+    assert sorted(messages(split)) == sorted(before)
 
 
 def test_a_wrong_count_in_the_metadata_file_is_put_right(folder: Path) -> None:
