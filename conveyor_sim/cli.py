@@ -103,7 +103,9 @@ def explain(scene: str, price: bool, at: float | None) -> None:
 
 @main.command()
 @click.argument("scene")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
+@click.option(
+    "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
+)
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
@@ -189,18 +191,25 @@ def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, wri
 @main.command()
 @click.argument("bag", type=click.Path(path_type=Path))
 def recover(bag: Path) -> None:
-    """Make BAG whole again that was killed while it was written."""
+    """Verify BAG; if it was damaged, or killed while it was written, repair it and keep the original."""
     from conveyor_sim.bag.recover import recover as recover_bag
 
     report = recover_bag(bag)
-    if report.healthy:
-        click.echo(f"{bag}: is whole, nothing to do ({report.message_count} messages)")
-        return
     for sentence in report.damage:
         click.echo(sentence)
-    click.echo(f"{bag}: whole again with {report.message_count} messages up to {report.end_ns * 1e-9:.2f} s")
+    for phrase in report.unverified:
+        click.echo(f"{phrase}: has no checksum, so it can't be verified")
+    what = f"{report.message_count} messages up to {report.end_ns * 1e-9:.2f} s"
+    if not report.healthy:
+        click.echo(f"{bag}: repaired, with {what}")
+    elif report.unverified:
+        click.echo(f"{bag}: no damage was found, nothing to do ({what})")
+    else:
+        click.echo(f"{bag}: is whole, every checksum is right, nothing to do ({what})")
     for file in report.kept:
         click.echo(f"the damaged original is kept as {file} and may be deleted")
+    if report.unusable and not report.healthy:
+        raise click.ClickException(f"{report.unusable}; other programs can read it, but it can't be replayed or drawn")
 
 
 @main.command()

@@ -17,7 +17,7 @@ from rich.table import Table
 from conveyor_sim.achieved import Achieved, achieved
 from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
-from conveyor_sim.errors import SceneError
+from conveyor_sim.errors import ConveyorError, SceneError
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.observe.borne import Borne
 from conveyor_sim.observe.columns import BottleColumns
@@ -149,15 +149,18 @@ class Summary:
 
 def summarize(path: str | Path, wall: float | None = None) -> Summary:
     """Sums a bag up in one pass; wall: how long the run took, s, if known. Raises BagError if it can't be read."""
-    with open_bag(path) as bag:
+    with open_bag(path) as bag, bag.sense():
         return _Tally(bag).summary(wall)
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
-    """Writes summary.json into the folder; returns its path."""
+    """Writes summary.json into the folder; returns its path. Raises ConveyorError if it can't be written."""
     file = folder / FILE_NAME
     content = {**asdict(summary), "real_time_factor": summary.real_time_factor}
-    file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    try:
+        file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConveyorError(f"{file}: can't be written ({error.strerror})") from error
     return file
 
 

@@ -46,4 +46,7 @@ def main(path: str) -> None:
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit("usage: python read_bag.py BAG")
-    main(sys.argv[1])
+    try:
+        main(sys.argv[1])
+    except Exception as error:  # a damaged bag makes the reader raise almost anything
+        sys.exit(f"{sys.argv[1]}: can't be read ({error!r:.200}); `conveyor-sim recover` may help")

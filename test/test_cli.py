@@ -106,6 +106,12 @@ def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_record_is_another_name_of_out(command: Command, tmp_path: Path) -> None:
+    result = command("run", SMALL_LINE, "--record", "bag", "--duration", "0.1")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "bag" / "bag_0.mcap").exists()
+
+
 def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path) -> None:
     command("run", SMALL_LINE, "--out", "bag", "--duration", "0.6")
     assert "nothing to do" in command("recover", "bag").output
@@ -117,7 +123,7 @@ def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path)
     assert_refused(command("replay", "bag"), "conveyor-sim recover")
     recovered = command("recover", "bag")
     assert recovered.exit_code == 0, recovered.output
-    assert "whole again with" in recovered.output
+    assert "repaired, with" in recovered.output
     assert "bag_0.mcap.damaged and may be deleted" in recovered.output
     assert command("replay", "bag").exit_code == 0
 

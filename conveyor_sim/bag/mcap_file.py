@@ -44,11 +44,17 @@ class McapFile:
 
     def __init__(self, stream: IO[bytes], name: str, distro: str) -> None:
         self._distro = distro
-        self._writer = Writer(stream, compression=CompressionType.ZSTD)
+        # Of what lies between and around the chunks, only the checksum over all data tells damage.
+        self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
         self._schemas: dict[Schema, int] = {}
         self._topics: dict[int, TopicInfo] = {}
         self.info = FileInfo(name, 0, 0, 0)
         self._writer.start(profile="ros2", library=f"conveyor_sim {__version__}")
+
+    @property
+    def topics(self) -> list[TopicInfo]:
+        """The topics with their counts so far."""
+        return list(self._topics.values())
 
     def add_topic(self, name: str, schema: Schema, encoding: str, metadata: dict[str, str]) -> int:
         """Registers a channel for messages of the schema's type; returns its number."""
@@ -70,6 +76,10 @@ class McapFile:
         """Appends a metadata record."""
         self._writer.add_metadata(name, content)
 
+    def add_attachment(self, name: str, media_type: str, data: bytes, log_time: int, create_time: int) -> None:
+        """Appends a file; times in ns."""
+        self._writer.add_attachment(create_time, log_time, name, media_type, data)
+
     def flush(self) -> None:
         """Ends the present chunk and hands everything to the operating system."""
         self._writer.flush()  # type: ignore[no-untyped-call]
@@ -77,7 +87,7 @@ class McapFile:
     def finish(self) -> dict[str, Any]:
         """Writes the metadata record, index and end; returns what belongs into metadata.yaml."""
         self.flush()
-        information = bag_information(list(self._topics.values()), [self.info], self._distro)
+        information = bag_information(self.topics, [self.info], self._distro)
         self.add_metadata(RECORD_NAME, {RECORD_KEY: to_yaml(information)})
         self._writer.finish()  # type: ignore[no-untyped-call]
         return information

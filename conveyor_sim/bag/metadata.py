@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from io import StringIO
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
+SIZE_LIMIT = 1 << 24
+"""Bytes of the file, at most."""
 RECORD_NAME = "rosbag2"
 RECORD_KEY = "serialized_metadata"
 """Name and key of the MCAP metadata record that repeats this file's content."""
@@ -95,26 +97,69 @@ def to_yaml(value: Any) -> str:
     return stream.getvalue()
 
 
+@lru_cache(maxsize=64)
 def from_yaml(text: str) -> Any:
-    """Parses YAML; None if it is none."""
+    """Parses YAML; None if it is none. Not to be changed: topics share what their profiles are parsed to."""
     try:
         return YAML(typ="safe").load(text)
-    except YAMLError:
+    except Exception:  # damaged text makes the parser raise more than its own YAMLError
         return None
 
 
 def write_metadata(folder: Path, information: Mapping[str, Any]) -> None:
     """Writes metadata.yaml into the folder, whole or not at all."""
     temporary = folder / f"{FILE_NAME}.tmp"
-    temporary.write_text(to_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
-    temporary.replace(folder / FILE_NAME)
+    try:
+        temporary.write_text(to_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
+        temporary.replace(folder / FILE_NAME)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def read_metadata(folder: Path) -> dict[str, Any] | None:
     """What metadata.yaml says under `rosbag2_bagfile_information`; None if it is missing or broken."""
+    file = folder / FILE_NAME
     try:
-        document = from_yaml((folder / FILE_NAME).read_text(encoding="utf-8"))
+        if not file.is_file() or file.stat().st_size > SIZE_LIMIT:
+            return None
+        document = from_yaml(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError):
         return None
     information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
     return information if isinstance(information, dict) else None
+
+
+def fits(information: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
+    """Whether a metadata.yaml says of its bag what it must: files, times, and topics with their types and counts."""
+    try:
+        return _essence(information) == _essence(expected)
+    except (KeyError, TypeError, AttributeError, IndexError):
+        return False
+
+
+def file_names(information: Mapping[str, Any]) -> list[str]:
+    """The storage files; older versions tell them with their folder. Raises TypeError or KeyError."""
+    return [PurePath(path).name for path in information["relative_file_paths"]]
+
+
+def _essence(information: Mapping[str, Any]) -> tuple[Any, ...]:
+    topics = {}
+    for topic in information["topics_with_message_count"]:
+        if count := topic["message_count"]:  # of the others, a recorder may name some or none
+            told = topic["topic_metadata"]
+            topics[told["name"]] = (told["type"], told["serialization_format"], _profiles(told), count)
+    return (
+        information["storage_identifier"],
+        information["duration"]["nanoseconds"],
+        information["starting_time"]["nanoseconds_since_epoch"],
+        information["message_count"],
+        topics,
+        file_names(information),
+    )
+
+
+def _profiles(topic: Mapping[str, Any]) -> Any:
+    """Quality of service; up to version 8 it is text."""
+    profiles = topic.get("offered_qos_profiles")
+    return from_yaml(profiles) if isinstance(profiles, str) else profiles

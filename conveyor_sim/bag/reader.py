@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, fields
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
-from rosbags.rosbag2 import ReaderError
-from rosbags.serde import SerdeError
 
 from conveyor_sim.bag import messages
+from conveyor_sim.bag.index import sealed
+from conveyor_sim.bag.metadata import FILE_NAME, file_names, read_metadata
 from conveyor_sim.bag.qos import DATA, Qos
+from conveyor_sim.bag.records import mapped
+from conveyor_sim.bag.salvage import Salvage
 from conveyor_sim.bag.typestore import typestore
-from conveyor_sim.errors import BagError
+from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
 
 T = TypeVar("T")
+
+TOLD = 200
+"""Characters of a library's error that are told."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +84,10 @@ class Bag(AbstractContextManager["Bag"]):
     `line` is the recorded conveyor_msgs/Line (its fields as attributes, arrays as NumPy, texts as lists of str).
     """
 
-    def __init__(self, path: Path, reader: AnyReader) -> None:
+    def __init__(self, path: Path, reader: AnyReader, verified: bool) -> None:
         self.path = path
+        self.verified = verified
+        """Every byte is as it was written; False: some carry no checksum."""
         self._reader = reader
         line_topics = [c.topic for c in reader.connections if c.msgtype == messages.LINE and c.msgcount]
         if not line_topics:
@@ -97,7 +105,10 @@ class Bag(AbstractContextManager["Bag"]):
     @property
     def counts(self) -> dict[str, int]:
         """Recorded messages by topic, names as in OUTPUTS (without the namespace and its slash)."""
-        return {self._relative(c.topic): c.msgcount for c in self._reader.connections}
+        counts: Counter[str] = Counter()
+        for connection in self._reader.connections:
+            counts[self._relative(connection.topic)] += connection.msgcount
+        return dict(counts)
 
     @property
     def types(self) -> dict[str, str]:
@@ -132,18 +143,18 @@ class Bag(AbstractContextManager["Bag"]):
         chosen = [c for c in self._reader.connections if topics is None or self._relative(c.topic) in topics]
         if not chosen:
             return
-        try:
+        with in_one_sentence(self.path):
             for connection, log_time, data in self._reader.messages(chosen, start_ns, stop_ns):
                 yield self._relative(connection.topic), log_time, data
-        except (AnyReaderError, ReaderError) as error:
-            raise BagError(f"{self.path}: {error} (damaged? `conveyor-sim recover` may help)") from error
 
     def decode(self, topic: str, data: bytes) -> Any:
         """A rosbags message object. Raises BagError if the bytes are not one of the topic's type."""
-        try:
+        with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded"):
             return self._reader.deserialize(data, self.types[topic])
-        except (AnyReaderError, SerdeError, AssertionError) as error:
-            raise BagError(f"{self.path}: a message of topic {topic} can't be decoded: {error}") from error
+
+    def sense(self) -> AbstractContextManager[None]:
+        """Around whatever makes sense of decoded messages: where damage can't be excluded, errors become BagErrors."""
+        return nullcontext() if self.verified else in_one_sentence(self.path, "its messages make no sense")
 
     def messages(self, topic: str) -> Iterator[Frame[Any]]:
         """Every message of one topic that carries a tick, as a rosbags object."""
@@ -234,25 +245,79 @@ def to_outcome(message: Any) -> Outcome:
     return Outcome(message.source, tuple(message.names), values, bool(message.accepted), message.reason)
 
 
-def open_bag(path: str | Path) -> Bag:
-    """Opens a rosbag2 folder or a single .mcap file.
+@contextmanager
+def in_one_sentence(path: Path, what: str = "can't be read as a bag") -> Iterator[None]:
+    """Turns whatever the libraries raise over a bag that they can't read into a BagError of one sentence."""
+    try:
+        yield
+    except ConveyorError:
+        raise
+    except Exception as error:
+        told = " ".join(f"{type(error).__name__}: {error}".split())
+        cut = told if len(told) <= TOLD else f"{told[:TOLD]}..."
+        raise BagError(f"{path}: {what} ({cut}); damaged? `conveyor-sim recover` may help") from error
 
-    Raises BagError, in one sentence, if it is missing, cut short, or holds no `line`.
+
+def mcap_files(path: Path) -> list[Path]:
+    """The MCAP files of a rosbag2 folder in their order, or the file itself."""
+    if path.is_file():
+        return [path]
+    files = [file for file in path.glob("*.mcap") if file.is_file()]
+    return sorted(files, key=lambda file: (len(file.name), file.name))
+
+
+def open_bag(path: str | Path) -> Bag:
+    """Opens a rosbag2 folder or a single .mcap file, once all of it that carries a checksum has been verified.
+
+    Raises BagError, in one sentence, if it is missing, cut short or damaged, or holds no `line`.
     """
     path = Path(path)
     if not path.exists():
         raise BagError(f"{path}: no such bag; expected a rosbag2 folder or an .mcap file")
-    if path.is_dir() and not (path / "metadata.yaml").exists():
-        hint = "`conveyor-sim recover` makes it whole" if list(path.glob("*.mcap*")) else "expected a rosbag2 folder"
-        raise BagError(f"{path}: metadata.yaml is missing; {hint}")
-    try:
-        reader = AnyReader([path], default_typestore=typestore())
+    with in_one_sentence(path):
+        files = _checked_files(path)
+        seals = [_verify(path, file) for file in files]
+        verified = bool(seals) and all(seals)
+        # By its files, if it is MCAP: these repeat, under a checksum, what metadata.yaml says.
+        reader = AnyReader(files or [path], default_typestore=typestore())
         reader.open()
-    except (AnyReaderError, ReaderError, OSError) as error:
-        raise BagError(f"{path}: not a whole bag ({error}); `conveyor-sim recover` may make it whole") from error
+        try:
+            return Bag(path, reader, verified)
+        except BaseException:
+            with suppress(Exception):
+                reader.close()
+            raise
+
+
+def _checked_files(path: Path) -> list[Path]:
+    """The MCAP files that a bag consists of; none if rosbags must read it by its metadata.yaml."""
+    if path.is_file():
+        return [path] if path.suffix == ".mcap" else []
+    files = mcap_files(path)
+    if not (path / FILE_NAME).exists():
+        hint = "`conveyor-sim recover` repairs it" if files else "expected a rosbag2 folder"
+        raise BagError(f"{path}: {FILE_NAME} is missing; {hint}")
+    if not files:
+        return []
+    information = read_metadata(path)
     try:
-        return Bag(path, reader)
-    except BagError:
-        with suppress(AnyReaderError):
-            reader.close()
-        raise
+        names = [] if information is None else file_names(information)
+    except (KeyError, TypeError):
+        names = []
+    compressed = information is not None and str(information.get("compression_mode") or "none").lower() != "none"
+    if names and (compressed or all(PurePath(name).suffix != ".mcap" for name in names)):
+        return []  # rosbags unpacks what was compressed message by message or file by file
+    if sorted(names) != sorted(file.name for file in files):
+        raise BagError(f"{path}: {FILE_NAME} does not fit the MCAP files beside it; `conveyor-sim recover` repairs it")
+    return files
+
+
+def _verify(path: Path, file: Path) -> bool:
+    """Whether every byte of a file is as it was written; False: as far as can be seen. Raises BagError."""
+    with mapped(file) as data:
+        if sealed(data):
+            return True
+        damage = Salvage(file, data).damage
+    if damage:
+        raise BagError(f"{file}: is damaged ({damage[0]}); `conveyor-sim recover {path}` saves what is sound")
+    return False

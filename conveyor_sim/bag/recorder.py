@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,40 +14,55 @@ from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.typestore import default_distro, definition, type_hash
 from conveyor_sim.errors import BagError
 
-FLUSH_INTERVAL = 1.0
-"""s of wall time: what a killed process can lose."""
+FLUSH_INTERVAL = 0.5
+"""s of wall time that a message waits at most to be handed to the operating system. A killed process loses these, and
+what a loaded machine adds: less than a second."""
 
 
 class Recorder(contextlib.AbstractContextManager["Recorder"]):
     """A sink that records every message it is given; use it as a context manager.
 
     path: the folder to create, which must not exist or be empty. topics: those of OUTPUTS to record (default: all).
-    Raises BagError, before anything is simulated, if the folder can't be written.
+    A thread of its own flushes, whether more messages come or not; any thread may call the methods.
+    Raises BagError, before anything is simulated, if the folder can't be written; then nothing is left of it.
     """
 
     def __init__(self, path: str | Path, *, topics: Iterable[str] | None = None, distro: str | None = None) -> None:
         self.path = Path(path)
         self._distro = distro or default_distro()
         self._ended = False
+        self._failure: BagError | None = None
+        self._waiting_since: float | None = None  # s of wall time; None: all has been flushed
+        self._changed = threading.Condition()  # its lock is held by whoever uses the file
         name = f"{self.path.resolve().name}_0.mcap"
-        self._make_folder()
+        self._made = self._make_folder()
+        self._storage = self.path / name
         try:
-            self._stream = (self.path / name).open("xb")
+            self._stream = self._storage.open("xb")
             self._file = McapFile(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
+            self._file.flush()  # a disk without room is noticed here
         except OSError as error:
-            raise BagError(f"{self.path / name}: can't be written ({error.strerror})") from error
-        # The first message, the line, is flushed at once: without it a bag killed early could not be understood.
-        self._next_flush = time.monotonic()
+            self._leave_nothing()
+            raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
+        self._begun = False  # the first message, the line, is flushed at once: without it a bag can't be understood
+        self._flusher = threading.Thread(target=self._keep_flushing, name="recorder", daemon=True)
+        self._flusher.start()
 
-    def _make_folder(self) -> None:
+    def _make_folder(self) -> list[Path]:
+        """Makes the folder; returns the folders that were not there before, the innermost first."""
+        made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            occupied = any(self.path.iterdir())
+            occupied = sorted(file.name for file in self.path.iterdir())
         except OSError as error:
+            self._remove(made)
             raise BagError(f"{self.path}: can't be created as the folder of a recording ({error.strerror})") from error
         if occupied:
-            raise BagError(f"{self.path}: is not empty, expected a new or an empty folder to record into")
+            bag = next((name for name in occupied if ".mcap" in name), None)
+            holds = f" (it holds a recording, {bag})" if bag else ""
+            raise BagError(f"{self.path}: is not empty{holds}, expected a new or an empty folder to record into")
+        return made
 
     def _register(self, topic: str) -> int:
         output = OUTPUTS[topic]
@@ -63,55 +79,109 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Records one message. Raises BagError if the disk is full; what was written before stays recoverable."""
-        if self._ended:
-            raise BagError(f"{self.path}: the recording has ended and takes no more messages")
-        try:
-            self._file.add_message(self._channels[topic], data, log_time=stamp_ns, publish_time=stamp_ns)
-        except OSError as error:
-            self._fail(error)
-        if time.monotonic() >= self._next_flush:
-            self.flush()
+        with self._changed:
+            self._raise_failure()
+            if self._ended:
+                raise BagError(f"{self.path}: the recording has ended and takes no more messages")
+            try:
+                self._file.add_message(self._channels[topic], data, log_time=stamp_ns, publish_time=stamp_ns)
+                if not self._begun:
+                    self._file.flush()
+                    self._begun = True
+                elif self._waiting_since is None:
+                    self._waiting_since = time.monotonic()
+                    self._changed.notify()
+            except OSError as error:
+                self._fail(error)
 
     def flush(self) -> None:
-        """Hands everything recorded so far to the operating system.
+        """Hands everything recorded so far to the operating system at once.
 
-        Done by itself once a second while messages come; whoever pauses the simulation calls it then.
+        Raises BagError if the disk is full, also if that was found in the meantime.
         """
-        if self._ended:
-            return
-        try:
-            self._file.flush()
-        except OSError as error:
-            self._fail(error)
-        self._next_flush = time.monotonic() + FLUSH_INTERVAL
+        with self._changed:
+            self._raise_failure()
+            if not self._ended:
+                self._flush()
 
     def close(self) -> None:
         """Ends the recording: index, metadata, metadata.yaml. Does nothing the second time, or after a failure.
 
         Raises BagError if the disk is full; what was written before stays recoverable.
         """
-        if self._ended:
-            return
-        try:
-            information = self._file.finish()
-            self._stream.close()
-            write_metadata(self.path, information)
-        except OSError as error:
-            self._fail(error)
-        self._ended = True
+        with self._changed:
+            self._raise_failure()
+            if self._ended:
+                return
+            self._ended = True
+            self._changed.notify()
+            try:
+                information = self._file.finish()
+                self._stream.close()
+                write_metadata(self.path, information)
+            except OSError as error:
+                self._fail(error)
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _keep_flushing(self) -> None:
+        """Flushes what has waited for long enough, until the recording ends."""
+        with self._changed:
+            while not self._ended:
+                if self._waiting_since is None:
+                    self._changed.wait()
+                elif (left := self._waiting_since + FLUSH_INTERVAL - time.monotonic()) > 0.0:
+                    self._changed.wait(left)
+                else:
+                    try:
+                        self._flush()
+                    except BagError as error:
+                        self._failure = error  # for whoever writes, flushes or closes next
+
+    def _flush(self) -> None:
+        try:
+            self._file.flush()
+        except OSError as error:
+            self._fail(error)
+        self._waiting_since = None
+
+    def _raise_failure(self) -> None:
+        """Raises what ended the recording in the meantime, once."""
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+
     def _fail(self, error: OSError) -> None:
-        """Ends the recording where it is, which `recover` can make whole, and raises BagError."""
+        """Ends the recording where it is, which `recover` can repair, and raises BagError."""
         self._ended = True
+        self._changed.notify()
         with contextlib.suppress(OSError):
             self._stream.close()  # tries once more to write what is buffered, which may not fit either
+        if not self._begun:
+            self._leave_nothing()
+            raise BagError(
+                f"{self.path}: can't be recorded to ({error.strerror}): there is no room for the first message; "
+                "nothing was left there"
+            ) from error
         raise BagError(
             f"{self.path}: recording stopped at {self._file.info.end_ns * 1e-9:.2f} s ({error.strerror}); "
             f"what was written is kept: make room, then `conveyor-sim recover {self.path}`"
         ) from error
+
+    def _leave_nothing(self) -> None:
+        """Removes what was made before the first message, so that the same folder can be recorded to later."""
+        with contextlib.suppress(OSError, AttributeError):
+            self._stream.close()
+        with contextlib.suppress(OSError):
+            self._storage.unlink(missing_ok=True)
+        self._remove(self._made)
+
+    @staticmethod
+    def _remove(folders: Iterable[Path]) -> None:
+        for folder in folders:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
 
 
 def new_run_folder(root: str | Path = "runs") -> Path:

@@ -1,31 +1,38 @@
-"""Makes a bag whole that was killed while it was written. The damaged file is kept beside the new one."""
+"""Repairs a bag that was interrupted or damaged: a copy of what is sound. The damaged file is kept beside it."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
-from mcap.records import Channel, Message, Metadata
+from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
+from conveyor_sim.bag.compare import COMPARERS
+from conveyor_sim.bag.index import read_index, sealed
 from conveyor_sim.bag.mcap_file import McapFile, Schema, topic_info
 from conveyor_sim.bag.metadata import (
+    FILE_NAME,
     RECORD_NAME,
     FileInfo,
     TopicInfo,
     bag_information,
+    fits,
     read_metadata,
     write_metadata,
 )
-from conveyor_sim.bag.salvage import MAGIC, Salvage
+from conveyor_sim.bag.outputs import OUTPUTS
+from conveyor_sim.bag.reader import mcap_files, open_bag
+from conveyor_sim.bag.records import mapped
+from conveyor_sim.bag.salvage import Salvage
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import BagError
+
+STATE_TYPES = {OUTPUTS[topic].type for topic in COMPARERS}
 
 
 @dataclass(frozen=True)
@@ -35,135 +42,151 @@ class RecoverReport:
     path: Path
     healthy: bool
     """Nothing was wrong, and nothing was done."""
+    unverified: tuple[str, ...]
+    """What carries no checksum, so that damage in it can't be seen, a phrase each; empty: every byte was verified."""
     message_count: int
     end_ns: int
     """Log time of the last message, ns."""
     damage: tuple[str, ...]
-    """What was wrong, one sentence each."""
+    """What was wrong and what is lost, one sentence each."""
     kept: tuple[Path, ...]
     """The damaged originals; they may be deleted."""
+    unusable: str
+    """Why what is there can't be replayed or drawn; empty: it can."""
 
 
 @dataclass(frozen=True)
 class _Content:
-    """What one whole MCAP file holds."""
+    """What of one MCAP file is sound."""
 
     file: FileInfo
     topics: tuple[TopicInfo, ...]
+    damage: tuple[str, ...] = ()
+    unverified: tuple[str, ...] = ()
 
 
 def recover(path: str | Path) -> RecoverReport:
-    """Rewrites the cut MCAP files of a rosbag2 folder (or one .mcap file) and, for a folder, its metadata.yaml.
+    """Verifies a rosbag2 folder (or one .mcap file); where it is damaged, writes a copy without what is damaged.
 
-    The new file takes the old one's place only when it is complete; the old one stays as *.damaged.
-    Raises BagError if there is nothing to recover or no room for the new file.
+    The copy takes the old file's place only when all is written and at least one recorded state is left; the old file
+    stays as *.damaged, a metadata.yaml that does not fit too.
+    Raises BagError if there is nothing to recover or no room for the new file; then nothing has changed.
     """
     path = Path(path)
-    files = [path] if path.is_file() else sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
+    files = mcap_files(path)
     if not files:
         raise BagError(f"{path}: no MCAP file found, expected a rosbag2 folder or an .mcap file")
     damage: list[str] = []
+    unverified: list[str] = []
     kept: list[Path] = []
+    contents: list[_Content] = []
     try:
         for file in files:
-            if _read_content(file) is None:
-                found = _rewrite(file) or ["the index at the end is missing"]
-                damage += [f"{file.name}: {sentence}" for sentence in found]
-                kept.append(_put_in_place(file))
-        contents = [content for file in files if (content := _read_content(file)) is not None]
-        if path.is_dir() and _refresh_metadata(path, contents):
-            damage.append("metadata.yaml was missing or did not fit")
+            content = _repair(file)
+            damage += [f"{file.name}: {sentence}" for sentence in content.damage]
+            unverified += [f"{file.name}: {phrase}" for phrase in content.unverified]
+            contents.append(content)
+        if damage:
+            _require_states(path, contents)
+        kept += [_put_in_place(file) for file, content in zip(files, contents, strict=True) if content.damage]
+        if path.is_dir() and (aside := _refresh_metadata(path, contents)) is not None:
+            damage.append(f"{FILE_NAME} was missing or did not fit")
+            kept += aside
     except OSError as error:
-        raise BagError(f"{path}: can't be recovered ({error.strerror}); the original was left as it was") from error
+        raise BagError(f"{path}: can't be recovered ({error.strerror}); no original was deleted") from error
+    finally:
+        for file in files:
+            with contextlib.suppress(OSError):
+                _temporary(file).unlink()
     return RecoverReport(
         path=path,
         healthy=not damage,
+        unverified=tuple(unverified),
         message_count=sum(content.file.message_count for content in contents),
         end_ns=max(content.file.end_ns for content in contents),
         damage=tuple(damage),
         kept=tuple(kept),
+        unusable=_unusable(path),
     )
-
-
-def _read_content(path: Path) -> _Content | None:
-    """What a whole file's own index says; None if it has none."""
-    try:
-        with path.open("rb") as file:
-            file.seek(-len(MAGIC), os.SEEK_END)
-            if file.read() != MAGIC:
-                return None
-            file.seek(0)
-            summary = make_reader(file).get_summary()
-    except (McapError, OSError):
-        return None
-    if summary is None or summary.statistics is None:
-        return None
-    counts = summary.statistics.channel_message_counts
-    topics = tuple(
-        topic_info(channel.topic, summary.schemas[channel.schema_id].name, channel.metadata, counts.get(channel.id, 0))
-        for channel in summary.channels.values()
-        if channel.schema_id in summary.schemas
-    )
-    statistics = summary.statistics
-    span = (statistics.message_start_time, statistics.message_end_time)
-    return _Content(FileInfo(path.name, *span, statistics.message_count), topics)
 
 
 def _temporary(file: Path) -> Path:
     return file.with_name(f"{file.name}.recovering")
 
 
-def _rewrite(file: Path) -> list[str]:
-    """Writes what can be had of a file beside it; returns what was wrong with it."""
-    salvage, temporary = Salvage(file), _temporary(file)
-    try:
-        with temporary.open("wb") as stream:
+def _repair(file: Path) -> _Content:
+    """Verifies a file; if it is damaged, writes a copy of what is sound beside it."""
+    with mapped(file) as data:
+        if sealed(data) and (index := read_index(data)) is not None and index.statistics is not None:
+            statistics = index.statistics
+            span = (statistics.message_start_time, statistics.message_end_time)
+            topics = _topics(index.schemas, index.channels, statistics.channel_message_counts)
+            return _Content(FileInfo(file.name, *span, statistics.message_count), topics)
+        salvage = Salvage(file, data)
+        if not salvage.damage:
+            info = FileInfo(file.name, *salvage.span, sum(salvage.counts.values()))
+            topics = _topics(salvage.schemas, salvage.channels, salvage.counts)
+            return _Content(info, topics, unverified=tuple(salvage.unverified))
+        with _temporary(file).open("wb") as stream:
             copy = McapFile(stream, file.name, default_distro())
             _copy(salvage, copy)
-            if not copy.info.message_count:
-                raise BagError(f"{file}: holds not one whole message; nothing can be recovered")
             copy.finish()
             stream.flush()
             os.fsync(stream.fileno())
-        if _read_content(temporary) is None:
-            raise BagError(f"{temporary}: the new file can't be read back; the original was left as it was")
-    except BaseException:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
-    return salvage.damage
+    with mapped(_temporary(file)) as data:
+        if not sealed(data):
+            raise BagError(f"{file}: the repaired copy can't be read back; the original was left as it was")
+    damage = (*salvage.damage, *(str(loss) for loss in salvage.losses))
+    return _Content(copy.info, tuple(copy.topics), damage)
+
+
+def _topics(
+    schemas: Mapping[int, SchemaRecord], channels: Mapping[int, Channel], counts: Mapping[int, int]
+) -> tuple[TopicInfo, ...]:
+    return tuple(
+        topic_info(channel.topic, schemas[channel.schema_id].name, channel.metadata, counts.get(number, 0))
+        for number, channel in channels.items()
+        if channel.schema_id in schemas
+    )
 
 
 def _copy(salvage: Salvage, copy: McapFile) -> None:
     """Copies messages with their times, topics and types; rosbag2's own record is left to be written anew."""
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, int] = {}
-    nameless = 0
-    for record in salvage.records():
-        if isinstance(record, SchemaRecord):
-            schemas[record.id] = Schema(record.name, record.encoding, record.data)
-        elif isinstance(record, Channel):
-            if record.id not in channels and record.schema_id in schemas:
-                schema = schemas[record.schema_id]
-                channels[record.id] = copy.add_topic(record.topic, schema, record.message_encoding, record.metadata)
-        elif isinstance(record, Message):
-            if record.channel_id in channels:
-                channel = channels[record.channel_id]
-                copy.add_message(channel, record.data, record.log_time, record.publish_time, record.sequence)
-            else:
-                nameless += 1
-        elif isinstance(record, Metadata) and record.name != RECORD_NAME:
+    channels = {}
+    for number, channel in sorted(salvage.channels.items()):
+        found = salvage.schemas[channel.schema_id]
+        schema = Schema(found.name, found.encoding, found.data)
+        channels[number] = copy.add_topic(channel.topic, schema, channel.message_encoding, channel.metadata)
+    for message in salvage.messages():
+        copy.add_message(
+            channels[message.channel_id], message.data, message.log_time, message.publish_time, message.sequence
+        )
+    for record in salvage.metadata:
+        if record.name != RECORD_NAME:
             copy.add_metadata(record.name, record.metadata)
-    if nameless:
-        salvage.damage.append(f"{nameless} messages were left out: the chunk that names their topics is damaged")
+    for attachment in salvage.attachments:
+        copy.add_attachment(
+            attachment.name, attachment.media_type, attachment.data, attachment.log_time, attachment.create_time
+        )
+
+
+def _require_states(path: Path, contents: list[_Content]) -> None:
+    """Raises BagError if a damaged recording has no message left, or of a line that was recorded not one state."""
+    topics = [topic for content in contents for topic in content.topics]
+    left = {topic.name: topic.message_count for topic in topics if topic.message_count}
+    ours = any(topic.type in STATE_TYPES for topic in topics)
+    states = any(topic.type in STATE_TYPES and topic.message_count for topic in topics)
+    if not (states if ours else left):
+        what = f"only {sum(left.values())} messages of {', '.join(left)} and no state" if left else "not one message"
+        raise BagError(
+            f"{path}: holds {what} that can be read; nothing can be recovered, and nothing was changed: delete it to "
+            "record there again"
+        )
 
 
 def _put_in_place(file: Path) -> Path:
     """Gives the new file the old one's name, the old one a name ending in .damaged; returns that name."""
-    aside, number = file.with_name(f"{file.name}.damaged"), 2
-    while aside.exists():
-        aside = file.with_name(f"{file.name}.damaged-{number}")
-        number += 1
+    aside = _aside(file)
     try:
         os.link(file, aside)  # then the next line swaps without a moment at which the bag has no file
     except OSError:
@@ -172,12 +195,16 @@ def _put_in_place(file: Path) -> Path:
     return aside
 
 
-def _refresh_metadata(folder: Path, contents: list[_Content]) -> bool:
-    """Rewrites metadata.yaml if it does not fit the files; returns whether it did."""
-    old = read_metadata(folder)
-    files = [content.file for content in contents]
-    if old is not None and _fits(old, files):
-        return False
+def _aside(file: Path) -> Path:
+    aside, number = file.with_name(f"{file.name}.damaged"), 2
+    while aside.exists():
+        aside = file.with_name(f"{file.name}.damaged-{number}")
+        number += 1
+    return aside
+
+
+def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | None:
+    """Rewrites metadata.yaml if it does not fit the files; then returns where the old one is, if there was one."""
     counts: Counter[str] = Counter()
     topics: dict[str, TopicInfo] = {}
     for content in contents:
@@ -187,13 +214,25 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> bool:
     merged = [
         TopicInfo(topic.name, topic.type, topic.type_hash, topic.qos, counts[topic.name]) for topic in topics.values()
     ]
+    old = read_metadata(folder)
     distro = str(old["ros_distro"]) if old and old.get("ros_distro") else default_distro()
-    write_metadata(folder, bag_information(merged, files, distro))
-    return True
+    expected = bag_information(merged, [content.file for content in contents], distro)
+    if old is not None and fits(old, expected):
+        return None
+    kept = []
+    file = folder / FILE_NAME
+    if file.is_file():
+        kept.append(_aside(file))
+        file.rename(kept[0])
+    write_metadata(folder, expected)
+    return kept
 
 
-def _fits(information: dict[str, Any], files: list[FileInfo]) -> bool:
-    names = information.get("relative_file_paths")
-    return names == [file.path for file in files] and information.get("message_count") == sum(
-        file.message_count for file in files
-    )
+def _unusable(path: Path) -> str:
+    """Why a bag can't be replayed or drawn, in words; empty if it can."""
+    try:
+        with open_bag(path) as bag:
+            known = any(bag.counts.get(topic) for topic in COMPARERS)
+    except BagError as error:
+        return str(error)
+    return "" if known else f"{path}: holds no message of topics {', '.join(COMPARERS)}"

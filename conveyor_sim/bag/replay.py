@@ -43,19 +43,33 @@ class ReplayReport:
 class _Messages:
     """The messages of one topic in the order of their ticks, each taken once."""
 
-    def __init__(self, bag: Bag, topic: str) -> None:
+    def __init__(self, bag: Bag, topic: str, end_ns: int) -> None:
+        """end_ns: where the run was to end; a later message must be of the time that it states."""
         self.topic = topic
+        self._end_ns = end_ns
         # A second line begins another run, after a reset.
         lines = [log_time for _, log_time, _ in bag.raw({"line"})]
         end = lines[1] if len(lines) > 1 else None
         raw = bag.raw({topic})
-        self._source: Iterator[Any] = (bag.decode(topic, data) for _, time, data in raw if end is None or time < end)
+        self._source: Iterator[Any] = (self._decode(bag, data) for _, time, data in raw if end is None or time < end)
         self._next = next(self._source, None)
 
     @property
     def next_tick(self) -> int | None:
         """Tick of the message to come; None after the last."""
         return None if self._next is None else int(self._next.tick)
+
+    def _decode(self, bag: Bag, data: bytes) -> Any:
+        """Raises BagError for a damaged tick, up to which the simulation might have to run for years."""
+        message = bag.decode(self.topic, data)
+        stamp = message.header.stamp
+        stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        if message.tick * bag.line.tick_ns > max(stamp_ns, self._end_ns):
+            raise BagError(
+                f"{bag.path}: a message of topic {self.topic} has tick {message.tick} and the time {stamp_ns * 1e-9:g} "
+                "s, expected a tick of that time"
+            )
+        return message
 
     def take(self, tick: int) -> Iterator[Any]:
         """The messages up to a tick (an earlier tick than expected is a difference for the caller to find)."""
@@ -73,7 +87,7 @@ def replay(path: str | Path, progress: Callable[[float, float], None] | None = N
     out. Stops at the first difference. progress(done, total) is told simulated times, s.
     Raises BagError, and SceneError if the recorded scene is refused.
     """
-    with open_bag(path) as bag:
+    with open_bag(path) as bag, bag.sense():
         if bag.line.tick > 0:
             raise BagError(
                 f"{bag.path}: began from a checkpoint at tick {bag.line.tick}, expected a run from tick 0: "
@@ -99,8 +113,9 @@ class _Replay:
         self._progress = progress
         recorded = bag.counts
         topics = [topic for topic in COMPARERS if recorded.get(topic) and (self._exact or topic not in SENSITIVE)]
-        self._states = [_Messages(bag, topic) for topic in topics]
-        self._outcomes = _Messages(bag, "outcomes") if recorded.get("outcomes") else None
+        end_ns = simulation.scene.duration_ticks * simulation.model.tick_ns
+        self._states = [_Messages(bag, topic, end_ns) for topic in topics]
+        self._outcomes = _Messages(bag, "outcomes", end_ns) if recorded.get("outcomes") else None
         self._compared = dict.fromkeys(topics, 0)
         self._last_tick = -1
         if not self._states:

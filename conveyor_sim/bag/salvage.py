@@ -1,120 +1,367 @@
-"""Reads an MCAP file that may end anywhere: every whole record, and what a cut last chunk still yields."""
+"""One walk over an MCAP file that may be damaged anywhere: what in it is sound, what is wrong, and what is lost."""
 
 from __future__ import annotations
 
-import struct
-import zlib
-from collections.abc import Iterator
-from io import BytesIO
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
 
-import zstandard
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Header, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Message, MessageIndex, Metadata, Schema
 
+from conveyor_sim.bag.chunk import Chunk, Content, chunk_at, inside, next_chunk, read_content, read_cut, survey
+from conveyor_sim.bag.index import CRC_SIZE, DATA_END, DATA_END_HEAD, Index, read_index
+from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, Data, Malformed, checksum, head_at, parse
 from conveyor_sim.errors import BagError
 
-MAGIC = b"\x89MCAP0\r\n"
-RECORD_HEAD = struct.Struct("<BQ")
-CHUNK_HEAD = struct.Struct("<QQQII")
-"""First time, last time, uncompressed size, CRC, length of the compression's name."""
-FEED = 4096
-"""Bytes given to the decompressor at a time: an error then costs no more than these."""
+WALL_CLOCK = 10**18
+"""ns: later log times are dates (from 2001 on), not simulated times."""
+PRIVATE = 0x80
+"""Opcodes from here on are a writer's own, to be skipped."""
 
-READERS = {
-    Opcode.HEADER: Header.read,
-    Opcode.SCHEMA: Schema.read,
-    Opcode.CHANNEL: Channel.read,
-    Opcode.METADATA: Metadata.read,
-}
+
+@dataclass(frozen=True)
+class Loss:
+    """Messages that can't be had any more."""
+
+    messages: int | None
+    """None: not known."""
+    start_ns: int | None
+    """Log times between which they were; None: from the beginning, or to the end."""
+    end_ns: int | None
+
+    def __str__(self) -> str:
+        count = "an unknown number of messages" if self.messages is None else f"{self.messages} messages"
+        start = "the beginning" if self.start_ns is None else seconds(self.start_ns)
+        end = "the end" if self.end_ns is None else seconds(self.end_ns)
+        return f"lost: {count} from {start} to {end}"
+
+
+def seconds(time_ns: int) -> str:
+    """A log time in words."""
+    return f"{time_ns * 1e-9:.2f} s"
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A sound chunk, or one that the end of the file cuts."""
+
+    chunk: Chunk
+    counts: dict[int, int]
+    """Messages by channel."""
+    cut: bool = False
+
+    @property
+    def place(self) -> tuple[int, int, str]:
+        return self.chunk.start, self.chunk.stop - self.chunk.start, self.chunk.compression
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        return self.chunk.start_ns, self.chunk.end_ns, self.chunk.size
 
 
 class Salvage:
-    """One pass over a file. Iterate `records()`, then read `damage`: what was wrong, one sentence each."""
+    """Walks over a file's bytes when it is made; then says what was found.
 
-    def __init__(self, path: Path) -> None:
+    Raises BagError if the file does not begin as an MCAP file does.
+    """
+
+    def __init__(self, path: Path, data: Data) -> None:
+        if data[: len(MAGIC)] != MAGIC:
+            what = "is empty" if len(data) == 0 else "does not begin as an MCAP file"
+            raise BagError(f"{path}: {what}; nothing in it can be recovered")
         self.path = path
         self.damage: list[str] = []
+        """What is wrong, a phrase each; nothing: what can be verified is as it was written."""
+        self.unverified: list[str] = []
+        """What carries no checksum, a phrase each."""
+        self.metadata: list[Metadata] = []
+        self.attachments: list[Attachment] = []
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.losses: list[Loss] = []
+        self.counts: Counter[int] = Counter()
+        """Messages by channel."""
+        self._data = data
+        self._index = read_index(data)
+        self._found: list[_Found] = []
+        self._digests: set[tuple[int, int]] = set()
+        self._last: Content | None = None  # of the chunk before, if it is sound
+        self._loose: list[tuple[int, int]] = []  # messages outside of chunks: where they begin and end
+        self._loose_counts: Counter[int] = Counter()
+        self._loose_names: list[object] = []
+        self._holes: list[tuple[int, int | None]] = []  # after how many found chunks, how many messages
+        self._ended = self._walk()
+        self._names()
+        self._judge()
 
-    def records(self) -> Iterator[McapRecord]:
-        """Header, Schema, Channel, Message and Metadata records in the order of the file, chunks opened.
+    @property
+    def span(self) -> tuple[int, int]:
+        """Log times of the first and the last message, ns; zeros without any."""
+        times = [time for found in self._found if found.counts for time in (found.chunk.start_ns, found.chunk.end_ns)]
+        times += [message.log_time for message in self._loose_messages()]
+        return (min(times), max(times)) if times else (0, 0)
 
-        Raises BagError if the file does not begin as an MCAP file does.
-        """
-        with self.path.open("rb") as file:
-            if file.read(len(MAGIC)) != MAGIC:
-                raise BagError(f"{self.path}: does not begin as an MCAP file; nothing in it can be recovered")
-            for opcode, body, whole in self._top_level(file):
-                if opcode == Opcode.DATA_END:
-                    return
-                if opcode == Opcode.CHUNK:
-                    yield from self._chunk(body, whole)
-                elif whole:
-                    yield from _parse(opcode, body)
-        self.damage.append("the end of the file is missing")
+    def messages(self) -> Iterator[Message]:
+        """Every message that can be had and whose topic is known, in the order of the chunks' times."""
+        for found in sorted(self._found, key=lambda found: found.chunk.start_ns):
+            content = (read_cut if found.cut else read_content)(self._data, found.chunk)
+            for record in inside(content):
+                if isinstance(record, Message) and record.channel_id in self.channels:
+                    yield record
+        yield from self._loose_messages()
 
-    def _top_level(self, file: BinaryIO) -> Iterator[tuple[int, bytes, bool]]:
-        """Opcode, body, and whether the body is all there."""
-        while len(head := file.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
-            opcode, length = RECORD_HEAD.unpack(head)
-            if not Opcode.HEADER <= opcode <= Opcode.DATA_END:
-                self.damage.append(f"no record begins at byte {file.tell() - RECORD_HEAD.size}; the rest was left out")
-                return
-            remaining = self.path.stat().st_size - file.tell()
-            body = file.read(min(length, remaining))
-            yield opcode, body, len(body) == length
+    def _loose_messages(self) -> Iterator[Message]:
+        for start, stop in self._loose:
+            record = parse(Opcode.MESSAGE, self._data[start:stop])
+            if isinstance(record, Message) and record.channel_id in self.channels:
+                yield record
 
-    def _chunk(self, body: bytes, whole: bool) -> Iterator[McapRecord]:
-        if len(body) < CHUNK_HEAD.size:
-            self.damage.append("the last chunk is lost: only its beginning was written")
+    # The walk
+
+    def _walk(self) -> int | None:
+        """Goes over the data section; where it ends, None if its end is missing."""
+        position, size = len(MAGIC), len(self._data)
+        while position < size:
+            chunk = chunk_at(self._data, position)
+            if chunk is not None:
+                position = self._take(chunk)
+                continue
+            head = head_at(self._data, position, size)
+            if head is not None and head[0] == Opcode.DATA_END and head[1] == position + DATA_END.size:
+                return position
+            if head is not None and self._top_level(head[0], position, head[1]):
+                position = head[1]
+            else:
+                position = self._resume(position)
+        return None
+
+    def _take(self, chunk: Chunk) -> int:
+        """Takes a chunk in, if it is sound; returns where to go on."""
+        self._last = None
+        if chunk.stop > len(self._data) and self._chunk_in(chunk) is None:
+            had = read_cut(self._data, chunk)
+            share = f"{len(had)} of {chunk.size} bytes" if had else "nothing"
+            self.damage.append(
+                f"the last chunk was cut while it was written; {share} of its content could be read, and not verified"
+            )
+            records = list(inside(had))
+            counts = Counter(record.channel_id for record in records if isinstance(record, Message))
+            self._found.append(_Found(chunk, counts, cut=True))
+            self._learn(records)
+            return len(self._data)
+        try:
+            content = survey(read_content(self._data, chunk))
+        except Malformed as error:
+            self.damage.append(f"the chunk at byte {chunk.start} is damaged: {error}")
+            self._holes.append((len(self._found), None))
+            inner = self._chunk_in(chunk)
+            return inner.start if inner else chunk.stop
+        if (content.digest, chunk.size) in self._digests:
+            self.damage.append(f"the chunk at byte {chunk.start} repeats another one")
+            return chunk.stop
+        self._digests.add((content.digest, chunk.size))
+        if content.count and content.span != (chunk.start_ns, chunk.end_ns):
+            self.damage.append(f"the chunk at byte {chunk.start} states other times than its messages")
+            chunk = replace(chunk, start_ns=content.span[0], end_ns=content.span[1])
+        self._last = content
+        self._found.append(_Found(chunk, {channel: len(places) for channel, places in content.places.items()}))
+        self._learn((*content.schemas, *content.channels))
+        return chunk.stop
+
+    def _chunk_in(self, chunk: Chunk) -> Chunk | None:
+        """The next chunk, if it begins before a damaged one ends: where bytes of that were lost."""
+        return next_chunk(self._data, chunk.start + 1, chunk.stop)
+
+    def _learn(self, records: Iterable[object]) -> None:
+        for record in records:
+            if isinstance(record, Schema):
+                self.schemas.setdefault(record.id, record)
+            elif isinstance(record, Channel):
+                self.channels.setdefault(record.id, record)
+
+    def _top_level(self, opcode: int, start: int, stop: int) -> bool:
+        """Takes a record outside of chunks in; whether it is one."""
+        body = start + RECORD_HEAD.size
+        if (opcode >= PRIVATE or opcode == Opcode.MESSAGE) and next_chunk(self._data, start + 1, stop) is not None:
+            return False  # with a damaged length
+        if opcode >= PRIVATE:
+            return True
+        if opcode not in (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.MESSAGE_INDEX,
+                          Opcode.ATTACHMENT, Opcode.METADATA):  # fmt: skip
+            return False
+        try:
+            record = parse(opcode, self._data[body:stop])
+        except Malformed:
+            return False
+        if isinstance(record, Message):
+            self._loose.append((body, stop))
+            self._loose_counts[record.channel_id] += 1
+        elif isinstance(record, MessageIndex):
+            self._match(record)
+        elif isinstance(record, Metadata):
+            self.metadata.append(record)
+        elif isinstance(record, Attachment):
+            self._attach(record, body, stop)
+        else:
+            self._loose_names.append(record)
+        return True
+
+    def _match(self, record: MessageIndex) -> None:
+        """Compares what indexes the chunk before with what is in it, or counts what that held if it is damaged."""
+        if self._holes and self._holes[-1][0] == len(self._found):
+            at, count = self._holes[-1]
+            self._holes[-1] = (at, (count or 0) + len(record.records))
+        # Writers may put the entries in the order of time.
+        elif self._last is not None and sorted(record.records) != sorted(self._last.places.get(record.channel_id, [])):
+            self._once("the index of a chunk's messages is damaged")
+
+    def _attach(self, record: Attachment, start: int, stop: int) -> None:
+        crc = int.from_bytes(self._data[stop - CRC_SIZE : stop], "little")
+        if crc and checksum(self._data, start, stop - CRC_SIZE) != crc:
+            self.damage.append(f"the attachment {record.name} is damaged and was left out")
+        else:
+            self.attachments.append(record)
+
+    def _resume(self, position: int) -> int:
+        """Where the next record begins that can be trusted to be one: a chunk, or the end of the data."""
+        chunk = next_chunk(self._data, position + 1, len(self._data))
+        following = chunk.start if chunk else len(self._data)
+        end = self._data.find(DATA_END_HEAD, position + 1, following)
+        while end >= 0 and not self._is_end(end):
+            end = self._data.find(DATA_END_HEAD, end + 1, following)
+        following = end if end >= 0 else following
+        self.damage.append(f"bytes {position} to {following} hold nothing that can be read")
+        self._holes.append((len(self._found), None))
+        return following
+
+    def _is_end(self, position: int) -> bool:
+        """Whether bytes that look like the end of the data are: the index begins right after."""
+        after = position + DATA_END.size
+        if self._index is not None:
+            return after == self._index.start
+        head = head_at(self._data, after, len(self._data))
+        return head is not None and head[0] in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX)
+
+    # What it amounts to
+
+    def _names(self) -> None:
+        """Topics and types that no chunk names any more are taken from the index."""
+        if self._index is not None:
+            self._learn((*self._index.schemas.values(), *self._index.channels.values()))
+        self._learn(self._loose_names)
+        self.channels = {key: value for key, value in self.channels.items() if value.schema_id in self.schemas}
+
+    def _judge(self) -> None:
+        if self._found and self._loose:  # nobody writes both, and a damaged record can look like a message
+            self.damage.append(f"{len(self._loose)} messages outside of chunks were left out")
+            self._loose.clear()
+            self._loose_counts.clear()
+        counts = self.counts
+        counts.update(self._loose_counts)
+        for found in self._found:
+            counts.update(found.counts)
+        if self._ended is None:
+            self.damage.append("the end of the file is missing")
+        else:
+            self._judge_end(self._ended)
+        nameless = sum(count for channel, count in counts.items() if channel not in self.channels)
+        if nameless:
+            self.damage.append(f"{nameless} messages were left out: what named their topics is damaged")
+        if any(found.chunk.crc == 0 for found in self._found):
+            self.unverified.append("chunks")
+        if self._loose:
+            self.unverified.append("messages outside of chunks")
+        if self._index is not None:
+            self._judge_index(self._index, counts)
+        elif self._holes:
+            self._lose_by_neighbours()
+
+    def _judge_end(self, end: int) -> None:
+        _, _, crc = DATA_END.unpack(self._data[end : end + DATA_END.size])
+        if crc == 0:
+            self.unverified.append("what is outside of chunks")
+        elif checksum(self._data, 0, end) != crc:
+            self._once("the checksum over all data is wrong")
+        index = self._index
+        if index is None:
+            self.damage.append("the index at the end is damaged or missing")
             return
-        _, _, size, crc, name_length = CHUNK_HEAD.unpack_from(body)
-        start = CHUNK_HEAD.size + name_length
-        compression = body[CHUNK_HEAD.size : start].decode(errors="replace")
-        content = _decompress(body[start + 8 :], compression)
-        if whole and (len(content) != size or (crc and zlib.crc32(content) != crc)):
-            self.damage.append("a chunk with a wrong checksum was left out")
+        if not index.verified:
+            self.unverified.append("the index")
+        if index.start != end + DATA_END.size:
+            self._once("the index is not where it should be")
+        if index.stop != len(self._data):
+            self.damage.append(f"{len(self._data) - index.stop} bytes follow the end")
+
+    def _judge_index(self, index: Index, counts: Counter[int]) -> None:
+        """What the index lists and was not found is lost; where it disagrees in other ways, it is damaged."""
+        places = sorted((c.chunk_start_offset, c.chunk_length, c.compression) for c in index.chunks)
+        known = {found.place for found in self._found} | {found.key for found in self._found}
+        missing = [
+            chunk
+            for chunk in sorted(index.chunks, key=lambda chunk: chunk.message_start_time)
+            if (chunk.chunk_start_offset, chunk.chunk_length, chunk.compression) not in known
+            and (chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size) not in known
+        ]
+        for chunk in missing:
+            offsets = len(chunk.message_index_offsets)
+            # A message index is its head, a channel, a length, and 16 bytes a message.
+            messages = (chunk.message_index_length - offsets * (RECORD_HEAD.size + 6)) // 16 if offsets else None
+            self._lose(Loss(messages, chunk.message_start_time, chunk.message_end_time))
+        if missing and not self._holes and not self.damage:
+            self.damage.append("chunks that the index lists are missing")
+        found = sum(counts.values())
+        statistics = index.statistics
+        if statistics is not None and statistics.message_count != found and not missing:
+            lost = statistics.message_count - found
+            self._once(f"the index counts {statistics.message_count} messages, {found} were found")
+            if self._holes and lost > 0:
+                self._lose(Loss(lost, None, None))
+        if self.damage:
             return
-        yield from _inside(content)
-        if not whole:
-            share = f"{len(content)} of {size} bytes" if content else "none"
-            self.damage.append(f"the last chunk was cut while it was written; of its content, {share} could be read")
+        keys = {(c.message_start_time, c.message_end_time, c.uncompressed_size) for c in index.chunks}
+        fits = (
+            (not places or places == [found.place for found in self._found])
+            and (not keys or keys == {found.key for found in self._found})
+            and all(self.schemas.get(key) == schema for key, schema in index.schemas.items())
+            and all(self.channels.get(key) == channel for key, channel in index.channels.items())
+            and (statistics is None or self._fits(statistics.message_start_time, statistics.message_end_time))
+            and (statistics is None or Counter(statistics.channel_message_counts) == counts)
+        )  # fmt: skip
+        if not fits:
+            self.damage.append("the index at the end does not fit the data")
 
+    def _fits(self, start_ns: int, end_ns: int) -> bool:
+        """Whether times are those of the messages, as far as these are in chunks."""
+        filled = [found.chunk for found in self._found if found.counts]
+        if self._loose or not filled:
+            return True
+        return (start_ns, end_ns) == (min(c.start_ns for c in filled), max(c.end_ns for c in filled))
 
-def _decompress(data: bytes, compression: str) -> bytes:
-    """As much as can be had; b"" for a compression other than none and zstd, which rosbag2 does not write."""
-    if compression == "":
-        return data
-    if compression != "zstd":
-        return b""
-    stream = zstandard.ZstdDecompressor().decompressobj()
-    content = bytearray()
-    try:
-        for start in range(0, len(data), FEED):
-            content += stream.decompress(data[start : start + FEED])
-    except zstandard.ZstdError:
-        pass  # what came before the error is sound
-    return bytes(content)
+    def _lose_by_neighbours(self) -> None:
+        """Without an index, a loss lies between the sound chunks before and after it."""
+        for at, messages in self._holes:
+            before = self._found[at - 1].chunk.end_ns if at else None
+            after = self._found[at].chunk.start_ns if at < len(self._found) else None
+            self._lose(Loss(messages, before, after))
 
+    def _lose(self, loss: Loss) -> None:
+        """Adds a loss; one that follows right upon the last one is joined to it."""
+        last = self.losses[-1] if self.losses else None
+        if last is not None and None not in (last.end_ns, loss.start_ns) and self._adjoin(last, loss):
+            known = last.messages is not None and loss.messages is not None
+            count = (last.messages or 0) + (loss.messages or 0) if known else None
+            self.losses[-1] = Loss(count, last.start_ns, loss.end_ns)
+        elif last is None or (last.start_ns, last.end_ns) != (loss.start_ns, loss.end_ns):
+            self.losses.append(loss)
 
-def _inside(content: bytes) -> Iterator[McapRecord]:
-    """The whole records of a chunk's content, which may be cut."""
-    position = 0
-    while position + RECORD_HEAD.size <= len(content):
-        opcode, length = RECORD_HEAD.unpack_from(content, position)
-        start = position + RECORD_HEAD.size
-        position = start + length
-        if position > len(content):
-            return
-        yield from _parse(opcode, content[start:position])
+    def _adjoin(self, first: Loss, second: Loss) -> bool:
+        """Whether nothing was found between two losses."""
+        assert first.end_ns is not None and second.start_ns is not None
+        return not any(first.end_ns <= found.chunk.start_ns <= second.start_ns for found in self._found)
 
-
-def _parse(opcode: int, body: bytes) -> Iterator[McapRecord]:
-    """A record of one of the kinds that matter, else nothing."""
-    stream = ReadDataStream(BytesIO(body))
-    if opcode == Opcode.MESSAGE:
-        yield Message.read(stream, len(body))
-    elif opcode in READERS:
-        yield READERS[Opcode(opcode)](stream)
+    def _once(self, phrase: str) -> None:
+        if phrase not in self.damage:
+            self.damage.append(phrase)

@@ -49,7 +49,7 @@ def plot_bag(
     Raises BagError if the bag can't be read, ConveyorError for a time or bottle that it does not hold.
     """
     out = Path(out_dir)
-    with open_bag(bag) as opened, style.look():
+    with open_bag(bag) as opened, opened.sense(), style.look():
         recording = Recording(opened)
         frames = recording.frames(times)
         velocities = recording.velocities(bottles)

@@ -30,6 +30,7 @@ def publish_bag(path: Path, rate: float, start: float | None, paused: bool, argu
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         bag = stack.enter_context(open_bag(path))
+        stack.enter_context(bag.sense())
         start_ros()
         stack.callback(rclpy.shutdown)
         node = ReplayNode(bag, rate, start, paused, stop.request, arguments=arguments)

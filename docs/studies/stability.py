@@ -21,6 +21,7 @@ sys.path[:0] = [str(ROOT / "test"), str(Path(__file__).parent)]
 
 import stability_guard  # noqa: E402
 import stability_hour  # noqa: E402
+import stability_kills  # noqa: E402
 import stability_limits  # noqa: E402
 import stability_matrix  # noqa: E402
 from hard_cases.case import read_table  # noqa: E402
@@ -54,6 +55,7 @@ def _measure(rows: tuple[str, ...]) -> None:
     stability_limits.measure(FOLDER / "limits.csv")
     stability_guard.measure(FOLDER / "guard.csv")
     stability_hour.denormals(FOLDER / "denormals.csv")
+    stability_kills.measure(FOLDER / "kills.csv")
     picture(FOLDER / "worst.png")
 
 

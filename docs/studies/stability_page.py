@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -58,9 +59,24 @@ def page(text: str, folder: Path) -> str:
         "exceptions": exceptions(matrix),
         "limits": limits(read(folder / "limits.csv")),
         "guard": guard(read(folder / "guard.csv")),
+        "kills": kills(read(folder / "kills.csv")),
         "hour": hour(read(folder / "hour.csv"), read(folder / "denormals.csv")),
     }
     return with_parts(Path("docs/stability.md"), text, parts)
+
+
+def kills(lines: Sequence[Line]) -> str:
+    """What recordings that were killed lost, by pace."""
+    if not lines:
+        return "Not measured yet."
+    table = ["| pace | kills | lost, s of wall time: median | at most | replays to the same bits |"]
+    table.append("| --- | ---: | ---: | ---: | ---: |")
+    for pace in dict.fromkeys(line["pace"] for line in lines):
+        mine = [line for line in lines if line["pace"] == pace]
+        lost = [float(line["lost_wall"]) for line in mine]
+        same = sum(line["replay"] == "same bits" for line in mine)
+        table.append(f"| {pace} | {len(mine)} | {statistics.median(lost):.2f} | {max(lost):.2f} | {same} |")
+    return "\n".join(table)
 
 
 def guard(lines: Sequence[Line]) -> str:

@@ -25,10 +25,10 @@ def bag(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def record_line(scene: Scene, tmp_path: Path) -> Callable[[str, int], Path]:
-    """Records the small line into a new folder of a name, for some ticks."""
+    """Records the small line into a new folder of a name, for some ticks; a chunk is ten of them."""
 
     def make(name: str, ticks: int) -> Path:
-        record(scene, tmp_path / name, ticks)
+        record(scene, tmp_path / name, ticks, ticks_a_chunk=10)
         return tmp_path / name
 
     return make

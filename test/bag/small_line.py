@@ -18,8 +18,8 @@ COMMANDS = {
 """By tick; the watchdog of `straight` stops it at tick 60."""
 
 
-def record(scene: Scene, folder: Path, ticks: int) -> Simulation:
-    """Runs a scene with COMMANDS and records it."""
+def record(scene: Scene, folder: Path, ticks: int, ticks_a_chunk: int = 0) -> Simulation:
+    """Runs a scene with COMMANDS and records it; after so many ticks a chunk ends (0: as it comes)."""
     simulation = Simulation(scene)
     with Recorder(folder) as recorder:
         outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
@@ -29,4 +29,6 @@ def record(scene: Scene, folder: Path, ticks: int) -> Simulation:
                 simulation.command(names, values)
             simulation.advance()
             outputs.after_tick()
+            if ticks_a_chunk and simulation.tick % ticks_a_chunk == 0:
+                recorder.flush()
     return simulation

@@ -1,14 +1,16 @@
 """Bags that every reader accepts, and clear refusals where nothing can be written."""
 
+import re
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from bag.small_line import record
-from mcap.reader import make_reader
+from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -172,6 +174,81 @@ def test_disk_that_fills_up_ends_the_recording_with_a_bag_that_can_be_recovered(
         ticks = [frame.tick for frame in bag.bottles()]
     assert ticks == list(range(0, 2 * len(ticks), 2))
     assert report.message_count > 100
+
+
+def test_what_was_recorded_reaches_the_file_without_another_message(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "bag", topics=["signals"])
+    recorder.write("signals", b"first", 1)
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    before = file.stat().st_size
+    recorder.write("signals", b"last", 2)
+    end = time.monotonic() + 60.0
+    while file.stat().st_size == before and time.monotonic() < end:
+        time.sleep(0.01)
+    with file.open("rb") as stream:
+        messages = NonSeekingReader(stream).iter_messages(log_time_order=False)
+        assert [message.data for _, _, message in (next(messages), next(messages))] == [b"first", b"last"]
+    recorder.close()
+
+
+NO_ROOM = """
+import resource, signal, sys, time
+from pathlib import Path
+from bag.small_line import SMALL_LINE, record
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import BagError
+from conveyor_sim.scene import load_scene
+folder, hard = Path(sys.argv[1]), resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+scene = load_scene(SMALL_LINE)
+record(scene, folder.with_name("first"), 2)
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+def room(size):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+def told(function):
+    try:
+        function()
+    except BagError as error:
+        print(error)
+room(0)
+told(lambda: Recorder(folder / "deep"))  # not even the first bytes
+print(folder.exists())
+room(3000)
+told(lambda: record(scene, folder, 2))  # the first bytes, but not the first message
+print(folder.exists())
+room(hard)
+record(scene, folder, 2)  # now there is room: the same folder can be recorded to
+recorder = Recorder(folder.with_name("waiting"), topics=["signals"])
+recorder.write("signals", b"first", 1)
+room(10)
+recorder.write("signals", b"later", 2)  # found full by the thread that flushes
+while not recorder._ended:
+    time.sleep(0.01)
+told(recorder.flush)
+recorder.close()
+"""
+
+
+def test_disk_that_is_full_from_the_start_is_told_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    folder = tmp_path / "full"
+    done = subprocess.run(
+        [sys.executable, "-c", NO_ROOM, str(folder)], capture_output=True, text=True, cwd=Path(__file__).parents[1]
+    )
+    assert done.stderr == ""
+    no_bytes, there, no_message, still_there, later = done.stdout.splitlines()
+    assert re.fullmatch(r".*full/deep/deep_0\.mcap: can't be written \(File too large\)", no_bytes)
+    assert no_message.startswith(
+        f"{folder}: can't be recorded to (File too large): there is no room for the first message"
+    )
+    assert there == still_there == "False"
+    assert "recording stopped at 0.00 s (File too large)" in later
+    with open_bag(folder) as bag:
+        assert bag.counts["signals"] == 3
+
+
+def test_folder_with_a_recording_is_refused_by_its_name(record_line: Callable[[str, int], Path]) -> None:
+    folder = record_line("bag", 2)
+    with pytest.raises(BagError, match=r"is not empty \(it holds a recording, bag_0\.mcap\), expected a new"):
+        Recorder(folder)
 
 
 def test_bag_of_another_distribution_says_so(scene: Scene, tmp_path: Path) -> None:
