@@ -64,17 +64,21 @@ class SimNode:
         node, executor = self._node, self._spinner.executor
         given = parameters.declare(node)
         distro = default_distro()
-        scene = load_scene(scene_path(given.scene), given.overrides())
+        scene = load_scene(scene_path(given.scene), given.overrides(), given.outside_tables)
         compile_kernels(scene)  # before the run starts: its first tick would be a long overrun
         sink = RosSink(
             node, distro, {"markers": RateCap(given.marker_rate)}, {**OUTPUTS, **photo_eye_outputs(scene.photo_eyes)}
         )
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
-        def open_session(runs: int, checkpoint: Path | None) -> Session:
-            threads = given.threads or None
-            new = Simulation(scene, threads) if checkpoint is None else Simulation.load(checkpoint, threads, scene)
-            return Session(new, sink, bag_folder(given.record, runs), given.frame_id, distro)
+        threads = given.threads or None
+
+        def open_session(runs: int, loaded: Simulation | None) -> Session:
+            simulation = loaded or Simulation(scene, threads)
+            return Session(simulation, sink, bag_folder(given.record, runs), given.frame_id, distro)
+
+        def read_checkpoint(path: Path) -> Simulation:
+            return Simulation.load(path, threads, scene, given.checkpoint_folder)
 
         stepper = Stepper(
             open_session,
@@ -91,7 +95,7 @@ class SimNode:
 
         subscribe_commands(node, stepper)
         Services(node, executor, stepper, quit_soon=quit_soon)
-        CheckpointServices(node, executor, stepper)
+        CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
         FaultService(node, executor, stepper)
         LockstepService(node, executor, stepper, given.frame_id)
         Diagnostics(node, stepper, sink)
