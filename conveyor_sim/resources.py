@@ -49,8 +49,8 @@ def scene_path(name_or_path: str | Path) -> Path:
     # What is no regular file is refused where it is read, and says why.
     if os.path.exists(path) and not os.path.isdir(path):
         return path
-    parts = path.with_suffix(".yaml").parts
-    shipped = config_dir().joinpath(*(parts[1:] if parts[0] == "config" else parts))
+    parts = path.with_suffix(".yaml").parts if path.name else path.parts
+    shipped = config_dir().joinpath(*(parts[1:] if parts[:1] == ("config",) else parts))
     if not path.is_absolute() and ".." not in parts and os.path.isfile(shipped):
         return shipped
     scenes = [*config_dir().glob("*.yaml"), *config_dir().glob("scenarios/*.yaml")]

@@ -640,7 +640,7 @@ def test_a_file_that_can_not_be_written_is_told_and_nothing_is_left(saved: Path,
     assert failure_to_save(sim, tmp_path / "no" / "file") == (
         f"can't be written (No such file or directory), expected the folder {tmp_path / 'no'} to be there"
     )
-    assert failure_to_save(sim, tmp_path) == "is a folder, expected a file to write a checkpoint to"
+    assert failure_to_save(sim, tmp_path) == "is a folder, expected a file that can be written, and room for it"
     locked.mkdir(mode=0o500)
     with as_nobody():
         assert failure_to_save(sim, locked / "file").startswith("can't be written (Permission denied), expected ")

@@ -83,15 +83,14 @@ def _points(path: str, beside: Beside | None) -> list[list[float]]:
 
 def _content(path: str, beside: Beside) -> tuple[bytes, bool]:
     """Of a file that a scene names, and whether it lies in the scene's folder. ValueError that says what is wrong."""
-    file = beside.folder / path
     try:
         return read_file(FilePath(path), _MOST_BYTES, beside.folder), True
     except OutsideError:
         if not beside.outside:
             raise ValueError(f"which leads out of the scene's folder, expected a CSV file in it; {OUTSIDE}") from None
     except FileError as error:
-        raise ValueError(f"expected a CSV file beside the scene ({file}: {error})") from None
+        raise ValueError(f"expected a CSV file in {beside.folder} ({error})") from None
     try:
-        return read_file(file, _MOST_BYTES), False
+        return read_file(beside.folder / path, _MOST_BYTES), False
     except FileError as error:
-        raise ValueError(f"expected a CSV file ({file}: {error})") from None
+        raise ValueError(f"expected a CSV file ({error})") from None

@@ -189,7 +189,10 @@ def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(
     wrong = [
         ("pipe", "is a named pipe, not a regular file"),
         ("device", f"leads out of the folder {tmp_path}"),
-        (written("no versions", {name: header[name] for name in header if name != "versions"}), "header.versions is missing"),
+        (
+            written("no versions", {name: header[name] for name in header if name != "versions"}),
+            "header.versions is missing",
+        ),
         (written("a number", {**header, "scene": 42}), "header.scene is not of its type"),
         (written("cut short", header, **{"bottles.x": x[:-1]}), "array bottles.x has the shape"),
         (written("not finite", header, **{"bottles.x": np.full_like(x, np.nan)}), "array bottles.x is not finite"),
@@ -203,7 +206,7 @@ def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(
         assert reason in response.message
         assert "\n" not in response.message
         ticks.append(response.tick)
-        until(lambda: client.lockstep(0).tick > ticks[-1], "time to pass")  # noqa: B023
+        until(lambda: client.lockstep(0).tick > ticks[-1], "time to pass")
     assert ticks == sorted(ticks)
     assert client.state() == PLAYING
     assert load(client, "good").tick == 20
@@ -251,7 +254,7 @@ def test_both_services_keep_to_their_folder(
     assert [file.name for file in outside.iterdir()] == ["file"]
     assert {file.name for file in folder.iterdir()} == {"good", "link"}
     node.stop()
-    node = start_node(checkpoint_folder="''")
+    node = start_node(checkpoint_folder="")
     for response in (save(client, "file"), load(client, "file")):
         assert response.message == (
             "the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in"
