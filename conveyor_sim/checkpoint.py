@@ -8,6 +8,7 @@ import hashlib
 import io
 import json
 import math
+import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -211,6 +212,6 @@ def _expected(folder: Path | None) -> str:
 def _place(path: Path, folder: Path | None) -> str:
     if folder is not None:
         return f"a file in {folder} that can be written, and room for it"
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         return f"the folder {path.parent} to be there"
     return "a file that can be written, and room for it"
