@@ -1,33 +1,45 @@
-"""The checkpoint file: a NumPy .npz with the arrays of a run and a JSON header with all else."""
+"""The checkpoint file: a NumPy .npz with the arrays of a run, a JSON header with all else, and a checksum over both.
 
+The checksum is the comment at the end of the archive (`unzip -z`), so the file is an ordinary .npz to other programs.
+It finds damage. It is no signature: what the file says is checked all the same before anything is made of it.
+"""
+
+import hashlib
+import io
 import json
+import math
 import os
 import zipfile
-import zlib
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, ValidationError
 
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import CheckpointError, SceneError
+from conveyor_sim.files import MB, FileError, in_mb, read_file, write_file
 from conveyor_sim.model import versions_here
+from conveyor_sim.part_memory import wrong
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.difference import scene_difference
 from conveyor_sim.world_arrays import Arrays
 
-FORMAT = 1
+FORMAT = 2
 """Raised by one whenever the layout of the file changes."""
 
 FREE = frozenset({"description", "duration"})
 """Fields of a scene that may differ from those of the checkpoint."""
 
+MOST = 512 * MB
+"""Bytes of a file. A bottle takes 0.5 to 5 kB, by effects and integrator; it is read into memory twice."""
+
 _HEADER = "header"
 _MAGIC = b"PK\x03\x04"
-# zipfile raises RuntimeError for what says that it is encrypted, or packed in a way not known.
-_DAMAGES = (ValueError, KeyError, TypeError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_CHECKSUM, _DIGITS = b"sha256:", 64
 
 
 @dataclass(frozen=True)
@@ -37,55 +49,70 @@ class Checkpoint:
     path: Path
     scene: Scene
     memory: dict[str, Any]
-    """What the run remembers beside its arrays, as plain data."""
+    """What the run remembers beside its arrays, as plain data; not checked."""
     arrays: Arrays
-    """Those that change, by name (`world_arrays.py`)."""
+    """Those that change, by name (`world_arrays.py`); not checked."""
 
 
-def write_checkpoint(path: Path, scene: Scene, memory: dict[str, Any], arrays: Arrays) -> None:
-    """Write a file in one go: it is whole, or what was there before is untouched.
+class _Source(BaseModel, strict=True, extra="forbid"):
+    text: str
+    name: str
+    overrides: str
 
-    memory: as JSON can hold it. Raises CheckpointError.
+
+_Version = Annotated[str, Field(pattern=r"^[ -~]{1,200}$")]
+
+
+class _Header(BaseModel, strict=True, extra="forbid"):
+    format: Annotated[int, Field(ge=0, le=1_000_000)]
+    versions: Annotated[list[_Version], Field(max_length=100)]
+    scene: _Source
+    memory: dict[str, Any]
+
+
+def write_checkpoint(
+    path: Path, scene: Scene, memory: dict[str, Any], arrays: Arrays, folder: Path | None = None
+) -> None:
+    """Write a file in one go: it is complete, or what was there before is untouched.
+
+    memory: as JSON can hold it. folder: which the path may not leave. Raises CheckpointError.
     """
-    if os.path.isdir(path):
-        raise CheckpointError(f"{path}: is a folder, expected a file to write a checkpoint to")
-    header = {
-        "format": FORMAT,
-        "versions": versions(),
-        "scene": {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text},
-        "memory": memory,
-    }
-    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    source = {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text}
+    header = {"format": FORMAT, "versions": versions(), "scene": source, "memory": memory}
+    size = sum(array.nbytes for array in arrays.values())
+    if size > MOST - MB:
+        raise CheckpointError(f"{path}: would have {in_mb(size)}, expected a state of less than {in_mb(MOST - MB)}")
     try:
-        with unfinished.open("wb") as stream:
-            np.savez(stream, **{_HEADER: text}, **arrays)  # type: ignore[arg-type]
-            stream.flush()
-            os.fsync(stream.fileno())
-        unfinished.replace(path)
-    except OSError as error:
-        raise CheckpointError(f"{path}: can't be written ({error.strerror}), expected {_place(path)}") from error
-    finally:
-        with suppress(OSError):
-            unfinished.unlink()
+        write_file(path, sealed(json.dumps(header), arrays), folder)
+    except FileError as error:
+        raise CheckpointError(f"{path}: {error}, expected {_place(path, folder)}") from error
 
 
-def read_checkpoint(path: Path, scene: Scene | None = None) -> Checkpoint:
+def sealed(header: str, arrays: Arrays) -> bytes:
+    """The content of a file with a checksum that fits."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **{_HEADER: np.frombuffer(header.encode(), np.uint8)}, **arrays)  # type: ignore[arg-type]
+    with zipfile.ZipFile(buffer, "a") as archive:
+        archive.comment = _CHECKSUM + b"0" * _DIGITS
+    content = buffer.getvalue()[:-_DIGITS]
+    return content + hashlib.sha256(content).hexdigest().encode()
+
+
+def read_checkpoint(path: Path, scene: Scene | None = None, folder: Path | None = None) -> Checkpoint:
     """Read a file; where a scene is given, it must be the one of the file but for the FREE fields.
 
-    Raises CheckpointError for what is no checkpoint, not whole, of another version, or of another scene.
+    folder: which the path may not leave. Raises CheckpointError, in one sentence, for what is no checkpoint, damaged,
+    of another version, or of another scene. What memory and arrays hold is checked by those who take it.
     """
-    header, arrays = _read(path)
-    if header.get("format") != FORMAT:
-        raise CheckpointError(f"{path}: format {header.get('format')} of checkpoints, expected {FORMAT}")
-    then, now = [str(entry) for entry in header["versions"]], versions()
+    header, arrays = _read(path, folder)
+    then, now = header.versions, versions()
     if then != now:
         raise CheckpointError(
-            f"{path}: saved with {', '.join(entry for entry in then if entry not in now)}, "
-            f"expected {', '.join(entry for entry in now if entry not in then)}: "
+            f"{path}: saved with {', '.join(entry for entry in then if entry not in now) or 'nothing'}, "
+            f"expected {', '.join(entry for entry in now if entry not in then) or 'no more'}: "
             "no other version goes on to the same bits"
         )
-    saved = _scene(path, header["scene"])
+    saved = _scene(path, header.scene)
     difference = None if scene is None else scene_difference(saved, scene, FREE)
     if difference is not None:
         field, here, given = difference
@@ -93,12 +120,14 @@ def read_checkpoint(path: Path, scene: Scene | None = None) -> Checkpoint:
             f"{path}: saved from a scene with {field}: {here}, which is {given} in the scene given; "
             "expected the same scene"
         )
-    return Checkpoint(path, saved if scene is None else scene, header["memory"], arrays)
+    return Checkpoint(path, saved if scene is None else scene, header.memory, arrays)
 
 
 def damaged(path: Path, reason: object) -> CheckpointError:
     """The error for a file whose contents do not fit together."""
-    return CheckpointError(f"{path}: is damaged or cut short ({reason}), expected a whole checkpoint")
+    text = " ".join(str(reason).split()) or type(reason).__name__
+    short = text if len(text) <= 200 else f"{text[:196]} ..."
+    return CheckpointError(f"{path}: is damaged or cut short ({short}), expected a whole checkpoint")
 
 
 def versions() -> list[str]:
@@ -106,37 +135,83 @@ def versions() -> list[str]:
     return [f"engine={ENGINE_HASH}", *versions_here()]
 
 
-def _read(path: Path) -> tuple[dict[str, Any], Arrays]:
-    """Header and arrays of a file of any version."""
+def _read(path: Path, folder: Path | None) -> tuple[_Header, Arrays]:
+    """Header and arrays of a file of this format."""
     try:
-        with path.open("rb") as stream:
-            if stream.read(len(_MAGIC)) != _MAGIC:
-                raise CheckpointError(f"{path}: not a checkpoint, expected a file that was saved as one")
-            stream.seek(0)
-            with np.load(stream, allow_pickle=False) as file:
-                if _HEADER not in file:
-                    raise CheckpointError(f"{path}: a .npz without a header, expected a checkpoint")
-                header = dict(json.loads(file[_HEADER].tobytes()))
-                arrays = {name: file[name] for name in file.files if name != _HEADER}
-    except FileNotFoundError:
-        raise CheckpointError(f"{path}: no such file, expected a checkpoint") from None
-    except IsADirectoryError:
-        raise CheckpointError(f"{path}: is a folder, expected a checkpoint") from None
-    except OSError as error:
-        raise CheckpointError(f"{path}: can't be read ({error.strerror}), expected a checkpoint") from error
-    except _DAMAGES as error:
+        content = read_file(path, MOST, folder)
+    except FileError as error:
+        raise CheckpointError(f"{path}: {error}, expected {_expected(folder)}") from error
+    if not content.startswith(_MAGIC):
+        raise CheckpointError(f"{path}: not a checkpoint, expected a file that was saved as one")
+    has_checksum = content[-_DIGITS - len(_CHECKSUM) : -_DIGITS] == _CHECKSUM
+    if has_checksum and hashlib.sha256(content[:-_DIGITS]).hexdigest().encode() != content[-_DIGITS:]:
+        raise damaged(path, "its checksum does not fit")
+    try:
+        header, arrays = _unpacked(content)
+    except CheckpointError as error:
+        raise CheckpointError(f"{path}: {error}") from None
+    # Whatever libraries raise for an archive that somebody made up.
+    except Exception as error:
         raise damaged(path, error) from error
-    return header, arrays
-
-
-def _scene(path: Path, source: dict[str, str]) -> Scene:
+    number = header.get("format")
+    if type(number) is int and number != FORMAT and 0 <= number < 1000:
+        raise CheckpointError(f"{path}: format {number} of checkpoints, expected {FORMAT}")
+    if not has_checksum:
+        raise damaged(path, "it ends without a checksum")
     try:
-        return parse_scene(source["text"], source["name"], parse_overrides(source["overrides"]))
+        return _Header.model_validate(header), arrays
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise damaged(path, f"header.{'.'.join(map(str, first['loc']))} {wrong(first['type'])}") from error
+
+
+def _unpacked(content: bytes) -> tuple[dict[str, Any], Arrays]:
+    """Header and arrays of an archive, which take no more memory than it has bytes. Raises anything."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = archive.infolist()
+        if any(entry.compress_type != zipfile.ZIP_STORED for entry in entries):
+            raise ValueError("it is compressed")
+        if sum(entry.file_size for entry in entries) > len(content):
+            raise ValueError("its parts overlap")
+        arrays: Arrays = {}
+        for entry in entries:
+            name = entry.filename.removesuffix(".npy")
+            if name in arrays:
+                raise ValueError("it has two arrays of one name")
+            arrays[name] = _array(archive.read(entry))
+    if _HEADER not in arrays:
+        raise CheckpointError("a .npz without a header, expected a checkpoint")
+    return dict(json.loads(arrays.pop(_HEADER).tobytes())), arrays
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    """A .npy file of numbers in C order, as NumPy writes it; no more is allocated than it has bytes."""
+    stream = io.BytesIO(content)
+    if npy.read_magic(stream) != (1, 0):
+        raise ValueError("an array of another version of .npy")
+    shape, fortran_order, dtype = npy.read_array_header_1_0(stream)
+    if dtype.kind not in "biuf" or fortran_order:
+        raise ValueError(f"an array of {dtype}, not of numbers in C order")
+    data = content[stream.tell() :]
+    if math.prod(shape) * dtype.itemsize != len(data) or min(shape, default=0) < 0:
+        raise ValueError(f"an array of shape {shape} in {len(data)} bytes")
+    return np.frombuffer(data, dtype).reshape(shape).copy()
+
+
+def _scene(path: Path, source: _Source) -> Scene:
+    try:
+        return parse_scene(source.text, source.name, parse_overrides(source.overrides))
     except SceneError as error:
-        raise CheckpointError(f"{path}: the scene in it is refused by this version:\n{error}") from error
+        raise damaged(path, f"its scene is refused: {str(error).splitlines()[0]}") from error
 
 
-def _place(path: Path) -> str:
+def _expected(folder: Path | None) -> str:
+    return "a checkpoint" if folder is None else f"a checkpoint in {folder}"
+
+
+def _place(path: Path, folder: Path | None) -> str:
+    if folder is not None:
+        return f"a file in {folder} that can be written, and room for it"
     if not os.path.isdir(path.parent):
         return f"the folder {path.parent} to be there"
     return "a file that can be written, and room for it"

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 # Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
 
 
+OUTSIDE_TABLES = "Let SCENE name tables (CSV files) that lie outside its own folder."
+
+
 class _Group(click.Group):
     """Turns errors meant for the user into one sentence and exit code 1."""
 
@@ -46,7 +49,8 @@ def main(context: click.Context) -> None:
 @main.command()
 @click.argument("scene")
 @click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
-def check(scene: str, out: Path) -> None:
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def check(scene: str, out: Path, outside_tables: bool) -> None:
     """Validate SCENE (a file, or the name of a shipped one), tell what it comes to, and draw it."""
     from conveyor_sim.model import build_model
     from conveyor_sim.report import plot_function
@@ -54,7 +58,7 @@ def check(scene: str, out: Path) -> None:
     from conveyor_sim.scene import load_scene
 
     path = scene_path(scene)
-    checked = load_scene(path)
+    checked = load_scene(path, outside_tables=outside_tables)
     model = build_model(checked)
     _print(_account(checked, model))
     plot_scene = plot_function("plot_scene")
@@ -70,14 +74,15 @@ def check(scene: str, out: Path) -> None:
 @click.argument("scene")
 @click.option("--price", is_flag=True, help="Measure what each effect costs, in ns per bottle and step.")
 @click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
-def explain(scene: str, price: bool, at: float | None) -> None:
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
     """Tell why SCENE is simulated as it is: which effects are on, what bounds the time step; with --price, the cost."""
     from conveyor_sim.explain import explanation, price_table
     from conveyor_sim.model import build_model
     from conveyor_sim.resources import scene_path
     from conveyor_sim.scene import load_scene
 
-    loaded = load_scene(scene_path(scene))
+    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
     if at is not None and not price:
         raise ConveyorError(f"--at: {at:g} given, expected --price with it, for it is the time to measure at")
     if at is not None and not 0.0 < at <= loaded.duration:
@@ -109,7 +114,10 @@ def explain(scene: str, price: bool, at: float | None) -> None:
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
-def run(scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None) -> None:
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def run(
+    scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None, outside_tables: bool
+) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
     from conveyor_sim.achieved import achieved
     from conveyor_sim.bag.folder import require_recordable
@@ -122,7 +130,7 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool, t
     from conveyor_sim.runner import run_scene
     from conveyor_sim.scene import load_scene
 
-    loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration})
+    loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
     click.echo(setting_line(model))
     folder = None if no_record else out or new_run_folder()
@@ -151,7 +159,8 @@ def run(scene: str, out: Path | None, duration: float | None, no_record: bool, t
 @click.option("--out", type=click.Path(path_type=Path), help="Folder (default: runs/accuracy_<scene>_<hash>).")
 @click.option("--thorough", is_flag=True, help="Many more long runs: up to an hour.")
 @click.option("--apply", "write", is_flag=True, help="Write the answer into a copy of the scene, in the folder.")
-def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, write: bool) -> None:
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, write: bool, outside_tables: bool) -> None:
     """Tell what accuracy costs in time on SCENE, and the cheapest setting that can be trusted.
 
     A study that was interrupted goes on where it was when the command is given again.
@@ -166,7 +175,7 @@ def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, wri
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
     path = scene_path(scene)
-    loaded = load_scene(path)
+    loaded = load_scene(path, outside_tables=outside_tables)
     folder = out or study_folder(loaded)
     click.echo(f"study of {loaded.name} in {folder}; Ctrl-C interrupts it, the same command goes on with it", err=True)
     study = run_study(

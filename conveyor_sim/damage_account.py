@@ -10,6 +10,7 @@ from conveyor_sim.empty_damage import rail_places
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.damage_arrays import Damage, Worst, worst_columns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.part_memory import Unchecked
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.state import State
 
@@ -38,6 +39,13 @@ SLOW = 0.1
 class DamageAccount:
     """What the bottles of a State bear. Public attributes are remembered in checkpoints."""
 
+    beyond: dict[str, list[int]]
+    """By limit, ids of the bottles that were beyond it at the end of the last tick."""
+    passages: dict[str, tuple[int, int, int]]
+    """By outfeed: bottles removed, tick of the last passage or of nobody waiting, whether that was told."""
+    events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
+    """Those that nobody has taken."""
+
     def __init__(self, state: State, limits: Limits, exits: Mapping[str, F8]) -> None:
         """exits: corners (n, 2) m of each outfeed, by name."""
         self._state = state
@@ -46,11 +54,9 @@ class DamageAccount:
         }
         self._exits = exits if "clogging_time" in self._limits else {}
         self._places = rail_places(state.model)
-        self.beyond: dict[str, list[int]] = {name: [] for name in WORDS}
-        """By limit, ids of the bottles that were beyond it at the end of the last tick."""
-        self.passages = {name: [0, 0, 0] for name in self._exits}
-        """By outfeed: bottles removed, tick of the last passage or of nobody waiting, whether that was told."""
-        self.events: list[Any] = []
+        self.beyond = {name: [] for name in WORDS}
+        self.passages = dict.fromkeys(self._exits, (0, 0, 0))
+        self.events = []
 
     def begin(self, was_output: bool) -> None:
         """A tick begins; was_output: the largest of everything were output at its beginning."""
@@ -136,13 +142,13 @@ class DamageAccount:
         bottles, passage = self._state.world.bottles, self.passages[name]
         waiting = self._held_up()
         if removed != passage[0] or not len(waiting):
-            self.passages[name] = [removed, tick, 0]
+            self.passages[name] = (removed, tick, 0)
             return
         idle = (tick - passage[1]) * self._state.model.tick_ns * 1e-9
         limit = self._limits["clogging_time"]
         if idle < limit - 1e-9 or passage[2]:
             return
-        self.passages[name] = [*passage[:2], 1]
+        self.passages[name] = (passage[0], passage[1], 1)
         centre = corners.mean(axis=0)
         slot = waiting[np.argmin(np.hypot(bottles.x[waiting] - centre[0], bottles.y[waiting] - centre[1]))]
         what = f"waits, for outfeed {name} has removed nothing for {idle:.3g} s, nearest to it"

@@ -3,7 +3,7 @@
 import os
 import time
 from dataclasses import astuple
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,10 +15,14 @@ from conveyor_sim.errors import SimulationError
 from conveyor_sim.guard import Guard, GuardEvent, Violation, chatter
 from conveyor_sim.guard.memory import Memory
 from conveyor_sim.moving_rails import fastest_rail
+from conveyor_sim.part_memory import Unchecked, entries, typed
 from conveyor_sim.state import State
 
 SHORTER = (4, 16, 64)
 """By what factors steps are shortened, one after another, for a tick that the guard objects to."""
+
+
+_Event = tuple[int, Literal["shorter_steps", "chatter", "soft", "stopped"], int, Unchecked, Unchecked, str]
 
 
 class Integration:
@@ -70,10 +74,13 @@ class Integration:
         }
 
     def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what another one of the same Model remembered."""
-        self._events = [GuardEvent(*event) for event in memory["events"]]
-        self._chatters, self.shortened_ticks = memory["chatters"], memory["shortened_ticks"]
-        self._guard.deepest, self._guard.has_put_in = memory["deepest"], memory["put_in"]
+        """Take over what another one of the same Model remembered. Raises ValueError for what is no such memory."""
+        entries(memory, self.memory(), "integration")
+        self._events = [GuardEvent(*event) for event in typed(list[_Event], memory["events"], "integration.events")]
+        self._chatters = typed(bool, memory["chatters"], "integration.chatters")
+        self.shortened_ticks = typed(int, memory["shortened_ticks"], "integration.shortened_ticks")
+        self._guard.deepest = typed(float, memory["deepest"], "integration.deepest")
+        self._guard.has_put_in = typed(bool, memory["put_in"], "integration.put_in")
 
     def put_in(self) -> None:
         """Bottles were put somewhere from outside."""

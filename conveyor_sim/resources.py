@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
@@ -41,12 +42,16 @@ def scene_path(name_or_path: str | Path) -> Path:
 
     A file where the caller stands wins over a shipped one. Raises SceneError if there is neither.
     """
-    path = Path(name_or_path).expanduser()
-    if path.is_file():
+    try:
+        path = Path(name_or_path).expanduser()
+    except RuntimeError:  # ~ of a user who is not there
+        path = Path(name_or_path)
+    # What is no regular file is refused where it is read, and says why.
+    if os.path.exists(path) and not os.path.isdir(path):
         return path
-    parts = path.with_suffix(".yaml").parts
-    shipped = config_dir().joinpath(*(parts[1:] if parts[0] == "config" else parts))
-    if not path.is_absolute() and ".." not in parts and shipped.is_file():
+    parts = path.with_suffix(".yaml").parts if path.name else path.parts
+    shipped = config_dir().joinpath(*(parts[1:] if parts[:1] == ("config",) else parts))
+    if not path.is_absolute() and ".." not in parts and os.path.isfile(shipped):
         return shipped
     scenes = [*config_dir().glob("*.yaml"), *config_dir().glob("scenarios/*.yaml")]
     names = ", ".join(sorted(scene.relative_to(config_dir()).with_suffix("").as_posix() for scene in scenes))

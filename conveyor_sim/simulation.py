@@ -26,11 +26,14 @@ from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.part_memory import recall, remembered
+from conveyor_sim.part_memory import entries, recall, remembered, typed
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import FIRST_SLOTS, State
 from conveyor_sim.world_arrays import changing_arrays
+
+LAST_STAMP_NS = 2**31 * 10**9 - 1
+"""The seconds of a message header are 32 bits."""
 
 
 @dataclass(frozen=True)
@@ -88,23 +91,30 @@ class Simulation:
             self._account = EnergyAccount(self._state)
 
     @classmethod
-    def load(cls, path: str | PathLike[str], threads: int | None = None, scene: Scene | None = None) -> "Simulation":
+    def load(
+        cls,
+        path: str | PathLike[str],
+        threads: int | None = None,
+        scene: Scene | None = None,
+        folder: Path | None = None,
+    ) -> "Simulation":
         """Go on from a checkpoint as if the run had never stopped: the same bits, on any number of threads.
 
         scene: must be the one that was saved, but for `duration` and `description`; None: the one in the file.
-        Raises CheckpointError for a file that is missing, no checkpoint, not whole, of another version or scene.
+        folder: where relative paths start, and which no path may leave; None: anywhere.
+        Raises CheckpointError for a file that is missing, no checkpoint, damaged, of another version or scene.
         """
-        checkpoint = read_checkpoint(Path(path), scene)
+        checkpoint = read_checkpoint(Path(path), scene, folder)
         simulation = cls(checkpoint.scene, threads)
         simulation._go_on_from(checkpoint)
         return simulation
 
-    def save(self, path: str | PathLike[str]) -> None:
+    def save(self, path: str | PathLike[str], folder: Path | None = None) -> None:
         """Write a checkpoint: the whole state at this tick, in place of what the file held. The run does not notice.
 
-        Raises CheckpointError if the file can't be written, which leaves what it held.
+        folder: as for `load`. Raises CheckpointError if the file can't be written, which leaves what it held.
         """
-        write_checkpoint(Path(path), self.scene, self._memory(), changing_arrays(self._state.world))
+        write_checkpoint(Path(path), self.scene, self._memory(), changing_arrays(self._state.world), folder)
 
     @property
     def time(self) -> float:
@@ -317,15 +327,19 @@ class Simulation:
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         memory = checkpoint.memory
         try:
-            self.tick = memory["tick"]
+            entries(memory, self._memory(), "memory")
+            self.tick = typed(int, memory["tick"], "tick")
+            if self.tick < 0 or self.stamp_ns > LAST_STAMP_NS:
+                raise ValueError(f"tick {self.tick}, which no message can say")
             self._line.go_on_from(self.tick, memory["line"])
-            if self._account is not None:
-                recall(self._account, memory["account"])
-            if self._damage is not None:
-                recall(self._damage, memory["damage"])
+            for name, account in (("account", self._account), ("damage", self._damage)):
+                if account is None:
+                    typed(type(None), memory[name], name)
+                else:
+                    recall(account, memory[name], name)
             self._integration.recall(memory["integration"])
-            self._state.go_on_from(checkpoint.arrays, memory["next_id"])
-        except (KeyError, AttributeError, TypeError, ValueError) as error:
+            self._state.go_on_from(checkpoint.arrays, typed(int, memory["next_id"], "next_id"))
+        except (ValueError, MemoryError) as error:
             raise damaged(checkpoint.path, error) from error
 
     def _slots(self) -> np.ndarray:

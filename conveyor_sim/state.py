@@ -17,6 +17,7 @@ from conveyor_sim.engine.rebuild import rebuild
 from conveyor_sim.model import Model
 from conveyor_sim.scene.geometry import RailShape
 from conveyor_sim.world_arrays import Arrays, with_arrays
+from conveyor_sim.world_checks import require_sound
 
 FIRST_SLOTS = 16
 
@@ -94,7 +95,9 @@ class State:
 
         Raises ValueError where they are not those of such a State.
         """
-        self.world, self.next_id = with_arrays(self.world, arrays), next_id
+        world = with_arrays(self.world, arrays)
+        require_sound(world, self.model, next_id)
+        self.world, self.next_id = world, next_id
         self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
 
     def _equip(self, slots: "slice | NDArray[np.int64]") -> None:

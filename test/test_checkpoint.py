@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
+import math
 import os
+import re
 import resource
+import socket
+import warnings
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,13 +22,14 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, every_law, kind, line, polyline, scene
 
-from conveyor_sim.checkpoint import FORMAT, versions
+from conveyor_sim.checkpoint import FORMAT, sealed, versions
 from conveyor_sim.engine.arrays import World
 from conveyor_sim.errors import CheckpointError
 from conveyor_sim.part_memory import remembered
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.world_arrays import CONSTANT, changing_arrays
+from conveyor_sim.world_checks import FIXED, SCRATCH, indices, ranges
 
 SPRING = {"stiffness": 2000.0, "damping": 0.5}
 SPRINGS_AND_RINGS: dict[str, Any] = {
@@ -239,6 +247,14 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture
+def own_socket(tmp_path: Path) -> Iterator[Path]:
+    """A socket in the file system."""
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(tmp_path / "socket"))
+        yield tmp_path / "socket"
+
+
 def refusal(path: Path, given: Scene | None = None) -> str:
     """Why a file is not loaded: one sentence that begins with its name."""
     with pytest.raises(CheckpointError) as caught:
@@ -249,14 +265,25 @@ def refusal(path: Path, given: Scene | None = None) -> str:
     return text.removeprefix(f"{path}: ")
 
 
-def with_header(path: Path, to: Path, **changes: Any) -> Path:
-    """The file with other entries in its header."""
+def contents(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Header and arrays of a file."""
     with np.load(path) as file:
-        contents = dict(file)
-    header = {**json.loads(contents["header"].tobytes()), **changes}
-    contents["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    with to.open("wb") as stream:
-        np.savez(stream, **contents)
+        arrays = dict(file)
+    return json.loads(arrays.pop("header").tobytes()), arrays
+
+
+def with_header(path: Path, to: Path, **changes: Any) -> Path:
+    """The file with other entries in its header, without those that are None, and a checksum that fits."""
+    header, arrays = contents(path)
+    header = {name: value for name, value in {**header, **changes}.items() if value is not None}
+    to.write_bytes(sealed(json.dumps(header), arrays))
+    return to
+
+
+def with_arrays(path: Path, to: Path, **changes: Any) -> Path:
+    """The file with other arrays and a checksum that fits."""
+    header, arrays = contents(path)
+    to.write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
     return to
 
 
@@ -320,34 +347,268 @@ def test_a_file_cut_short_anywhere_is_refused(saved: Path, tmp_path: Path) -> No
         assert refusal(cut).endswith("), expected a whole checkpoint"), length
 
 
-def test_a_flipped_bit_is_found(saved: Path, tmp_path: Path) -> None:
-    contents = bytearray(saved.read_bytes())
-    with zipfile.ZipFile(saved) as file:
-        largest = max(file.infolist(), key=lambda member: member.file_size)
-    contents[largest.header_offset + 1000] ^= 1
-    assert largest.file_size > 2000
-    (tmp_path / "flipped").write_bytes(contents)
-    assert refusal(tmp_path / "flipped").startswith(f"is damaged or cut short (Bad CRC-32 for file '{largest.filename}")
-
-
-def test_flipped_bits_of_the_directory_are_found(saved: Path, tmp_path: Path) -> None:
-    """Those by which a member claims to be encrypted or patched, and its name."""
+def test_every_flipped_bit_is_refused(saved: Path, tmp_path: Path) -> None:
+    """Wherever it is: in an array, in the header, in the archive's directory, in the checksum itself."""
     whole, flipped = saved.read_bytes(), tmp_path / "flipped"
-    entry = whole.index(b"PK\x01\x02")
-    for place, bit, told in ((8, 1, "is encrypted"), (8, 32, "patched data"), (46, 1, "without a header")):
-        contents = bytearray(whole)
-        contents[entry + place] ^= bit
-        flipped.write_bytes(contents)
-        assert told in refusal(flipped)
+    directory = whole.index(b"PK\x01\x02")
+    drawn = np.random.default_rng(0).integers(0, 8 * len(whole), 200)
+    chosen = [8 * (directory + 8), 8 * (directory + 46), 8 * (len(whole) - 70), 8 * (len(whole) - 1)]
+    for bit in [*chosen, *drawn.tolist()]:
+        content = bytearray(whole)
+        content[bit // 8] ^= 1 << bit % 8
+        flipped.write_bytes(content)
+        reason = refusal(flipped)
+        assert reason.startswith(("is damaged or cut short (", "not a checkpoint, ")), bit
+
+
+def test_the_file_is_one_that_numpy_and_unzip_read(saved: Path) -> None:
+    """A flipped bit is none of their business, but to look into a file that the guard left is a user's."""
+    header, arrays = contents(saved)
+    assert header["format"] == FORMAT
+    assert np.isfinite(arrays["bottles.x"]).all()
+    with zipfile.ZipFile(saved) as file:
+        assert file.testzip() is None
+        assert re.fullmatch(b"sha256:[0-9a-f]{64}", file.comment)
 
 
 def test_arrays_of_another_make_are_refused(saved: Path, tmp_path: Path) -> None:
-    with np.load(saved) as file:
-        contents = dict(file)
-    for name, array in (("bottles.x", contents["bottles.x"].astype(np.float32)), ("ring.radius", np.zeros(3))):
-        with (tmp_path / "other").open("wb") as stream:
-            np.savez(stream, **{**contents, name: array})
-        assert f"(array {name} is of float" in refusal(tmp_path / "other")
+    x = contents(saved)[1]["bottles.x"]
+    for name, array in (("bottles.x", x.astype(np.float32)), ("ring.radius", np.zeros(3))):
+        assert f"(array {name} is of float" in refusal(with_arrays(saved, tmp_path / "other", **{name: array}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"versions": None}, "header.versions is missing"),
+        ({"versions": "one"}, "header.versions is not of its type"),
+        ({"versions": ["engine=\x1b[2J"]}, "header.versions.0 is not of its type, or out of bounds"),
+        ({"scene": 42}, "header.scene is not of its type"),
+        ({"scene": {"text": 1, "name": "a", "overrides": ""}}, "header.scene.text is not of its type"),
+        ({"scene": {"text": "a: [", "name": "a", "overrides": ""}}, "its scene is refused: a:1: not valid YAML"),
+        ({"memory": []}, "header.memory is not of its type"),
+        ({"memory": {}}, "memory has other entries than tick, next_id, line"),
+        ({"extra": 1}, "header.extra should not be there"),
+        ({"format": None}, "header.format is missing"),
+        ({"format": "2"}, "header.format is not of its type"),
+    ],
+)
+def test_a_header_with_odd_fields_is_refused(saved: Path, tmp_path: Path, changes: Any, told: str) -> None:
+    assert told in refusal(with_header(saved, tmp_path / "odd", **changes))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        (("tick",), -1, "tick -1"),
+        (("tick",), 10.0, "tick is not of its type"),
+        (("tick",), 10**12, "tick 1000000000000, which no message can say"),
+        (("next_id",), 3, "array bottles.id holds"),
+        (("line", "speeds"), [0.6], "line.speeds has the shape (1,), expected (3,)"),
+        (("line", "speeds"), [math.nan] * 3, "line.speeds[0] is not finite"),
+        (("line", "bad"), ["one"], "line.bad[0] is not of its type"),
+        (("line", "pending"), [[["a"], [1.0]]], "line.pending[0][2] is missing"),
+        (("line", "devices", "belts/feeder", "watchdog"), None, "watchdog has other entries than timeout_ticks"),
+        (("line", "devices", "infeeds/packed", "due"), math.inf, "packed.due is not finite"),
+        (("line", "devices", "infeeds/packed", "fed"), "two", "packed.fed is not of its type"),
+        (("line", "devices", "infeeds/packed", "random", "state"), {}, "random: not the state of a random generator"),
+        (("line", "devices", "nothing"), {}, "line.devices has other entries"),
+        (("integration", "deepest"), math.nan, "integration.deepest is not finite"),
+        (("integration", "events"), [[1]], "integration.events[0][1] is missing"),
+    ],
+)
+def test_a_memory_that_is_no_memory_of_the_scene_is_refused(
+    saved: Path, tmp_path: Path, path: tuple[str, ...], value: Any, told: str
+) -> None:
+    memory = contents(saved)[0]["memory"]
+    place = memory
+    for part in path[:-1]:
+        place = place[part]
+    place[path[-1]] = value
+    assert told in refusal(with_header(saved, tmp_path / "odd", memory=memory))
+
+
+CAPACITIES = {"near_segments.piece", "near_arcs.piece", "belts.candidate"}
+"""Lists without springs, whose length is what room there is."""
+
+
+def spoilt(name: str, array: Any) -> list[tuple[Any, str]]:
+    """An array as it can't be, and why: cut short, not finite, pointing out of bounds."""
+    wrong = [(array[:-1], "has the shape")] if array.size and name not in CAPACITIES else []
+    if array.dtype.kind == "f" and array.size and not name.startswith((*SCRATCH, *FIXED)):
+        wrong += [(np.full_like(array, value), "is not finite") for value in (np.nan, np.inf)]
+    if name in indices({name: array}) and array.size:
+        wrong.append((np.full_like(array, np.iinfo(array.dtype).max), f"array {name} holds"))
+    if name.startswith(FIXED):
+        wrong.append((array + array.dtype.type(1), f"array {name} is not that of the scene"))
+    return wrong
+
+
+def test_arrays_that_can_not_be_are_refused(saved: Path, tmp_path: Path) -> None:
+    """The kernels trust every length and every index: what is wrong in one would be read beyond the end of another."""
+    arrays, state = contents(saved)[1], Simulation.load(saved)._state
+    world, told = state.world, Counter[str]()
+    for name, array in arrays.items():
+        for wrong, reason in spoilt(name, array):
+            with pytest.raises(ValueError, match=re.escape(reason)):
+                state.go_on_from({**arrays, name: wrong}, state.next_id)
+            assert state.world is world
+            told[reason.split()[-1]] += 1
+    assert all(told[word] > 5 for word in ("shape", "finite", "holds", "scene"))
+    for name in ("bottles.x", "pairs.i"):
+        cut = with_arrays(saved, tmp_path / "wrong", **{name: arrays[name][:-1]})
+        assert refusal(cut).startswith("is damaged or cut short (array ")
+
+
+def test_bottles_that_can_not_be_are_refused(saved: Path, tmp_path: Path) -> None:
+    _, arrays = contents(saved)
+    twice, heavy = arrays["bottles.id"].copy(), arrays["bottles.weight"].copy()
+    twice[:2] = 0
+    heavy[0] *= 2.0
+    assert "holds an id twice" in refusal(with_arrays(saved, tmp_path / "wrong", **{"bottles.id": twice}))
+    assert "bottles.weight does not fit" in refusal(with_arrays(saved, tmp_path / "wrong", **{"bottles.weight": heavy}))
+
+
+def test_every_index_is_known(saved: Path) -> None:
+    """An array of whole numbers that is new must be given its range, or be named as one that indexes nothing."""
+    for sim in (Simulation.load(saved), Simulation(scene(**line())), Simulation(queue(**SPRINGS_AND_RINGS))):
+        arrays = changing_arrays(sim._state.world)
+        assert indices(arrays) == ranges(sim._state.world, sim.model, 1).keys() & arrays.keys()
+
+
+def archive(*members: tuple[str, bytes], compression: int = zipfile.ZIP_STORED) -> bytes:
+    """A .zip with a checksum that fits."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", compression) as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of names that are there twice
+        for name, content in members:
+            file.writestr(name, content)
+        file.comment = b"sha256:" + b"0" * 64
+    content = buffer.getvalue()[:-64]
+    return content + hashlib.sha256(content).hexdigest().encode()
+
+
+def npy(shape: str, data: bytes, kind: str = "<f8") -> bytes:
+    """A .npy file, whatever its header says."""
+    text = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + data
+
+
+@pytest.mark.parametrize(
+    ("members", "told"),
+    [
+        ([("a.npy", npy("(10**12,)", b""))], "is damaged"),
+        ([("a.npy", npy("(1000000000000,)", b""))], "an array of shape (1000000000000,) in 0 bytes"),
+        ([("a.npy", npy("(-1,)", b"12345678"))], "an array of shape (-1,) in 8 bytes"),
+        ([("a.npy", npy("(1,)", b"12345678", "|O"))], "an array of object, not of numbers"),
+        ([("a.npy", npy("(1,)", b"12345678", "<U2"))], "an array of <U2, not of numbers"),
+        ([("a.npy", b"\x93NUMPY\x09\x00")], "an array of another version"),
+        ([("a.npy", b"")], "is damaged"),
+        ([("a.npy", npy("(0,)", b"")), ("a.npy", npy("(0,)", b""))], "two arrays of one name"),
+        ([("header.npy", npy("(2,)", b"[]", "|u1"))], "header.format is missing"),
+        ([("header.npy", npy("(2,)", b"42", "|u1"))], "is damaged"),
+        ([("header.npy", npy("(100000,)", b"[" * 100000, "|u1"))], "is damaged"),
+        ([("header.npy", npy("(10000,)", b"9" * 10000, "|u1"))], "is damaged"),
+    ],
+)
+def test_an_archive_that_somebody_made_up_is_refused(tmp_path: Path, members: Any, told: str) -> None:
+    (tmp_path / "made up").write_bytes(archive(*members))
+    assert told in refusal(tmp_path / "made up")
+
+
+def test_an_archive_takes_no_more_memory_than_it_has_bytes(tmp_path: Path) -> None:
+    packed = archive(("a.npy", npy("(10000000,)", bytes(80_000_000))), compression=zipfile.ZIP_DEFLATED)
+    assert len(packed) < 100_000
+    (tmp_path / "bomb").write_bytes(packed)
+    assert "(it is compressed)" in refusal(tmp_path / "bomb")
+
+
+def test_a_file_of_the_old_format_is_refused_in_one_sentence(saved: Path, tmp_path: Path) -> None:
+    """It has no checksum."""
+    header, arrays = contents(saved)
+    text = np.frombuffer(json.dumps({**header, "format": 1}).encode(), np.uint8)
+    with (tmp_path / "old").open("wb") as stream:
+        np.savez(stream, header=text, **arrays)
+    assert refusal(tmp_path / "old") == f"format 1 of checkpoints, expected {FORMAT}"
+
+
+def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, own_socket: Path) -> None:
+    """Nobody writes to the pipe, and the devices have no end."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "round").symlink_to(tmp_path / "round")
+    (tmp_path / "to zero").symlink_to("/dev/zero")
+    for path, told in (
+        (tmp_path / "pipe", "is a named pipe, not a regular file, expected a checkpoint"),
+        (Path("/dev/zero"), "is a device, not a regular file, expected a checkpoint"),
+        (Path("/dev/tty"), "is a device, not a regular file, expected a checkpoint"),
+        (tmp_path / "to zero", "is a device, not a regular file, expected a checkpoint"),
+        (own_socket, "is a socket, not a regular file, expected a checkpoint"),
+        (tmp_path / "round", "can't be read (Too many levels of symbolic links), expected a checkpoint"),
+        (tmp_path / ("x" * 300), "can't be read (File name too long), expected a checkpoint"),
+        (tmp_path / "a\0b", "can't be read (not a path), expected a checkpoint"),
+    ):
+        assert refusal(path) == told
+
+
+def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
+    with (tmp_path / "huge").open("wb") as stream:
+        stream.truncate(10**12)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert refusal(tmp_path / "huge") == "has 1000000 MB, more than the 512 MB that are read, expected a checkpoint"
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000  # kB
+
+
+def test_a_path_can_not_leave_a_folder(saved: Path, tmp_path: Path) -> None:
+    """By `..`, as an absolute path, by a link to a file or to a folder; links that stay in it are followed."""
+    folder, outside = tmp_path / "folder", tmp_path / "outside"
+    (folder / "inner").mkdir(parents=True)
+    outside.mkdir()
+    for place in (folder / "inner" / "file", outside / "file"):
+        place.write_bytes(saved.read_bytes())
+    (folder / "out").symlink_to(outside)
+    (folder / "file out").symlink_to(outside / "file")
+    (folder / "in").symlink_to(folder / "inner")
+    for path in ("inner/file", "in/file", "inner/../in/file", folder / "inner" / "file"):
+        assert Simulation.load(path, folder=folder).tick == 10
+    sim = Simulation.load(saved)
+    for path in ("../outside/file", "out/file", "file out", outside / "file", "inner/../../outside/file", "out/new"):
+        with pytest.raises(CheckpointError) as caught:
+            Simulation.load(path, folder=folder)
+        if path != "out/new":
+            assert str(caught.value) == f"{path}: leads out of the folder {folder}, expected a checkpoint in {folder}"
+        if path != "file out":
+            with pytest.raises(CheckpointError, match="leads out of the folder"):
+                sim.save(path, folder)
+    assert [file.name for file in outside.iterdir()] == ["file"]
+    assert (outside / "file").read_bytes() == saved.read_bytes()
+    sim.save("file out", folder)  # the link is replaced
+    assert (folder / "file out").is_file()
+    assert not (folder / "file out").is_symlink()
+    assert (outside / "file").read_bytes() == saved.read_bytes()
+
+
+def test_a_folder_is_made_for_the_first_file(saved: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    with pytest.raises(CheckpointError, match="no such file, expected a checkpoint in"):
+        Simulation.load("file", folder=folder)
+    Simulation.load(saved).save("file", folder)
+    assert Simulation.load("file", folder=folder).tick == 10
+
+
+def test_only_a_regular_file_is_replaced(saved: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    assert failure_to_save(Simulation.load(saved), tmp_path / "pipe").startswith("is a named pipe, not a regular file")
+    assert (tmp_path / "pipe").is_fifo()
+    assert [file.name for file in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_what_is_refused_changes_nothing(saved: Path, tmp_path: Path) -> None:
+    """A run that is under way, and the random draws of one that is loaded afterwards."""
+    sim, reference = Simulation.load(saved), Simulation.load(saved)
+    memory = contents(saved)[0]["memory"]
+    memory["integration"]["deepest"] = math.nan  # the last that is looked at before the arrays
+    refusal(with_header(saved, tmp_path / "wrong", memory=memory))
+    assert run(sim, 40) == run(reference, 40) == run(Simulation.load(saved), 40)
 
 
 def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
@@ -385,7 +646,7 @@ def test_a_file_that_can_not_be_written_is_told_and_nothing_is_left(saved: Path,
     assert failure_to_save(sim, tmp_path / "no" / "file") == (
         f"can't be written (No such file or directory), expected the folder {tmp_path / 'no'} to be there"
     )
-    assert failure_to_save(sim, tmp_path) == "is a folder, expected a file to write a checkpoint to"
+    assert failure_to_save(sim, tmp_path) == "is a folder, expected a file that can be written, and room for it"
     locked.mkdir(mode=0o500)
     with as_nobody():
         assert failure_to_save(sim, locked / "file").startswith("can't be written (Permission denied), expected ")

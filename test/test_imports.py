@@ -10,13 +10,14 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
-    ["errors", "version", "machine", "signals"],
+    ["errors", "version", "machine", "signals", "files"],
     ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
     ["model"],
     ["empty_damage"],
     ["empty_world"],
+    ["world_checks"],
     ["state", "elastic", "checkpoint"],
     ["guard", "line", "energy_account", "damage_account"],
     ["integration"],

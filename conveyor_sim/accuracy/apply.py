@@ -16,9 +16,9 @@ from conveyor_sim.scene import Scene, load_scene
 def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
     """Write the scene's file with the setting to `copy`; return the scene that is read back from it.
 
-    Tables that the scene names by path are named from the copy's folder. Raises ValueError for a setting of another
-    stiffness, which would change the materials; ConveyorError if the copy can't be written, is the scene's own file,
-    or the scene is written in braces, where no line can be put.
+    Tables that the scene names by path and that lie elsewhere are copied beside it. Raises ValueError for a setting of
+    another stiffness, which would change the materials; ConveyorError if the copy can't be written, is the scene's own
+    file, or the scene is written in braces, where no line can be put.
     """
     if setting.stiffness != 1.0:
         raise ValueError(f"stiffness {setting.stiffness:g}, expected 1")
@@ -29,7 +29,7 @@ def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
     if data.fa.flow_style():
         raise ConveyorError(f"{source}: is written in braces, expected one field a line to write a setting into")
     lines = scene.source_text.splitlines(keepends=True)
-    _rename_tables(lines, data, source.parent, copy.parent)
+    _take_tables_along(lines, data, source.parent, copy)
     _put(lines, data, _line(setting))
     _write(copy, "".join(lines))
     return load_scene(copy)
@@ -60,13 +60,17 @@ def _is_blank(line: str) -> bool:
     return not line.strip() or line.lstrip().startswith("#")
 
 
-def _rename_tables(lines: list[str], data: Any, before: Path, after: Path) -> None:
+def _take_tables_along(lines: list[str], data: Any, before: Path, copy: Path) -> None:
     for contact in data.get("contacts", ()):
         path = contact.get("table")
         if isinstance(path, str):
             row, column = contact.lc.value("table")
-            renamed = os.path.relpath(before / path, after)
-            lines[row] = lines[row][:column] + lines[row][column:].replace(path, renamed, 1)
+            name = os.path.relpath(before / path, copy.parent)
+            if name.startswith(".."):
+                # A scene may name what lies in its folder only.
+                name = f"{copy.stem}_{Path(path).name}"
+                _write(copy.with_name(name), (before / path).read_text(encoding="utf-8"))
+            lines[row] = lines[row][:column] + lines[row][column:].replace(path, name, 1)
 
 
 def _write(file: Path, text: str) -> None:

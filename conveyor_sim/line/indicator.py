@@ -20,6 +20,9 @@ HOUR = 3600.0
 class IndicatorDevice(Device):
     """One exit while it runs. Its times are counted in ticks."""
 
+    recent: list[int]
+    """Ticks of the passages within the window."""
+
     def __init__(
         self,
         name: str,
@@ -46,8 +49,7 @@ class IndicatorDevice(Device):
         self._window, self._window_ticks = indicator.window, _ticks(indicator.window, tick)
         self.passed = 0
         """Bottles out, less those back in, at most so far: one that shakes on the line passes once."""
-        self.recent: list[int] = []
-        """Ticks of the passages within the window."""
+        self.recent = []
         self.stuck = 0
         """Ticks for which nothing has left that could have."""
         self.empty = 0

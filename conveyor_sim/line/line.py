@@ -14,7 +14,7 @@ from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.part_memory import as_tuples, recall, remembered
+from conveyor_sim.part_memory import Unchecked, entries, recall, remembered, typed
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 
@@ -23,6 +23,9 @@ FAULT = "fault"
 
 WATCHDOG = "watchdog"
 """Source of outcomes that the line itself brings about."""
+
+_Pending = tuple[tuple[str, ...], tuple[Unchecked, ...], str]
+_Outcome = tuple[int, str, tuple[str, ...], tuple[Unchecked, ...], bool, str]
 
 
 class Line:
@@ -47,7 +50,7 @@ class Line:
             tuple(fault for device in devices for fault in device.faults),
         )
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
-        self._pending: list[tuple[tuple[str, ...], tuple[float, ...], str]] = []
+        self._pending: list[_Pending] = []
         self._outcomes: list[CommandOutcome] = []
 
     @property
@@ -162,13 +165,15 @@ class Line:
         }
 
     def go_on_from(self, tick: int, memory: dict[str, Any]) -> None:
-        """Stand as one of the same scene did at a tick. Raises KeyError, AttributeError, TypeError or ValueError."""
+        """Stand as one of the same scene did at a tick. Raises ValueError for what is no memory of one."""
+        entries(memory, self.memory(), "line")
         self.now.tick = tick
-        self._pending = list(as_tuples(memory["pending"]))
-        self._outcomes = [CommandOutcome(*told) for told in as_tuples(memory["outcomes"])]
-        self.now.setpoints[:], self.now.speeds[:] = memory["setpoints"], memory["speeds"]
-        self.now.bad = set(memory["bad"])
-        recall(self._by_name(), memory["devices"])
+        self._pending = typed(list[_Pending], memory["pending"], "line.pending")
+        self._outcomes = [CommandOutcome(*told) for told in typed(list[_Outcome], memory["outcomes"], "line.outcomes")]
+        speeds = {"setpoints": self.now.setpoints, "speeds": self.now.speeds}
+        recall(speeds, {name: memory[name] for name in speeds}, "line")
+        self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
+        recall(self._by_name(), memory["devices"], "line.devices")
 
     def _by_name(self) -> dict[str, Device]:
         return {device.name: device for device in self._devices}

@@ -19,6 +19,9 @@ FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
 class PhotoEyeDevice(Device):
     """One photo-eye: beam, chatter, stuck, late by a delay, debounced; then on-delay and off-delay, in this order."""
 
+    late: tuple[Edge, ...]
+    """Edges that have not come through yet."""
+
     def __init__(self, name: str, eye: PhotoEye, beams: Beams, index: int, random: np.random.Generator) -> None:
         """index: of its beam among the beams; random: for its chatter alone."""
         place = f"photo_eyes/{name}"
@@ -53,8 +56,7 @@ class PhotoEyeDevice(Device):
         """s: when chatter turns over next."""
         self.level = False
         """What it shows before delays."""
-        self.late: tuple[Edge, ...] = ()
-        """Edges that have not come through yet."""
+        self.late = ()
         self.debounced = Timer(eye.debounce, eye.debounce)
         self.delayed = Timer(eye.on_delay, eye.off_delay)
         self.rose = self.fell = 0.0

@@ -14,6 +14,9 @@ from conveyor_sim.scene.machines import Reject
 class RejectDevice(Device):
     """One reject while it runs."""
 
+    strokes: tuple[float, ...]
+    """s, when the strokes that are still to hit began or begin."""
+
     def __init__(self, name: str, reject: Reject) -> None:
         place = f"machines/{name}"
         names = ("rejected_bad", "rejected_good", "missed")
@@ -23,8 +26,7 @@ class RejectDevice(Device):
         self._corners = np.array(reject.region)
         self.fire = RisingEdge()
         self.stop = False
-        self.strokes: tuple[float, ...] = ()
-        """s, when the strokes that are still to hit began or begin."""
+        self.strokes = ()
         self.removed = 0
         self.removed_bad = 0
         self.missed = 0

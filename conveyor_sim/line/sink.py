@@ -14,6 +14,9 @@ from conveyor_sim.scene.machines import Sink
 class SinkDevice(MachineDevice):
     """One sink while it runs. Starved: it would take a bottle, and none is in its region."""
 
+    waiting: tuple[int, ...]
+    """Ids of the bottles in the region, in the order of their arrival."""
+
     def __init__(self, name: str, sink: Sink) -> None:
         place = f"machines/{name}"
         signals = [
@@ -24,8 +27,7 @@ class SinkDevice(MachineDevice):
         ]
         super().__init__(name, sink.rate, sink.rate_limit, signals)
         self._corners = np.array(sink.region)
-        self.waiting: tuple[int, ...] = ()
-        """Ids of the bottles in the region, in the order of their arrival."""
+        self.waiting = ()
         self.removed = 0
         self.removed_bad = 0
         self.starved = False

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+import traceback
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -11,40 +14,103 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from conveyor_sim.errors import ConveyorError
+from conveyor_sim.errors import CheckpointError, ConveyorError
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
+from conveyor_sim.simulation import Simulation
+
+LONGEST = 1000
+"""Characters of a path."""
 
 
 class CheckpointServices:
-    """Answers requests by asking the stepper."""
+    """Answers requests by asking the stepper. Files are read beside it: it goes on meanwhile."""
 
-    def __init__(self, node: Node, executor: Executor, stepper: Stepper) -> None:
+    def __init__(
+        self,
+        node: Node,
+        executor: Executor,
+        stepper: Stepper,
+        folder: Path | None,
+        read: Callable[[Path], Simulation],
+    ) -> None:
+        """`folder`: which no path may leave; None: every request is refused. `read`: reads a file in it."""
         self._executor = executor
         self._stepper = stepper
+        self._folder = folder
+        self._read = read
+        self._log = node.get_logger()
+        self._reading = False
         group = ReentrantCallbackGroup()
         node.create_service(SaveCheckpoint, "save_checkpoint", self._save, callback_group=group)
         node.create_service(LoadCheckpoint, "load_checkpoint", self._load, callback_group=group)
 
     async def _save(self, request: Any, response: Any) -> Any:
-        return await self._do(self._stepper.save, "saved to", request, response)
+        try:
+            folder, path = self._place(request.path)
+        except ConveyorError as error:
+            return await self._refuse(response, error)
+        return await self._between_ticks(response, lambda: self._stepper.save(path, folder), f"saved to {path}")
 
     async def _load(self, request: Any, response: Any) -> Any:
-        return await self._do(self._stepper.load, "loaded", request, response)
+        if self._reading:
+            return await self._refuse(response, "another checkpoint is being loaded, expected its answer first")
+        self._reading = True
+        try:
+            _, path = self._place(request.path)
+            simulation = await settled(self._executor, _in_background(lambda: self._read(path)))
+        except ConveyorError as error:
+            return await self._refuse(response, error)
+        except Exception as error:
+            # Not to end a run for a file.
+            self._log.error(traceback.format_exc())
+            return await self._refuse(response, f"{path}: can't be loaded ({type(error).__name__})")
+        finally:
+            self._reading = False
+        return await self._between_ticks(response, lambda: self._stepper.load(simulation, path), f"loaded {path}")
 
-    async def _do(self, what: Callable[[Path], None], done: str, request: Any, response: Any) -> Any:
-        path = Path(request.path).expanduser().absolute()
+    def _place(self, text: str) -> tuple[Path, Path]:
+        """The folder, and a path that is asked for in it. Whether it leaves the folder is seen when it is opened."""
+        if self._folder is None:
+            raise CheckpointError("the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in")
+        if not text.isprintable() or len(text) > LONGEST:
+            shown = repr(text[:100])
+            raise CheckpointError(f"path: {shown} given, expected at most {LONGEST} characters that can be printed")
+        return self._folder, self._folder / text
 
-        def between_ticks() -> None:
+    async def _between_ticks(self, response: Any, what: Callable[[], None], done: str) -> Any:
+        def now() -> None:
             # The state that the answer tells of is the one that was saved, not one some ticks later.
             try:
-                what(path)
-                response.success, response.message = True, f"{done} {path}"
+                what()
+                response.success, response.message = True, done
             except ConveyorError as error:
                 response.message = str(error)
-            simulation = self._stepper.session.simulation
-            response.tick, response.time = simulation.tick, to_time(simulation.stamp_ns)
+            self._stamp(response)
 
-        await settled(self._executor, self._stepper.call(between_ticks))
+        await settled(self._executor, self._stepper.call(now))
         return response
+
+    async def _refuse(self, response: Any, reason: object) -> Any:
+        response.message = str(reason)
+        await settled(self._executor, self._stepper.call(lambda: self._stamp(response)))
+        return response
+
+    def _stamp(self, response: Any) -> None:
+        simulation = self._stepper.session.simulation
+        response.tick, response.time = simulation.tick, to_time(simulation.stamp_ns)
+
+
+def _in_background(function: Callable[[], Simulation]) -> Future[Simulation]:
+    """Have something done in a thread of its own, which keeps nobody from ending the process."""
+    future: Future[Simulation] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(function())
+        except Exception as error:
+            future.set_exception(error)
+
+    threading.Thread(target=run, name="checkpoint", daemon=True).start()
+    return future

@@ -30,14 +30,16 @@ CONTROLLED = ("feeder", "table")  # belts that plc_node commands unless its para
 PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent once a second
 
 
-def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -> float | None:
+def run_in_lockstep(
+    scene_name: str, bag: Path, duration: float | None = None, outside_tables: bool = False
+) -> float | None:
     """Run node and controller to the end of `duration` (s; None: the scene's), recorded to `bag`.
 
     Returns the wall time in s from the first tick to the last, if the node could tell it.
     Raises ConveyorError if one of them ends before that, or on Ctrl-C or SIGTERM. Either way nothing is left running.
     """
     file = scene_path(scene_name).resolve()
-    scene = load_scene(file, {"duration": duration} if duration is not None else None)
+    scene = load_scene(file, {"duration": duration} if duration is not None else None, outside_tables)
     missing = [belt for belt in CONTROLLED if belt not in scene.belts]
     if missing:
         raise ConveyorError(
@@ -54,6 +56,7 @@ def run_in_lockstep(scene_name: str, bag: Path, duration: float | None = None) -
         environment = {**os.environ, "ROS_LOG_DIR": str(logs / "ros"), "PYTHONUNBUFFERED": "1"}
         node_parameters = {
             "scene": file,
+            "outside_tables": outside_tables,
             "duration": scene.duration,
             "start_paused": True,
             "real_time_factor": 0.0,
@@ -101,11 +104,12 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 @click.argument("scene", default="paper_plant")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
-def main(scene: str, out: Path | None, duration: float | None) -> None:
+@click.option("--outside-tables", is_flag=True, help="Let SCENE name tables (CSV) that lie outside its own folder.")
+def main(scene: str, out: Path | None, duration: float | None, outside_tables: bool) -> None:
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
     bag = out or new_run_folder()
     try:
-        report(bag, run_in_lockstep(scene, bag, duration))
+        report(bag, run_in_lockstep(scene, bag, duration, outside_tables))
     except ConveyorError as error:
         sys.exit(f"main job: {error}")
 

@@ -82,7 +82,7 @@ class SimNode:
         node, executor = self._node, self._spinner.executor
         self._given = parameters.declare(node)
         self._distro = default_distro()
-        self._scene = load_scene(scene_path(self._given.scene), self._given.overrides())
+        self._scene = load_scene(scene_path(self._given.scene), self._given.overrides(), self._given.outside_tables)
         if self._given.record is not None:
             require_recordable(self._given.record)
         topics = {**OUTPUTS, **photo_eye_outputs(self._scene.photo_eyes)}
@@ -111,10 +111,14 @@ class SimNode:
         node.destroy_timer(self._reports)
         clock = ClockPublisher(node, given.clock_rate) if given.publish_clock else None
 
-        def open_session(runs: int, checkpoint: Path | None) -> Session:
-            scene, threads = self._scene, given.threads or None
-            new = Simulation(scene, threads) if checkpoint is None else Simulation.load(checkpoint, threads, scene)
-            return Session(new, sink, bag_folder(given.record, runs), given.frame_id, self._distro)
+        scene, threads = self._scene, given.threads or None
+
+        def open_session(runs: int, loaded: Simulation | None) -> Session:
+            simulation = loaded or Simulation(scene, threads)
+            return Session(simulation, sink, bag_folder(given.record, runs), given.frame_id, self._distro)
+
+        def read_checkpoint(path: Path) -> Simulation:
+            return Simulation.load(path, threads, scene, given.checkpoint_folder)
 
         stepper = self._stepper = Stepper(
             open_session,
@@ -127,7 +131,7 @@ class SimNode:
         )
         subscribe_commands(node, stepper)
         self._services.serve(stepper)
-        CheckpointServices(node, executor, stepper)
+        CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
         FaultService(node, executor, stepper)
         LockstepService(node, executor, stepper, given.frame_id)
         Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))

@@ -9,6 +9,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.declared import Entry, declare_table
 
 _RATE_TEXT = "Hz of simulated time; -1: as the scene says, 0: never. Must divide the tick rate."
@@ -26,6 +27,12 @@ TABLE = (
         0.0,
         1e6,
         fixed=False,
+    ),
+    Entry("outside_tables", False, "Whether the scene may name tables that lie outside its own folder."),
+    Entry(
+        "checkpoint_folder",
+        "checkpoints",
+        "Folder that save_checkpoint and load_checkpoint keep to, made when first needed; empty text: both refuse.",
     ),
     Entry("record", "", "Folder of the rosbag2 recording, new or empty; empty text: do not record."),
     Entry("frame_id", "world", "Frame of all positions, in every header."),
@@ -46,6 +53,8 @@ class Parameters:
     duration: float
     start_paused: bool
     real_time_factor: float
+    outside_tables: bool
+    checkpoint_folder: Path | None
     record: Path | None
     frame_id: str
     publish_clock: bool
@@ -70,5 +79,17 @@ def declare(node: Node) -> Parameters:
     """Declare all of TABLE on `node`. Raises ConveyorError for a value that can't be."""
     values = declare_table(node, TABLE)
     rates = {name: values.pop(f"rates.{name}") for name in RATES}
-    record = values.pop("record")
-    return Parameters(**values, record=Path(record).expanduser() if record else None, rates=rates)
+    record, checkpoints = values.pop("record"), values.pop("checkpoint_folder")
+    return Parameters(
+        **values,
+        record=_folder(record) if record else None,
+        checkpoint_folder=_folder(checkpoints).absolute() if checkpoints else None,
+        rates=rates,
+    )
+
+
+def _folder(text: str) -> Path:
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise ConveyorError(f"parameter: {text!r} given, expected the home of a user that is there") from None

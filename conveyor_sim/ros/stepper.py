@@ -64,7 +64,7 @@ class Stepper:
 
     def __init__(
         self,
-        open_session: Callable[[int, Path | None], Session],
+        open_session: Callable[[int, Simulation | None], Session],
         *,
         real_time_factor: float,
         playing: bool,
@@ -73,7 +73,7 @@ class Stepper:
         died: Callable[[Exception], None],
         log: Log,
     ) -> None:
-        """`open_session`: opens the run with the given number of runs before it, from a checkpoint if one is given.
+        """`open_session`: opens the run with the given number of runs before it; with a Simulation, if one is given.
         `beat`: called after each tick and while idle, with the simulated time in ns and the wall time in s.
         `died`: called if the thread can't go on.
 
@@ -185,17 +185,17 @@ class Stepper:
             raise
         self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
 
-    def save(self, path: Path) -> None:
-        """Write a checkpoint of the present state. Raises CheckpointError."""
-        self.session.simulation.save(path)
+    def save(self, path: Path, folder: Path | None = None) -> None:
+        """Write a checkpoint of the present state; the path may not leave the folder. Raises CheckpointError."""
+        self.session.simulation.save(path, folder)
         self._log.info(f"saved tick {self.session.simulation.tick} to {path}")
 
-    def load(self, path: Path) -> None:
-        """Close this run and its recording and open the next from a checkpoint, PAUSED.
+    def load(self, simulation: Simulation, path: Path) -> None:
+        """Close this run and its recording and open the next with a Simulation from a checkpoint, PAUSED.
 
         Raises ConveyorError if that can't be opened; this run then goes on.
         """
-        session = self._open_session(self._runs + 1, path)
+        session = self._open_session(self._runs + 1, simulation)
         self._runs += 1
         self._leave("a checkpoint was loaded")
         self._enter(session)

@@ -59,7 +59,7 @@ class Contact(Part):
     )
     table: TablePoints | None = quantity(
         "Force at each overlap, measured or computed; straight between the points and on beyond the last. "
-        "A path is taken from the scene file's folder.",
+        "A path is taken from the scene file's folder and may not leave it, unless `--outside-tables` is given.",
         "m, N",
         default=None,
     )

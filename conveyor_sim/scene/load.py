@@ -10,49 +10,49 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from conveyor_sim.errors import SceneError
+from conveyor_sim.files import FileError, in_mb, read_file
 from conveyor_sim.scene.checks import problems_of
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.schema import Origin, Scene
-from conveyor_sim.scene.tables import with_tables
-from conveyor_sim.scene.yaml_lines import Document
+from conveyor_sim.scene.tables import Beside, with_tables
+from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 
 _MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
 
 
-def load_scene(path: str | PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+def load_scene(
+    path: str | PathLike[str], overrides: Mapping[str, Any] | None = None, outside_tables: bool = False
+) -> Scene:
     """Read a scene file. `overrides` is laid over it before it is validated: mappings merge, all else replaces.
 
+    outside_tables: whether tables that the scene names by path may lie outside its own folder.
     Raises SceneError with one line for each problem of the file.
     """
     file = FilePath(path)
     try:
-        text = file.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise SceneError(f"{path}: no such file, expected a scene file") from None
-    except IsADirectoryError:
-        raise SceneError(f"{path}: is a folder, expected a scene file") from None
-    except OSError as error:
-        raise SceneError(f"{path}: can't be read: {error.strerror}") from None
+        text = read_file(file, LONGEST_TEXT).decode("utf-8")
+    except FileError as error:
+        raise SceneError(f"{path}: {error}, expected a scene file") from None
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise SceneError(f"{path}:{line}: not UTF-8 text, expected a scene file in UTF-8") from None
-    return parse_scene(text, str(path), overrides, file.parent)
+    return parse_scene(text, str(path), overrides, Beside(file.parent, outside_tables))
 
 
 def parse_scene(
     text: str,
     name: str = "<text>",
     overrides: Mapping[str, Any] | None = None,
-    folder: FilePath | None = None,
+    beside: Beside | None = None,
 ) -> Scene:
-    """Read a scene from YAML text; `name` stands for the file in errors, files that it names lie in `folder`.
+    """Read a scene from YAML text; `name` stands for the file in errors. beside: where files that it names may lie.
 
     See `load_scene`.
     """
     document = Document(text, name)
     changes = plain(overrides or {}, name)
     merged = _merge(document.data, changes) if changes else document.data
-    data, unread = with_tables(merged, folder)
+    data, unread = with_tables(merged, beside)
     if unread:
         raise _refused(unread, document, name, changes)
     try:
@@ -64,7 +64,11 @@ def parse_scene(
         raise _refused(problems, document, name, changes)
     # A recording keeps the text and the overrides: with the tables among them, it needs no file.
     kept = changes if data is merged else {**changes, "contacts": data["contacts"]}
-    scene._source = Origin(text, name, _yaml_text(changes), _yaml_text(kept))
+    kept_text = _yaml_text(kept)
+    if len(kept_text) > LONGEST_TEXT:
+        most = in_mb(LONGEST_TEXT)
+        raise SceneError(f"{name}: tables and overrides of {in_mb(len(kept_text))} as YAML, expected at most {most}")
+    scene._source = Origin(text, name, _yaml_text(changes), kept_text)
     return scene
 
 

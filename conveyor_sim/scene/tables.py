@@ -1,19 +1,35 @@
 """Reads the tables of contacts that a scene names by the path of a CSV file."""
 
 import csv
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+from conveyor_sim.files import MB, FileError, OutsideError, read_file
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.words import shown
 
 _MOST_ROWS = 100_000
+_MOST_BYTES = 10 * MB
+_ROWS = "expected two numbers a line, overlap and force (m, N)"
+
+OUTSIDE = "the option --outside-tables, or the parameter outside_tables of the node, allows others"
 
 
-def with_tables(data: Any, folder: FilePath | None) -> tuple[Any, list[Problem]]:
+@dataclass(frozen=True)
+class Beside:
+    """Where the files lie that a scene names."""
+
+    folder: FilePath
+    """Of the scene: paths start there."""
+    outside: bool = False
+    """Whether they may lead out of it."""
+
+
+def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
     """The data of a scene with points in place of paths, and what is wrong with the files.
 
-    The very same object comes back if no contact names a file. `folder` is where paths start; None: none can be read.
+    The very same object comes back if no contact names a file. beside: where they lie; None: none can be read.
     """
     contacts = data.get("contacts") if isinstance(data, dict) else None
     if not isinstance(contacts, list):
@@ -26,7 +42,7 @@ def with_tables(data: Any, folder: FilePath | None) -> tuple[Any, list[Problem]]
             read.append(contact)
             continue
         try:
-            read.append({**contact, "table": _points(path, folder)})
+            read.append({**contact, "table": _points(path, beside)})
         except ValueError as error:
             problems.append(Problem(("contacts", index, "table"), f"{shown(path)} given, {error}"))
     if problems or all(one is other for one, other in zip(read, contacts, strict=True)):
@@ -34,17 +50,15 @@ def with_tables(data: Any, folder: FilePath | None) -> tuple[Any, list[Problem]]
     return {**data, "contacts": read}, []
 
 
-def _points(path: str, folder: FilePath | None) -> list[list[float]]:
+def _points(path: str, beside: Beside | None) -> list[list[float]]:
     """Points [overlap, force] of a CSV file. ValueError that says what is wrong."""
-    if folder is None:
+    if beside is None:
         raise ValueError("expected a list of points [overlap, force]: a scene that is no file has no files beside it")
+    content, is_inside = _content(path, beside)
     try:
-        text = (folder / path).read_bytes().decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ValueError("expected a CSV file in UTF-8") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a path"
-        raise ValueError(f"expected a CSV file beside the scene ({folder / path}: {reason})") from None
     points: list[list[float]] = []
     rows = csv.reader(text.splitlines())
     for row in rows:
@@ -56,11 +70,27 @@ def _points(path: str, folder: FilePath | None) -> list[list[float]]:
         except ValueError:
             if not points and rows.line_num == 1:
                 continue  # the names of the columns
-            wrong = f"line {rows.line_num} of it is {shown(','.join(row))}"
-            raise ValueError(f"expected two numbers a line, overlap and force (m, N): {wrong}") from None
+            # What lies elsewhere may be no table but somebody's secret.
+            wrong = f"is {shown(','.join(row))}" if is_inside else "is something else"
+            raise ValueError(f"{_ROWS}: line {rows.line_num} of it {wrong}") from None
         points.append([overlap, force])
         if len(points) > _MOST_ROWS:
             raise ValueError(f"expected at most {_MOST_ROWS} points")
     if not points:
-        raise ValueError("expected two numbers a line, overlap and force (m, N): it has none")
+        raise ValueError(f"{_ROWS}: it has none")
     return points
+
+
+def _content(path: str, beside: Beside) -> tuple[bytes, bool]:
+    """Of a file that a scene names, and whether it lies in the scene's folder. ValueError that says what is wrong."""
+    try:
+        return read_file(FilePath(path), _MOST_BYTES, beside.folder), True
+    except OutsideError:
+        if not beside.outside:
+            raise ValueError(f"which leads out of the scene's folder, expected a CSV file in it; {OUTSIDE}") from None
+    except FileError as error:
+        raise ValueError(f"expected a CSV file in {beside.folder} ({error})") from None
+    try:
+        return read_file(beside.folder / path, _MOST_BYTES), False
+    except FileError as error:
+        raise ValueError(f"expected a CSV file ({error})") from None

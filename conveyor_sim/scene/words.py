@@ -17,7 +17,11 @@ _LONGEST_VALUE = 60
 
 def shown(value: Any) -> str:
     """The value of a field for an error: as YAML, cut short when it is long."""
-    text = in_yaml(value)
+    return cut(in_yaml(value))
+
+
+def cut(text: str) -> str:
+    """A text for an error, cut short when it is long."""
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
 
 

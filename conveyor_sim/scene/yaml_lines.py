@@ -3,16 +3,23 @@
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.constructor import ConstructorError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from conveyor_sim.errors import SceneError
+from conveyor_sim.files import MB, in_mb
 from conveyor_sim.scene.problems import Path, dotted
+from conveyor_sim.scene.words import cut
+
+LONGEST_TEXT = 8 * MB
+"""Bytes of a file. A bottle that is listed by itself takes 40 of them and 8 values: 0.4 ms and 8 kB to read."""
 
 _DEEPEST = 30  # levels; a scene needs 6, an alias that contains itself has no end
-_LARGEST = 1_000_000  # values; a scene of 10 000 bottles needs about 50 000, nested aliases grow without bound
+_LARGEST = 1_000_000  # values; nested aliases grow without bound
+_TOO_MANY = f"too many values for a scene, expected at most {_LARGEST}: a grid of bottles is one entry, not many"
 
 _MERGE = "tag:yaml.org,2002:merge"
 
@@ -26,11 +33,16 @@ class Document:
         self._lines: dict[Path, int] = {(): 1}
         self._size = 0
         self._yaml = YAML(typ="safe", pure=True)
+        self._yaml.Composer = _Composer
+        if len(text) > LONGEST_TEXT:
+            raise SceneError(f"{name}: has {in_mb(len(text))}, expected a scene of at most {in_mb(LONGEST_TEXT)}")
         try:
             root = self._yaml.compose(text)
         except ReaderError as error:
             line = text.count("\n", 0, error.position) + 1
             raise self._error(line, "not valid YAML: a control character that YAML does not allow") from None
+        except _TooManyError as error:
+            raise self._error(error.line, _TOO_MANY) from None
         except MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             raise self._error(mark.line + 1 if mark else 1, f"not valid YAML: {_one_line(error)}") from None
@@ -53,8 +65,10 @@ class Document:
 
     def _build(self, node: Node, path: Path) -> Any:
         self._size += 1
-        if len(path) > _DEEPEST or self._size > _LARGEST:
-            raise self._error(node.start_mark.line + 1, "not a scene: nested too deeply, or too many values")
+        if len(path) > _DEEPEST:
+            raise self._error(node.start_mark.line + 1, "not a scene: nested too deeply")
+        if self._size > _LARGEST:
+            raise self._error(node.start_mark.line + 1, _TOO_MANY)
         if isinstance(node, MappingNode):
             return self._mapping(node, path)
         if isinstance(node, SequenceNode):
@@ -95,9 +109,31 @@ class Document:
     def _scalar(self, node: Node) -> Any:
         try:
             value = self._yaml.constructor.construct_object(node)
+            if isinstance(value, int) and value.bit_length() > 1024:
+                raise ValueError("beyond every float")
         except (ConstructorError, ValueError):
-            raise self._error(node.start_mark.line + 1, f"a value that can't be read: {node.value}") from None
+            line = node.start_mark.line + 1
+            raise self._error(line, f"a value that can't be read: {cut(str(node.value))}") from None
         return value if value is None or isinstance(value, (str, int, float)) else str(node.value)
+
+
+class _TooManyError(Exception):
+    def __init__(self, line: int) -> None:
+        super().__init__()
+        self.line = line
+
+
+class _Composer(Composer):
+    """Stops where a text has too many values, before all of it is in memory."""
+
+    values = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """One value and all in it."""
+        self.values += 1
+        if self.values > _LARGEST:
+            raise _TooManyError(self.parser.peek_event().start_mark.line + 1)
+        return super().compose_node(parent, index)
 
 
 def _one_line(error: MarkedYAMLError) -> str:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conveyor_msgs import srv
 from conveyor_msgs.msg import Line
@@ -16,21 +19,34 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
+from conveyor_sim.checkpoint import sealed
 from conveyor_sim.errors import BagError
 from conveyor_sim.ros.child import Child
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
 FEEDER = "belts/feeder/cmd_speed"
-PAUSED = 2
+PLAYING, PAUSED = 1, 2
 
 
-def save(client: LineClient, path: Path) -> Any:
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the shared node."""
+    return tmp_path_factory.mktemp("checkpoints")
+
+
+@pytest.fixture(scope="module")
+def shared_node(start_node: Callable[..., Child], folder: Path) -> Child:
+    """One node for many tests, with ticks enough for all."""
+    return start_node(duration=1000.0, checkpoint_folder=folder)
+
+
+def save(client: LineClient, path: Path | str) -> Any:
     """The response."""
     return client.call(srv.SaveCheckpoint, "save_checkpoint", path=str(path))
 
 
-def load(client: LineClient, path: Path) -> Any:
+def load(client: LineClient, path: Path | str) -> Any:
     """The response."""
     return client.call(srv.LoadCheckpoint, "load_checkpoint", path=str(path))
 
@@ -51,7 +67,7 @@ def test_what_was_saved_goes_on_to_the_same_bits(
 ) -> None:
     """In the same node, in another one with other threads, and without ROS; each run has a recording of its own."""
     file = tmp_path / "checkpoint"
-    node = start_node(record=tmp_path / "bag", threads=1)
+    node = start_node(record=tmp_path / "bag", threads=1, checkpoint_folder=tmp_path)
     scans(client, 10, 150)
     with client.listen(Line, "line") as lines:
         began = lines.first()
@@ -68,7 +84,7 @@ def test_what_was_saved_goes_on_to_the_same_bits(
     assert client.state() == PAUSED
     assert scans(client, 160, 250) == hashes
     node.stop()
-    node = start_node(threads=2)
+    node = start_node(threads=2, checkpoint_folder=tmp_path)
     assert load(client, file).success
     assert scans(client, 160, 250) == hashes
     node.stop()
@@ -85,10 +101,10 @@ def test_what_was_saved_goes_on_to_the_same_bits(
 
 
 def test_a_running_simulation_is_saved_as_it_runs_and_paused_by_a_load(
-    line: LineClient, shared_node: Child, tmp_path: Path
+    line: LineClient, shared_node: Child, folder: Path
 ) -> None:
     """Time goes back with a load, and on from there."""
-    file = tmp_path / "checkpoint"
+    file = folder / "checkpoint"
     line.step(50)
     line.call(Trigger, "resume")
     saved = save(line, file)
@@ -107,55 +123,150 @@ def test_a_running_simulation_is_saved_as_it_runs_and_paused_by_a_load(
     assert f"loaded {file}: run " in shared_node.log.read_text()
 
 
-def test_what_can_not_be_loaded_leaves_the_run_as_it_is(line: LineClient, tmp_path: Path) -> None:
+def test_what_can_not_be_loaded_leaves_the_run_as_it_is(line: LineClient, folder: Path) -> None:
     """The lockstep under way too: its owner goes on."""
-    (tmp_path / "scene.yaml").write_text("name: a scene\n")
+    (folder / "scene.yaml").write_text("name: a scene\n")
     other = Simulation(load_scene(SMALL_LINE, {"belts": {"table": {"speed": 0.1}}, "duration": 1000.0}))
-    other.save(tmp_path / "other")
+    other.save(folder / "other")
     with line.listen(Line, "line") as lines:
         lines.first()
         answer = line.lockstep(30, run_id="plc")
         assert answer.accepted
         for name, reason in (
-            ("nowhere", "no such file, expected a checkpoint"),
+            ("nowhere", f"no such file, expected a checkpoint in {folder}"),
             ("scene.yaml", "not a checkpoint, expected a file that was saved as one"),
             ("other", "saved from a scene with belts.table.speed: 0.1, which is 0.2 in the scene given; "
                       "expected the same scene"),
         ):  # fmt: skip
-            response = load(line, tmp_path / name)
+            response = load(line, folder / name)
             assert (response.success, response.tick) == (False, 30)
-            assert response.message == f"{tmp_path / name}: {reason}"
+            assert response.message == f"{folder / name}: {reason}"
         assert len(lines.messages) == 1
     assert line.lockstep(30, run_id="plc").state_hash == answer.state_hash  # the stored answer: nothing was reset
     assert line.lockstep(40, run_id="plc", release=True).accepted
 
 
-def test_what_can_not_be_saved_is_told(line: LineClient, tmp_path: Path) -> None:
+def test_what_can_not_be_saved_is_told(line: LineClient, folder: Path) -> None:
     line.step(3)
-    response = save(line, tmp_path / "no" / "file")
+    response = save(line, folder / "no" / "file")
     assert (response.success, response.tick) == (False, 3)
-    assert response.message.startswith(f"{tmp_path / 'no' / 'file'}: can't be written (No such file or directory)")
-    assert "is a folder, expected a file" in save(line, Path()).message
+    assert response.message.startswith(f"{folder / 'no' / 'file'}: can't be written (No such file or directory)")
+    assert "is a folder, expected a file" in save(line, "").message
 
 
-def test_a_load_breaks_off_what_is_under_way(line: LineClient, tmp_path: Path) -> None:
+def test_a_load_breaks_off_what_is_under_way(line: LineClient, folder: Path) -> None:
     """An advance far ahead is answered, and the owner of the lockstep is no longer one."""
     line.step(5)
-    assert save(line, tmp_path / "checkpoint").success
+    assert save(line, folder / "checkpoint").success
     assert line.lockstep(6, run_id="plc").accepted
     wait = line.client(srv.Lockstep, "lockstep").call_async(srv.Lockstep.Request(run_id="plc", target_tick=90_000))
     until(lambda: line.lockstep(0).tick > 6, "the advance to begin")
-    assert load(line, tmp_path / "checkpoint").tick == 5
+    assert load(line, folder / "checkpoint").tick == 5
     answer = until(wait.result, "the answer to the advance")
     assert (answer.accepted, answer.reason) == (False, "a checkpoint was loaded")
     line.step(1)
+
+
+def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(
+    start_node: Callable[..., Child], shared_node: Child, client: LineClient, tmp_path: Path
+) -> None:
+    """A pipe that nobody writes to, a device without end, a header without its fields, arrays cut short, NaN."""
+    shared_node.stop()
+    node = start_node(duration=1000.0, checkpoint_folder=tmp_path)
+    client.step(20)
+    assert save(client, "good").success
+    with np.load(tmp_path / "good") as file:
+        arrays = dict(file)
+    header = json.loads(arrays.pop("header").tobytes())
+    x = arrays["bottles.x"]
+
+    def written(name: str, header: dict[str, Any], **changes: Any) -> str:
+        (tmp_path / name).write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
+        return name
+
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "device").symlink_to("/dev/zero")
+    wrong = [
+        ("pipe", "is a named pipe, not a regular file"),
+        ("device", f"leads out of the folder {tmp_path}"),
+        (
+            written("no versions", {name: header[name] for name in header if name != "versions"}),
+            "header.versions is missing",
+        ),
+        (written("a number", {**header, "scene": 42}), "header.scene is not of its type"),
+        (written("cut short", header, **{"bottles.x": x[:-1]}), "array bottles.x has the shape"),
+        (written("not finite", header, **{"bottles.x": np.full_like(x, np.nan)}), "array bottles.x is not finite"),
+        ("a\nforged line", "path: 'a\\nforged line' given, expected at most 1000 characters that can be printed"),
+    ]
+    client.call(Trigger, "resume")
+    ticks = [0]
+    for path, reason in wrong:
+        response = load(client, path)
+        assert not response.success
+        assert reason in response.message
+        assert "\n" not in response.message
+        ticks.append(response.tick)
+        until(lambda: client.lockstep(0).tick > ticks[-1], "time to pass")
+    assert ticks == sorted(ticks)
+    assert client.state() == PLAYING
+    assert load(client, "good").tick == 20
+    node.stop()
+    assert node.exit_code == 0
+    assert "Traceback" not in node.log.read_text()
+
+
+def test_a_file_is_read_while_the_simulation_goes_on(
+    start_node: Callable[..., Child], client: LineClient, tmp_path: Path
+) -> None:
+    """A step that is asked for later is answered before the file is read; a second file is not read beside it."""
+    node = start_node(checkpoint_folder=tmp_path)
+    client.step(1)
+    with (tmp_path / "large").open("wb") as stream:
+        stream.write(b"PK\x03\x04")
+        stream.seek(480_000_000)
+        stream.write(b"sha256:" + b"0" * 64)
+    answer = client.client(srv.LoadCheckpoint, "load_checkpoint").call_async(srv.LoadCheckpoint.Request(path="large"))
+    refused = load(client, "large")
+    client.step(1)
+    assert not answer.done()
+    assert (refused.message, refused.tick) == ("another checkpoint is being loaded, expected its answer first", 1)
+    response = until(answer.result, "the answer")
+    assert "its checksum does not fit" in response.message
+    assert response.tick == 2
+    node.stop()
+
+
+def test_both_services_keep_to_their_folder(
+    start_node: Callable[..., Child], client: LineClient, tmp_path: Path
+) -> None:
+    """It is made when it is needed, and neither `..` nor an absolute path nor a link leads out of it."""
+    folder, outside = tmp_path / "folder", tmp_path / "outside"
+    outside.mkdir()
+    node = start_node(checkpoint_folder=folder)
+    assert save(client, "good").message == f"saved to {folder / 'good'}"
+    (outside / "file").write_bytes((folder / "good").read_bytes())
+    (folder / "link").symlink_to(outside)
+    for path in ("../outside/file", str(outside / "file"), "link/file", "~/file"):
+        for response in (save(client, path), load(client, path)):
+            assert not response.success
+            assert "~" in path or "leads out of the folder" in response.message
+    assert load(client, folder / "good").success
+    assert [file.name for file in outside.iterdir()] == ["file"]
+    assert {file.name for file in folder.iterdir()} == {"good", "link"}
+    node.stop()
+    node = start_node(checkpoint_folder="")
+    for response in (save(client, "file"), load(client, "file")):
+        assert response.message == (
+            "the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in"
+        )
+    node.stop()
 
 
 def test_a_checkpoint_of_the_end_has_no_way_on_but_a_longer_run(
     start_node: Callable[..., Child], shared_node: Child, client: LineClient, tmp_path: Path
 ) -> None:
     shared_node.stop()
-    node = start_node(record=tmp_path / "bag", duration=0.2)
+    node = start_node(record=tmp_path / "bag", duration=0.2, checkpoint_folder=tmp_path)
     client.step(20)
     assert save(client, tmp_path / "checkpoint").success
     (tmp_path / "bag_1").mkdir()
@@ -168,7 +279,7 @@ def test_a_checkpoint_of_the_end_has_no_way_on_but_a_longer_run(
     node.stop()
     with open_bag(tmp_path / "bag_1") as bag:
         assert bag.line.tick == 20
-    node = start_node(duration=0.3)
+    node = start_node(duration=0.3, checkpoint_folder=tmp_path)
     assert load(client, tmp_path / "checkpoint").tick == 20
     client.step(10)
     node.stop()

@@ -1,12 +1,14 @@
 """Every way a scene can be wrong is answered with one line that names file, line, field, value and expectation."""
 
+import os
 from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.scene import load_scene, parse_scene
+from conveyor_sim.resources import scene_path
+from conveyor_sim.scene import load_scene, parse_scene, yaml_lines
 
 HERE = Path(__file__).parent
 GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")
@@ -70,7 +72,7 @@ def test_folder(tmp_path: Path) -> None:
 
 def test_file_below_a_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(SceneError, match="can't be read: Not a directory"):
+    with pytest.raises(SceneError, match=r"can't be read \(Not a directory\), expected a scene file"):
         load_scene(tmp_path / "file" / "scene.yaml")
 
 
@@ -97,7 +99,7 @@ def test_not_utf_8(tmp_path: Path) -> None:
         ("hello\n", 'plant.yaml:1: "hello" given, expected a mapping with at least the fields name, duration, '),
         ("a: 1\n---\nb: 2\n", "plant.yaml:2: not valid YAML: expected a single document in the stream"),
         ("a: \x01\n", "plant.yaml:1: not valid YAML: a control character that YAML does not allow"),
-        ("a: &a [*a]\n", "plant.yaml:1: not a scene: nested too deeply, or too many values"),
+        ("a: &a [*a]\n", "plant.yaml:1: not a scene: nested too deeply"),
         ("[" * 5000, "plant.yaml:1: not a scene: nested too deeply"),
         ("a: *nowhere\n", "plant.yaml:1: not valid YAML: found undefined alias 'nowhere'"),
     ],
@@ -113,3 +115,40 @@ def test_aliases_that_multiply_are_stopped() -> None:
     levels += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12)]
     with pytest.raises(SceneError, match="too many values"):
         parse_scene("\n".join(levels))
+
+
+def test_a_scene_that_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "huge").open("wb") as stream:
+        stream.truncate(10**8)
+    for path, told in (
+        (tmp_path / "pipe", "is a named pipe, not a regular file, expected a scene file"),
+        (Path("/dev/zero"), "is a device, not a regular file, expected a scene file"),
+        (tmp_path / "huge", "has 100 MB, more than the 8 MB that are read, expected a scene file"),
+        (tmp_path / ("x" * 300), "can't be read (File name too long), expected a scene file"),
+    ):
+        with pytest.raises(SceneError) as error:
+            load_scene(path)
+        assert str(error.value) == f"{path}: {told}"
+
+
+def test_a_name_of_a_scene_may_be_anything(tmp_path: Path) -> None:
+    """What is no regular file is left to the reader, which says what it is."""
+    os.mkfifo(tmp_path / "pipe")
+    assert scene_path(tmp_path / "pipe") == tmp_path / "pipe"
+    for name in ("x" * 5000, "~nobody-of-this-name/scene.yaml", "a\0b", ""):
+        with pytest.raises(SceneError, match="no such scene file"):
+            scene_path(name)
+
+
+def test_a_text_of_too_many_values_is_refused_before_all_of_it_is_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(yaml_lines, "_LARGEST", 1000)
+    with pytest.raises(SceneError, match=r"plant.yaml:1: too many values for a scene"):
+        parse_scene(f"[{'a,' * 1000}", "plant.yaml")  # that it is not closed is not seen any more
+
+
+@pytest.mark.parametrize("number", ["0x" + "f" * 20_000, "9" * 100_000, "0x" + "f" * 300])
+def test_a_number_beyond_all_bounds_is_cut_in_its_sentence(number: str) -> None:
+    with pytest.raises(SceneError) as error:
+        parse_scene(f"seed: {number}", "plant.yaml")
+    assert str(error.value) == f"plant.yaml:1: a value that can't be read: {number[:56]} ..."

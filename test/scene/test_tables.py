@@ -1,11 +1,12 @@
 """Tables of contacts in CSV files: read with the scene, and not needed to read it again."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.scene import load_scene, parse_overrides, parse_scene
+from conveyor_sim.scene import load, load_scene, parse_overrides, parse_scene
 from conveyor_sim.scene.places import Places
 
 GOOD = (Path(__file__).parent / "good.yaml").read_text(encoding="utf-8")
@@ -112,8 +113,73 @@ def test_numbers_that_make_no_table_are_told_as_for_points(tmp_path: Path) -> No
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     path = written(tmp_path, "")
     (tmp_path / "data" / "glass.csv").unlink()
-    with pytest.raises(SceneError, match=r'"data/glass.csv" given, expected a CSV file beside .*No such file'):
+    with pytest.raises(SceneError, match=r'"data/glass.csv" given, expected a CSV file in .* \(no such file\)'):
         load_scene(path)
     (tmp_path / "data" / "glass.csv").mkdir()
-    with pytest.raises(SceneError, match="Is a directory"):
+    with pytest.raises(SceneError, match="is a folder"):
+        load_scene(path)
+
+
+def naming(folder: Path, path: str) -> Path:
+    """A scene in a folder `scenes` that names a table by a path."""
+    (folder / "scenes").mkdir(exist_ok=True)
+    scene = folder / "scenes" / "plant.yaml"
+    scene.write_text(TEXT.replace("data/glass.csv", path), encoding="utf-8")
+    return scene
+
+
+def test_a_table_that_is_no_regular_file_is_refused_at_once(tmp_path: Path) -> None:
+    """A pipe that nobody writes to, a device without end, a link round itself, a file that is too large."""
+    scene = naming(tmp_path, "table")
+    table = tmp_path / "scenes" / "table"
+    os.mkfifo(tmp_path / "scenes" / "pipe")
+    with (tmp_path / "scenes" / "huge").open("wb") as stream:
+        stream.truncate(10**12)
+    for target, told in (
+        ("pipe", "is a named pipe, not a regular file"),
+        ("huge", "has 1000000 MB, more than the 10 MB that are read"),
+        ("table", "can't be read (Too many levels of symbolic links)"),
+    ):
+        table.symlink_to(tmp_path / "scenes" / target)
+        with pytest.raises(SceneError) as error:
+            load_scene(scene)
+        assert str(error.value).endswith(f'"table" given, expected a CSV file in {tmp_path / "scenes"} ({told})')
+        table.unlink()
+    with pytest.raises(SceneError, match=r"expected a CSV file \(is a device, not a regular file\)"):
+        load_scene(naming(tmp_path, "/dev/zero"), outside_tables=True)
+
+
+def test_a_table_lies_below_the_scene_unless_asked_for(tmp_path: Path) -> None:
+    """By `..`, as an absolute path, or by a link."""
+    (tmp_path / "law.csv").write_text("0.001,5\n")
+    (tmp_path / "scenes" / "inner").mkdir(parents=True)
+    (tmp_path / "scenes" / "inner" / "law.csv").write_text("0.002,5\n")
+    (tmp_path / "scenes" / "out").symlink_to(tmp_path / "law.csv")
+    (tmp_path / "scenes" / "in").symlink_to(tmp_path / "scenes" / "inner")
+    for path in ("../law.csv", str(tmp_path / "law.csv"), "out"):
+        scene = naming(tmp_path, path)
+        with pytest.raises(SceneError) as error:
+            load_scene(scene)
+        assert "given, which leads out of the scene's folder, expected a CSV file in it; " in str(error.value)
+        assert "--outside-tables" in str(error.value)
+        assert load_scene(scene, outside_tables=True).contacts[1].table == ((0.001, 5.0),)
+    for path in ("in/law.csv", "inner/../in/law.csv", str(tmp_path / "scenes" / "inner" / "law.csv")):
+        assert load_scene(naming(tmp_path, path)).contacts[1].table == ((0.002, 5.0),)
+
+
+def test_nothing_of_a_file_outside_is_quoted(tmp_path: Path) -> None:
+    (tmp_path / "passwords").write_text("secret:x:0:0\nsecret:y:1:1\n")
+    for asked in (False, True):
+        with pytest.raises(SceneError) as error:
+            load_scene(naming(tmp_path, "../passwords"), outside_tables=asked)
+        assert "secret" not in str(error.value)
+    assert str(error.value).endswith("overlap and force (m, N): line 2 of it is something else")
+
+
+def test_tables_that_no_recording_could_hold_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are kept with the scene as YAML, whose length is limited as that of a scene is."""
+    path = written(tmp_path, "".join(f"{n}e-6,{n}\n" for n in range(1, 1001)))
+    load_scene(path)
+    monkeypatch.setattr(load, "LONGEST_TEXT", 10_000)
+    with pytest.raises(SceneError, match=r"tables and overrides of .* MB as YAML, expected at most 0.01 MB"):
         load_scene(path)

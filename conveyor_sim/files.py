@@ -1,0 +1,128 @@
+"""Files that somebody names: read up to a limit, written in one go, and kept in a folder where that is asked for.
+
+A path may lead to a pipe that nobody writes to, to a device without end, or out of the folder by a link. So a path is
+opened without access first (O_PATH), which has no effect on anything; what was opened is checked, and that is read.
+Nobody can put another file in its place in between.
+"""
+
+import os
+import stat
+from contextlib import suppress
+from pathlib import Path
+from uuid import uuid4
+
+MB = 1_000_000
+
+_KINDS = {
+    stat.S_IFDIR: "is a folder",
+    stat.S_IFIFO: "is a named pipe, not a regular file",
+    stat.S_IFSOCK: "is a socket, not a regular file",
+    stat.S_IFCHR: "is a device, not a regular file",
+    stat.S_IFBLK: "is a device, not a regular file",
+}
+
+
+class FileError(Exception):
+    """Why a file can't be read or written, in words that follow its path: "is a folder"."""
+
+
+class OutsideError(FileError):
+    """It lies outside the folder that it has to be in."""
+
+
+def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
+    """The content of a regular file of at most `most` bytes. Never waits for another process.
+
+    folder: where relative paths start, and which no path may leave, by `..` or by a link; None: anywhere.
+    Raises FileError.
+    """
+    try:
+        found = os.open(_in_folder(path, folder), os.O_PATH | os.O_CLOEXEC)
+        try:
+            _require_below(found, folder)
+            entry = os.fstat(found)
+            if not stat.S_ISREG(entry.st_mode):
+                raise FileError(_KINDS.get(stat.S_IFMT(entry.st_mode), "is not a regular file"))
+            # Some regular files of the kernel wait for news, without O_NONBLOCK.
+            with open(os.open(_of(found), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
+                # It may grow while it is read.
+                content = b"" if entry.st_size > most else (stream.read(most + 1) or b"")
+        finally:
+            os.close(found)
+    except FileNotFoundError:
+        raise FileError("no such file") from None
+    except (OSError, ValueError) as error:
+        raise FileError(f"can't be read ({_reason(error)})") from error
+    size = max(entry.st_size, len(content))
+    if size > most:
+        raise FileError(f"has {in_mb(size)}, more than the {in_mb(most)} that are read")
+    return content
+
+
+def write_file(path: Path, content: bytes, folder: Path | None = None) -> None:
+    """Write a file in one go: it is complete and on the disk, or what was there before is untouched.
+
+    A link of that name is replaced, not followed. folder: as for `read_file`; it is made if it is not there.
+    Raises FileError.
+    """
+    try:
+        if folder is not None:
+            os.makedirs(folder, exist_ok=True)
+        place = _in_folder(path, folder)
+        if os.path.isdir(place):
+            raise FileError("is a folder")
+        parent = os.open(place.parent, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            _require_below(parent, folder)
+            _replace(parent, place.name, content)
+        finally:
+            os.close(parent)
+    except (OSError, ValueError) as error:
+        raise FileError(f"can't be written ({_reason(error)})") from error
+
+
+def in_mb(size: int) -> str:
+    """A size in bytes for a message."""
+    return f"{size / MB:.3g} MB" if size < 1000 * MB else f"{size / MB:.0f} MB"
+
+
+def _replace(parent: int, name: str, content: bytes) -> None:
+    with suppress(FileNotFoundError):
+        kind = stat.S_IFMT(os.stat(name, dir_fd=parent, follow_symlinks=False).st_mode)
+        if kind in _KINDS:
+            raise FileError(_KINDS[kind])
+    unfinished = f".{uuid4().hex}.unfinished"
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+    try:
+        with open(os.open(unfinished, flags, 0o666, dir_fd=parent), "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(unfinished, name, src_dir_fd=parent, dst_dir_fd=parent)
+    finally:
+        with suppress(OSError):
+            os.unlink(unfinished, dir_fd=parent)
+
+
+def _in_folder(path: Path, folder: Path | None) -> Path:
+    """A path as it is opened; FileError for one that leads out of the folder by its words alone."""
+    if folder is None:
+        return path
+    place = Path(os.path.normpath(os.path.join(os.path.abspath(folder), path)))
+    if not any(place.is_relative_to(root) for root in (os.path.abspath(folder), os.path.realpath(folder))):
+        raise OutsideError(f"leads out of the folder {folder}")
+    return place
+
+
+def _require_below(opened: int, folder: Path | None) -> None:
+    """FileError for what turns out to lie elsewhere, links followed."""
+    if folder is not None and not Path(os.readlink(_of(opened))).is_relative_to(os.path.realpath(folder)):
+        raise OutsideError(f"leads out of the folder {folder}")
+
+
+def _of(opened: int) -> str:
+    return f"/proc/self/fd/{opened}"
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or "not a path"
