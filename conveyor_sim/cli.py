@@ -6,13 +6,17 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-from rich.console import Console, RenderableType
-from rich.table import Table
+from conveyor_sim.interrupt import one_line, while_importing
 
-from conveyor_sim.errors import ConveyorError
-from conveyor_sim.progress import COMPILING, ProgressBar, told_if_long
-from conveyor_sim.version import __version__
+with while_importing():
+    import click
+    from rich.console import Console, RenderableType
+    from rich.table import Table
+
+    from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.printable import printable_lines
+    from conveyor_sim.progress import COMPILING, ProgressBar, told_if_long
+    from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
     from conveyor_sim.model import Model
@@ -24,13 +28,14 @@ if TYPE_CHECKING:
 
 
 class _Group(click.Group):
-    """Turns errors meant for the user into one sentence and exit code 1."""
+    """Turns errors meant for the user into one sentence and exit code 1, and Ctrl-C into one line and 130."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with one_line():
+                return super().invoke(ctx)
         except ConveyorError as error:
-            raise click.ClickException(str(error)) from error
+            raise click.ClickException(printable_lines(error)) from error
 
 
 @click.group(cls=_Group)

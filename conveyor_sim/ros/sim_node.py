@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 
-import rclpy
-from rclpy.signals import SignalHandlerOptions
+from conveyor_sim.interrupt import while_importing
 
-from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.node import SimNode
-from conveyor_sim.ros.stop_request import StopRequest
+with while_importing():
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
+    from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.printable import printable_lines
+    from conveyor_sim.ros.node import SimNode
+    from conveyor_sim.ros.stop_request import StopRequest
 
 
 def main() -> None:
@@ -19,7 +23,7 @@ def main() -> None:
         try:
             node = SimNode(on_stop=stop.request)
         except ConveyorError as error:
-            sys.exit(f"sim_node: {error}")
+            sys.exit(f"sim_node: {printable_lines(error)}")
         stop.wait()
         node.close()
         rclpy.shutdown()
