@@ -12,9 +12,13 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.printable import printable
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
+
+SENTENCE = 2000
+"""Characters of an answer."""
 
 
 class CheckpointServices:
@@ -34,15 +38,19 @@ class CheckpointServices:
         return await self._do(self._stepper.load, "loaded", request, response)
 
     async def _do(self, what: Callable[[Path], None], done: str, request: Any, response: Any) -> Any:
-        path = Path(request.path).expanduser().absolute()
+        try:
+            path = Path(request.path).expanduser().absolute()
+        except RuntimeError:  # ~ of somebody who is not there
+            response.message = f"path: {printable(request.path)} given, which has no home folder; expected a path"
+            return response
 
         def between_ticks() -> None:
             # The state that the answer tells of is the one that was saved, not one some ticks later.
             try:
                 what(path)
-                response.success, response.message = True, f"{done} {path}"
+                response.success, response.message = True, f"{done} {printable(path)}"
             except ConveyorError as error:
-                response.message = str(error)
+                response.message = printable(str(error).replace(str(path), printable(path)), SENTENCE)
             simulation = self._stepper.session.simulation
             response.tick, response.time = simulation.tick, to_time(simulation.stamp_ns)
 

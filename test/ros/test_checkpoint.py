@@ -138,6 +138,18 @@ def test_what_can_not_be_saved_is_told(line: LineClient, tmp_path: Path) -> None
     assert "is a folder, expected a file" in save(line, Path()).message
 
 
+@pytest.mark.parametrize("ask", [save, load])
+def test_a_path_is_repeated_in_printable_words(line: LineClient, ask: Callable[..., Any], tmp_path: Path) -> None:
+    """And one with the home of nobody is refused as others are."""
+    forged = ask(line, tmp_path / "\n[ERROR] forged\x1b[2J" / ("x" * 500)).message
+    assert forged.isprintable()
+    assert len(forged) < 500
+    assert ask(line, Path("~nobody_at_all/x")).message == (
+        "path: ~nobody_at_all/x given, which has no home folder; expected a path"
+    )
+    line.step(1)
+
+
 def test_a_load_breaks_off_what_is_under_way(line: LineClient, tmp_path: Path) -> None:
     """An advance far ahead is answered, and the owner of the lockstep is no longer one."""
     line.step(5)
