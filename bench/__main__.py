@@ -7,12 +7,15 @@ import sys
 from pathlib import Path
 from typing import Protocol
 
-import click
+from conveyor_sim.interrupt import one_line, while_importing
 
-from bench import dense, growth, markdown, memory, node, plant, start, targets
-from bench.measure import Effort, say
-from bench.rows import Row, Rows
-from conveyor_sim.machine import PACKAGES, machine
+with while_importing():
+    import click
+
+    from bench import dense, growth, markdown, memory, node, plant, start, targets
+    from bench.measure import Effort, say
+    from bench.rows import Row, Rows
+    from conveyor_sim.machine import PACKAGES, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "performance.md"
@@ -42,6 +45,7 @@ PARTS: dict[str, Part] = {
 
 
 @click.command()
+@one_line()
 @click.argument("parts", nargs=-1, type=click.Choice([*PARTS]))
 @click.option("--quick", is_flag=True, help=f"Little of everything, to see that it works: to {QUICK_FOLDER} only.")
 @click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the tables from the raw numbers.")

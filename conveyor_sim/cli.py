@@ -7,14 +7,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-from rich.console import Console, RenderableType
-from rich.table import Table
+from conveyor_sim.interrupt import one_line, while_importing
 
-from conveyor_sim.errors import ConveyorError
-from conveyor_sim.progress import ProgressBar
-from conveyor_sim.signals import HandledOnce
-from conveyor_sim.version import __version__
+with while_importing():
+    import click
+    from rich.console import Console, RenderableType
+    from rich.table import Table
+
+    from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.printable import printable_lines
+    from conveyor_sim.progress import ProgressBar
+    from conveyor_sim.signals import HandledOnce
+    from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
     from conveyor_sim.model import Model
@@ -29,13 +33,14 @@ OUTSIDE_TABLES = "Let SCENE name tables (CSV files) that lie outside its own fol
 
 
 class _Group(click.Group):
-    """Turns errors meant for the user into one sentence and exit code 1."""
+    """Turns errors meant for the user into one sentence and exit code 1, and Ctrl-C into one line and 130."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with one_line():
+                return super().invoke(ctx)
         except ConveyorError as error:
-            raise click.ClickException(str(error)) from error
+            raise click.ClickException(printable_lines(error)) from error
 
 
 @click.group(cls=_Group)

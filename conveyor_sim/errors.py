@@ -5,6 +5,10 @@ class ConveyorError(Exception):
     """Base of all errors that conveyor_sim raises on purpose."""
 
 
+class Interrupted(ConveyorError):
+    """What was asked for was broken off by Ctrl-C or a request to terminate."""
+
+
 class SceneError(ConveyorError):
     """A scene file that can't be: one line per problem, with file, line, field, value and what was expected."""
 

@@ -180,6 +180,15 @@ class Simulation:
         """Why the next tick would refuse inputs, "" if it would not. source: "fault" for faults."""
         return self._line.refusal(names, values, source)
 
+    @property
+    def waiting(self) -> Sequence[tuple[tuple[str, ...], tuple[float, ...], str]]:
+        """Inputs that wait for the next tick, each with names, values and source."""
+        return self._line.waiting
+
+    def take_waiting(self) -> list[tuple[tuple[str, ...], tuple[float, ...], str]]:
+        """The same, given up: they will not be applied."""
+        return self._line.take_waiting()
+
     def take_outcomes(self) -> list[CommandOutcome]:
         """What became of commands since the last call, in order."""
         return self._line.take_outcomes()

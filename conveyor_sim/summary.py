@@ -24,10 +24,13 @@ from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.printable import printable
 from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3
+SENTENCE = 2000
+"""Characters of one that was recorded."""
 TAKEN = (BOTTLES, SIGNALS, LEDGER, DAMAGE, DAMAGE_EVENT, OUTCOME, GUARD_EVENT)
 
 
@@ -197,11 +200,11 @@ class _Tally:
         elif kind == SIGNALS:
             self._signals = message.values
         elif kind == GUARD_EVENT:
-            self._guard.append((message.kind, message.text))
+            self._guard.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif kind == DAMAGE:
             self._borne = (self._borne or Borne()).with_more(to_columns(DamageColumns, message))
         elif kind == DAMAGE_EVENT:
-            self._passed.append((message.kind, message.text))
+            self._passed.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif kind == LEDGER:
             self._ledger = to_columns(Ledger, message)
         else:
@@ -213,8 +216,8 @@ class _Tally:
         peak = None if self._unknown else float(forces.max(initial=0.0))
         line, model = self._bag.line, _model(self._bag.line)
         return Summary(
-            scene=line.scene_name,
-            bag=str(self._bag.path),
+            scene=printable(line.scene_name),
+            bag=printable(self._bag.path, SENTENCE),
             simulated=self._bag.time(max(0, self._last_tick - int(line.tick))),
             wall=wall,
             fed=self._signal_sum("infeeds/", "/fed"),
@@ -225,7 +228,7 @@ class _Tally:
             loop=self._loop(),
             peak_force=peak,
             peak_force_99=None if self._unknown else float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
-            setting=f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}",
+            setting=printable(f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}", SENTENCE),
             predicted=None if model is None else model.prediction.sentence,
             achieved=None if model is None else achieved(model, peak),
             guard=dict(Counter(kind for kind, _ in self._guard)),
@@ -236,7 +239,7 @@ class _Tally:
             damage_texts=[text for _, text in self._passed[:GUARD_TEXTS]],
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
-            topics={topic: TopicCount(*counts) for topic, counts in self._topics.items()},
+            topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},
         )
 
     def _signal_sum(self, prefix: str, suffix: str) -> int | None:

@@ -6,6 +6,7 @@ Lets the belt run at 0.2 m/s while it carries fewer than ten bottles, and stops 
 conveyor_msgs.
 """
 
+import signal
 import sys
 from contextlib import suppress
 from threading import Thread
@@ -16,14 +17,17 @@ from conveyor_msgs.srv import Lockstep
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
 from rclpy.wait_for_message import wait_for_message
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it at once; it goes on where it was when started again
 
 SCAN = 10  # ticks
 RUN_ID = "lockstep_controller"
 
 
 def main(belt: str, scans: int) -> None:
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node("lockstep_controller")
     client = node.create_client(Lockstep, "lockstep")
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -42,11 +46,14 @@ def main(belt: str, scans: int) -> None:
         return response
 
     try:
-        # A target that has passed is refused, and the refusal tells the present tick.
-        tick = call(Lockstep.Request(run_id=RUN_ID, target_tick=0)).tick
+        # A target that has passed is refused, and the refusal tells the present tick and the simulation's run.
+        present = call(Lockstep.Request(run_id=RUN_ID, target_tick=0))
+        tick, run = present.tick, present.sim_run_id
         speed = 0.2
         for number in range(scans):
-            request = Lockstep.Request(run_id=RUN_ID, target_tick=tick + SCAN, release=number == scans - 1)
+            # It names its run: after a reset of the simulation it is refused, however late it arrives.
+            request = Lockstep.Request(run_id=RUN_ID, target_tick=tick + SCAN, sim_run_id=run)
+            request.release = number == scans - 1
             request.names, request.values = [f"belts/{belt}/cmd_speed"], [speed]
             response = call(request)
             if not response.accepted:

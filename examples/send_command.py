@@ -5,13 +5,16 @@
 Needs ROS 2 and conveyor_msgs.
 """
 
+import signal
 import sys
-from contextlib import suppress
 
 import rclpy
 from conveyor_msgs.msg import CommandOutcome, Commands
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it at once
 
 
 class Sender(Node):
@@ -39,16 +42,13 @@ class Sender(Node):
 
 
 def main(belt: str, speed: str) -> None:
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     sender = Sender(f"belts/{belt}/cmd_speed", float(speed))
     executor = SingleThreadedExecutor()
     executor.add_node(sender)
     print(f"{sender.name}: waiting for the simulation, which answers at its next tick", flush=True)
-    with suppress(KeyboardInterrupt):
-        while sender.outcome is None:
-            executor.spin_once(timeout_sec=0.1)
-    if sender.outcome is None:
-        sys.exit("interrupted: no answer yet (is the node there, and not paused?)")
+    while sender.outcome is None:
+        executor.spin_once(timeout_sec=0.1)
     if not sender.outcome.accepted:
         sys.exit(f"refused at tick {sender.outcome.tick}: {sender.outcome.reason}")
     print(f"applied at tick {sender.outcome.tick}")

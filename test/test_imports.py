@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
-    ["errors", "version", "machine", "signals", "files"],
+    ["errors", "version", "machine", "signals", "files", "interrupt", "printable"],
     ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],

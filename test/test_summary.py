@@ -85,6 +85,17 @@ def test_a_recording_in_other_steps_than_this_version_chooses_has_no_prediction(
     assert summary.peak_force is not None
 
 
+def test_foreign_text_in_a_recording_is_told_in_printable_words(bag: Path, tmp_path: Path) -> None:
+    def forge(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.scene_name = "plant\nguard  nothing to tell\x1b[2J" + "x" * 5000
+            message.dt_reason = "\r\x1b]0;title\x07" + "y" * 5_000_000
+
+    summary = summarize(edited(bag, tmp_path / "forged", forge))
+    assert summary.scene.isprintable() and len(summary.scene) == 200
+    assert summary.setting.isprintable() and len(summary.setting) == 2000
+
+
 def test_messages_and_bytes_are_counted_by_topic(bag: Path) -> None:
     with open_bag(bag) as opened:
         sizes = [len(data) for topic, _, data in opened.raw() if topic == "contacts"]

@@ -37,7 +37,9 @@ DATA = Qos(depth=5)
 LATCHED = Qos(depth=1, durability="transient_local")
 """What is published once: a subscriber that joins late still gets it."""
 COMMANDS = Qos(depth=100)
-"""Commands, their outcomes, what the guard tells, limits that are passed: each one counts."""
+"""Commands, what the guard tells, limits that are passed: each one counts."""
+OUTCOMES = Qos(depth=1000)
+"""As many as one tick may bring (ros/inbox.py)."""
 ALARMS = Qos(depth=100, durability="transient_local")
 """A controller's alarms: who joins late still gets what came and went before."""
 CLOCK = Qos(depth=1)
@@ -55,7 +57,7 @@ QOS = {
     "markers": DATA,
     "line": LATCHED,
     "plant": LATCHED,
-    "outcomes": COMMANDS,
+    "outcomes": OUTCOMES,
     "guard": COMMANDS,
     "alarms": ALARMS,
     "damage_events": COMMANDS,

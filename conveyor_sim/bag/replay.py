@@ -12,7 +12,7 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.outputs import SERIALIZERS, Snapshot
 from conveyor_sim.bag.reader import Bag, Outcome, open_bag, to_outcome
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.line import FAULT, WATCHDOG
+from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 
@@ -150,7 +150,8 @@ class _Replay:
     def _recorded_outcomes(self) -> list[Outcome]:
         if self._outcomes is None:
             return []
-        return [to_outcome(message) for message in self._outcomes.take(self._sim.tick)]
+        outcomes = map(to_outcome, self._outcomes.take(self._sim.tick))
+        return [outcome for outcome in outcomes if outcome.source != ARRIVAL]  # the line never heard of those
 
     def _compare_outcomes(self, recorded: list[Outcome]) -> Difference | None:
         replayed = [Outcome(o.source, o.names, o.values, o.accepted, o.reason) for o in self._sim.take_outcomes()]

@@ -5,6 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.line.process_image import Command
+from conveyor_sim.printable import printable
+
+LISTED = 20
+"""Names that a refusal lists, of those there are."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +28,13 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
     """Why a set of inputs can't be applied, "" if it can. table: those there are; what: the word for one of them."""
     if len(names) != len(values):
         return f"{len(names)} names and {len(values)} values given, expected as many of both"
+    if not names:
+        return f"no name and no value given, expected at least one {what}"
     known = {command.name: command for command in table}
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
         if name not in known:
-            return f"{name}: no such {what}, expected one of {', '.join(known) or 'none: there are none'}"
+            return f"{printable(name)}: no such {what}, expected one of {_listed(list(known))}"
         if name in seen:
             return f"{name}: given twice"
         seen.add(name)
@@ -41,3 +47,14 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
         if not math.isfinite(value) or not command.low <= value <= command.high:
             return f"{name}: {value:g} given, expected {command.low:g} to {command.high:g}{unit}"
     return ""
+
+
+def shown(names: Sequence[str]) -> tuple[str, ...]:
+    """Names that somebody gave, fit to be repeated in an outcome."""
+    return tuple(map(printable, names))
+
+
+def _listed(known: Sequence[str]) -> str:
+    if len(known) <= LISTED:
+        return ", ".join(known) or "none: there are none"
+    return f"{', '.join(known[:LISTED])} and {len(known) - LISTED} others"

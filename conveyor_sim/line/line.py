@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.line.belt import BeltDevice
-from conveyor_sim.line.commands import CommandOutcome, refusal
+from conveyor_sim.line.commands import CommandOutcome, refusal, shown
 from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.part_memory import Unchecked, entries, recall, remembered, typed
+from conveyor_sim.printable import printable
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 
@@ -23,6 +24,9 @@ FAULT = "fault"
 
 WATCHDOG = "watchdog"
 """Source of outcomes that the line itself brings about."""
+
+ARRIVAL = "arrival"
+"""Source of outcomes that tell of commands which never reached the line, many in one."""
 
 _Pending = tuple[tuple[str, ...], tuple[Unchecked, ...], str]
 _Outcome = tuple[int, str, tuple[str, ...], tuple[Unchecked, ...], bool, str]
@@ -84,7 +88,17 @@ class Line:
 
     def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
         """Have inputs applied, or refused, together as the next tick begins."""
-        self._pending.append((tuple(names), tuple(float(value) for value in values), source))
+        self._pending.append((tuple(names), tuple(float(value) for value in values), printable(source)))
+
+    @property
+    def waiting(self) -> Sequence[tuple[tuple[str, ...], tuple[float, ...], str]]:
+        """Inputs that wait for the next tick, each with names, values and source."""
+        return tuple(self._pending)
+
+    def take_waiting(self) -> list[tuple[tuple[str, ...], tuple[float, ...], str]]:
+        """The same, given up: they will not be applied."""
+        waiting, self._pending = self._pending, []
+        return waiting
 
     def refusal(self, names: Sequence[str], values: Sequence[float], source: str) -> str:
         """Why a set of inputs can't be applied, "" if it can."""
@@ -105,7 +119,8 @@ class Line:
             if not reason:
                 for name, value in zip(names, values, strict=True):
                     self._owner[name].command(name, value, self.now)
-            self._outcomes.append(CommandOutcome(tick, source, names, values, not reason, reason))
+            told = shown(names) if reason else names
+            self._outcomes.append(CommandOutcome(tick, source, told, values, not reason, reason))
         for belt in self._belts:
             if name := belt.watch(self.now):
                 self._outcomes.append(CommandOutcome(tick, WATCHDOG, (name,), (0.0,), True, ""))

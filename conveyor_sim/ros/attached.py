@@ -107,9 +107,11 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
             turns.take_call(LOOK)
             if turns.request is None:
                 self._require_going_on(inputs, time.monotonic() > end)
-        if reason := turns.simulation.refusal(turns.request.names, turns.request.values):
+        request = turns.request
+        given = request.names or request.values
+        if given and (reason := turns.simulation.refusal(request.names, request.values)):
             raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
-        return dict(zip(turns.request.names, turns.request.values, strict=True))
+        return dict(zip(request.names, request.values, strict=True))
 
     def note(self, outcomes: Sequence[CommandOutcome]) -> None:
         """What became of commands in the last tick, for the next answer."""
@@ -124,7 +126,7 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         stack.callback(node.destroy_node)
         lines = node.create_publisher(Line, "line", ros_qos(QOS["line"]))
         check_type(node, lines.topic_name, LINE, default_distro())
-        lines.publish(_line(self._turns.simulation))
+        lines.publish(_line(self._turns.simulation, self._turns.run_id))
         spinner = Spinner(context, died=self._died)
         LockstepService(node, spinner.executor, self._turns, FRAME)
         spinner.start(node)
@@ -157,6 +159,8 @@ class _Turns:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
+        self.run_id = uuid.uuid4().hex
+        """As `line` tells it."""
         self._lockstep = Lockstep(LAST_TICK)
         self._answer: Future[LockstepAnswer] = Future()
         self._released = False
@@ -202,7 +206,7 @@ class _Turns:
         try:
             if self._ended or self._released:
                 raise Refused(ENDED if self._ended else "the line was released; the test goes on without a controller")
-            self._answer = self._lockstep.accept(request, self._simulation.tick, LAST_TICK)
+            self._answer = self._lockstep.accept(request, self.run_id, self._simulation.tick, LAST_TICK)
         except Refused as error:
             self.refused = str(error)
             raise
@@ -240,10 +244,10 @@ class _Turns:
             self._answer.set_exception(Refused(ENDED))
 
 
-def _line(simulation: Simulation) -> Line:
+def _line(simulation: Simulation, run_id: str) -> Line:
     """What `line` tells: the test's line, without the scene's end, at which a controller would leave."""
     message = deserialize_message(
-        line_message(simulation, uuid.uuid4().hex, Header(simulation.tick, simulation.stamp_ns, FRAME)), Line
+        line_message(simulation, run_id, Header(simulation.tick, simulation.stamp_ns, FRAME)), Line
     )
     message.overrides = _endless(simulation.scene).overrides_text
     return message

@@ -15,6 +15,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.errors import CheckpointError, ConveyorError
+from conveyor_sim.printable import printable
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
@@ -22,6 +23,8 @@ from conveyor_sim.simulation import Simulation
 
 LONGEST = 1000
 """Characters of a path."""
+SENTENCE = 2000
+"""Characters of an answer."""
 
 
 class CheckpointServices:
@@ -75,8 +78,8 @@ class CheckpointServices:
         if self._folder is None:
             raise CheckpointError("the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in")
         if not text.isprintable() or len(text) > LONGEST:
-            shown = repr(text[:100])
-            raise CheckpointError(f"path: {shown} given, expected at most {LONGEST} characters that can be printed")
+            expected = f"expected at most {LONGEST} characters that can be printed"
+            raise CheckpointError(f"path: {printable(text)} given, {expected}")
         return self._folder, self._folder / text
 
     async def _between_ticks(self, response: Any, what: Callable[[], None], done: str) -> Any:
@@ -86,14 +89,14 @@ class CheckpointServices:
                 what()
                 response.success, response.message = True, done
             except ConveyorError as error:
-                response.message = str(error)
+                response.message = printable(error, SENTENCE)
             self._stamp(response)
 
         await settled(self._executor, self._stepper.call(now))
         return response
 
     async def _refuse(self, response: Any, reason: object) -> Any:
-        response.message = str(reason)
+        response.message = printable(reason, SENTENCE)
         await settled(self._executor, self._stepper.call(lambda: self._stamp(response)))
         return response
 

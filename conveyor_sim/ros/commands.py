@@ -2,29 +2,77 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from conveyor_msgs.msg import Commands
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
 from std_msgs.msg import Float64
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.qos import QOS, Qos
 from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.ros.gaps import Gaps
+from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.stepper import Stepper
+
+UNREADABLE = "not readable as {type}, expected its serialized form"
 
 
 def subscribe_commands(node: Node, stepper: Stepper) -> None:
     """Pass every command on to the simulation, which judges it at the start of the next tick."""
-
-    def on_commands(message: Any) -> None:
-        stepper.command(tuple(message.names), tuple(message.values), "commands")
-
-    def on_speed(name: str, message: Any) -> None:
-        stepper.command((name,), (message.data,), name)
-
-    node.create_subscription(Commands, "commands", on_commands, ros_qos(QOS["commands"]))
+    _Topic(node, stepper, "commands", Commands, QOS["commands"], lambda message: (tuple(message.names), message.values))
     for belt in stepper.session.simulation.model.belts:
         name = speed_command(belt)
-        node.create_subscription(Float64, name, partial(on_speed, name), ros_qos(QOS["cmd_speed"]))
+        _Topic(node, stepper, name, Float64, QOS["cmd_speed"], partial(_speed, name))
+
+
+def _speed(name: str, message: Any) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    return (name,), (message.data,)
+
+
+class _Topic:
+    """One subscription. Its messages are taken as bytes, and looked at before Python objects are made of them."""
+
+    def __init__(
+        self, node: Node, stepper: Stepper, name: str, kind: Any, qos: Qos, read: Callable[[Any], tuple[Any, Any]]
+    ) -> None:
+        self._stepper = stepper
+        self._name = name
+        self._kind = kind
+        self._read = read
+        self._gaps = Gaps()
+        with_info: Any = self._on_bytes  # rclpy looks at the arguments; its hints know of one only
+        self._subscription: Subscription = node.create_subscription(
+            kind,
+            name,
+            with_info,
+            ros_qos(qos),
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
+        )
+
+    def _on_bytes(self, data: bytes, info: dict[str, Any]) -> None:
+        inbox = self._stepper.inbox
+        missing = self._gaps.before(info["publication_sequence_number"], self._subscription.get_publisher_count)
+        if missing:
+            inbox.miss(self._name, missing)
+        inbox.receive()
+        if len(data) > MESSAGE_BYTES:
+            inbox.turn_away(self._name, TOO_LARGE)
+            return
+        try:
+            names, values = self._read(deserialize_message(data, self._kind))
+        except Exception:  # rclpy's errors have no common base, and what was sent may be anything
+            kind = f"{self._kind.__module__.split('.')[0]}/{self._kind.__name__}"
+            inbox.turn_away(self._name, UNREADABLE.format(type=kind))
+            return
+        self._stepper.command(names, tuple(values), self._name, len(data))
+
+    def _on_matched(self, status: Any) -> None:
+        if status.current_count == 0:
+            self._gaps.forget()

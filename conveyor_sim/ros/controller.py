@@ -19,6 +19,7 @@ from rclpy.node import Node
 from conveyor_sim.bag.qos import QOS
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.printable import printable
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
@@ -94,21 +95,26 @@ class ControllerRun:
         while line is None or tick < last:
             if self._line is not line:  # at the start, and after a reset
                 line = self._line
+                # Stale by intent: the refusal tells the present tick, which is not 0 if this controller was restarted.
+                present = self._call(line, 0, {})
+                if self._left(line, present):
+                    continue
                 scanner = self._scanner(line)
                 last = _last_tick(line)
-                # Stale by intent: the refusal tells the present tick, which is not 0 if this controller was restarted.
-                present = self._call(0, {})
                 tick, values = present.tick, present.signals.values
-                log.info(f"controls {line.scene_name} from tick {tick}")
+                log.info(f"controls {printable(line.scene_name)} from tick {tick}")
                 continue
             target = min(tick + self._scan_ticks, last)
             commands = scanner.scan(values, tick, target - tick)
-            response = self._call(target, commands, release=target == last)
+            response = self._call(line, target, commands, release=target == last)
+            if not response.accepted and self._left(line, response):
+                line = None
+                continue
             if not response.accepted:
                 raise ConveyorError(f"lockstep to tick {target} refused: {response.reason}")
             for outcome in response.outcomes:
                 if not outcome.accepted:
-                    log.warning(f"{', '.join(outcome.names)} refused: {outcome.reason}")
+                    log.warning(f"{printable(', '.join(outcome.names))} refused: {printable(outcome.reason, 2000)}")
             tick, values = response.tick, response.signals.values
         log.info(f"ends at tick {tick}")
 
@@ -117,7 +123,7 @@ class ControllerRun:
         self._find(lambda: True)
         free = _FreeScans(self._node, self._scan_ticks, self._scanner, lambda: self._line)
         self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(QOS["signals"]))
-        self._node.get_logger().info(f"controls {self._line.scene_name} as its signals arrive")
+        self._node.get_logger().info(f"controls {printable(self._line.scene_name)} as its signals arrive")
         self._stop.wait()
         if self._error is not None:
             raise self._error
@@ -131,14 +137,26 @@ class ControllerRun:
     def _scanner(self, line: Any) -> Scanner:
         return Scanner(self._make(line), line, self._alarms)
 
-    def _call(self, target: int, commands: Mapping[str, float], release: bool = False) -> Any:
-        """The answer to a request, sent again for as long as there is none: the same request is safe to repeat."""
+    def _left(self, line: Any, response: Any) -> bool:
+        """Whether the simulation is in another run than that of `line`; if so, returns once it has told its line."""
+        if response.sim_run_id == line.run_id:
+            return False
+        while self._line is line:
+            self._require_going_on()
+            time.sleep(LOOK)
+        return True
+
+    def _call(self, line: Any, target: int, commands: Mapping[str, float], release: bool = False) -> Any:
+        """The answer to a request in the run of a line, sent again for as long as there is none: it is safe to repeat,
+        for it names its run and its tick.
+        """
         request = Lockstep.Request(
             run_id=self._run_id,
             target_tick=target,
             names=list(commands),
             values=list(commands.values()),
             release=release,
+            sim_run_id=line.run_id,
         )
         while True:
             self._require_going_on()

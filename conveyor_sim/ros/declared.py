@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.printable import printable
 
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
@@ -32,13 +33,13 @@ class Entry:
         if kind is float and type(value) is int:  # `-p real_time_factor:=2` means 2.0
             value = float(value)
         if type(value) is not kind:
-            return f"{self.name}: {value!r} given, expected {_KINDS[kind]}"
+            return f"{self.name}: {printable(repr(value))} given, expected {_KINDS[kind]}"
         if isinstance(value, (int, float)) and kind is not bool and not self.low <= value <= self.high:
             return f"{self.name}: {value} given, expected {_KINDS[kind]} from {self.low:g} to {self.high:g}"
         return ""
 
     def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows. refusal() judges the type, so that a whole number will do."""
+        """What `ros2 param describe` shows. refusal() judges the type, so that its sentence is told, not rclpy's."""
         descriptor = ParameterDescriptor(description=self.description, read_only=self.fixed, dynamic_typing=True)
         if type(self.default) is float:
             descriptor.floating_point_range = [FloatingPointRange(from_value=self.low, to_value=self.high)]
@@ -55,15 +56,27 @@ def declare_table(node: Node, table: Sequence[Entry]) -> dict[str, Any]:
         value = node.declare_parameter(entry.name, entry.default, ParameterDescriptor(dynamic_typing=True)).value
         if reason := entry.refusal(value):
             raise ConveyorError(f"parameter {reason}")
-        node.set_descriptor(entry.name, entry.descriptor())
         values[entry.name] = type(entry.default)(value)
+        if type(value) is not type(entry.default):
+            node.set_parameters([Parameter(entry.name, value=values[entry.name])])
+        node.set_descriptor(entry.name, entry.descriptor())
 
     entries = {entry.name: entry for entry in table}
+
+    def convert(parameters: list[Parameter]) -> list[Parameter]:
+        """A whole number will do where a number is described, and becomes one."""
+        return [
+            Parameter(given.name, value=float(given.value))
+            if type(given.value) is int and given.name in entries and type(entries[given.name].default) is float
+            else given
+            for given in parameters
+        ]
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
         known = [(entries[parameter.name], parameter.value) for parameter in parameters if parameter.name in entries]
         reasons = [reason for entry, value in known if (reason := entry.refusal(value))]
         return SetParametersResult(successful=not reasons, reason="; ".join(reasons))
 
+    node.add_pre_set_parameters_callback(convert)
     node.add_on_set_parameters_callback(check)
     return values

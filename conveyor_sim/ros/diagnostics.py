@@ -10,6 +10,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.qos import QOS
+from conveyor_sim.printable import printable
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import RosSink, ros_qos
@@ -21,8 +22,8 @@ WALL = "wall time from first to last tick (s)"
 
 
 class Diagnostics:
-    """Level WARN after a second with overruns, refused commands or a word of the guard, and while others on the graph
-    mix with it; ERROR while it can not go on.
+    """Level WARN after a second with overruns, refused or lost commands or a word of the guard, and while others on
+    the graph mix with it; ERROR while it can not go on.
     """
 
     def __init__(self, node: Node, stepper: Stepper, sink: RosSink, graph: GraphWatch) -> None:
@@ -36,6 +37,7 @@ class Diagnostics:
         self._last_run = ""
         self._last_overruns = 0
         self._last_refused = 0
+        self._last_lost = 0
         self._last_guard_events = 0
         # A steady clock: with use_sim_time the node's own would stand still while paused.
         node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -46,10 +48,12 @@ class Diagnostics:
         simulation = session.simulation
         tick, counts = simulation.tick, simulation.counts
         overruns = pacer.overruns - self._last_overruns
-        refused = stepper.refused_commands - self._last_refused
+        counts_in, reception = stepper.inbox.counts, stepper.reception
+        refusals = reception.refused + counts_in.turned_away
+        refused, lost = refusals - self._last_refused, counts_in.lost - self._last_lost
         noticed = stepper.guard_events - self._last_guard_events
         status = DiagnosticStatus(name=self._name, hardware_id=simulation.model.name)
-        status.level, status.message = _verdict(stepper, overruns, refused, noticed)
+        status.level, status.message = _verdict(stepper, overruns, refused, lost, noticed)
         not_alone = self._graph.look()
         if not_alone and status.level != DiagnosticStatus.ERROR:
             status.level = DiagnosticStatus.WARN
@@ -67,11 +71,16 @@ class Diagnostics:
             "steps per tick": simulation.model.steps_per_tick,
             "overruns": pacer.overruns,
             "wall time given up (s)": f"{pacer.lost:.3f}",
-            "refused commands": stepper.refused_commands,
+            "received commands": counts_in.received,
+            "applied commands": reception.applied,
+            "refused commands": refusals,
+            "lost commands": counts_in.lost,
+            "waiting commands": counts_in.waiting,
+            "waiting commands (bytes)": counts_in.waiting_bytes,
             "guard events": stepper.guard_events,
             "ticks in shorter steps": simulation.shortened_ticks,
             "deepest overlap (of a radius)": f"{simulation.deepest_overlap:.3g}",
-            "lockstep owner": stepper.lockstep.owner,
+            "lockstep owner": printable(stepper.lockstep.owner),
             "bottles present": counts.present,
             "bottles fed": counts.fed,
             "bottles removed": counts.removed,
@@ -83,7 +92,7 @@ class Diagnostics:
         message = DiagnosticArray(status=[status])
         message.header.stamp = to_time(simulation.stamp_ns)
         self._publisher.publish(message)
-        self._last_overruns, self._last_refused = pacer.overruns, stepper.refused_commands
+        self._last_overruns, self._last_refused, self._last_lost = pacer.overruns, refusals, counts_in.lost
         self._last_guard_events = stepper.guard_events
 
     def _measured(self, run: str, tick: int, tick_s: float) -> float:
@@ -95,10 +104,11 @@ class Diagnostics:
         return factor
 
 
-def _verdict(stepper: Stepper, overruns: int, refused: int, noticed: int) -> tuple[bytes, str]:
+def _verdict(stepper: Stepper, overruns: int, refused: int, lost: int, noticed: int) -> tuple[bytes, str]:
     if stepper.failure:
         return DiagnosticStatus.ERROR, f"stopped: {stepper.failure}"
     told = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
+    told += [f"{lost} lost commands"] * bool(lost)
     told += [f"{noticed} warnings of the guard"] * bool(noticed)
     if told:
         return DiagnosticStatus.WARN, f"{' and '.join(told)} since the last message"

@@ -10,6 +10,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.line.line import FAULT
+from conveyor_sim.ros.inbox import size_of
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
 
@@ -24,11 +25,13 @@ class FaultService:
 
     async def _inject(self, request: Any, response: Any) -> Any:
         def between_ticks() -> None:
-            simulation = self._stepper.session.simulation
+            stepper, name, value = self._stepper, request.name, request.value
+            simulation, size = stepper.session.simulation, size_of([name], [value])
             response.tick = simulation.tick
-            response.message = self._stepper.standstill or simulation.refusal([request.name], [request.value], FAULT)
+            response.message = stepper.standstill or simulation.refusal([name], [value], FAULT)
+            response.message = response.message or stepper.inbox.admit(size)
             if not response.message:
-                simulation.inject(request.name, request.value)
+                stepper.reception.inject(stepper.session, name, value, size)
                 response.success = True
 
         await settled(self._executor, self._stepper.call(between_ticks))

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.printable import MOST, printable
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -35,6 +36,7 @@ class LockstepRequest:
     names: tuple[str, ...]
     values: tuple[float, ...]
     release: bool
+    sim_run_id: str = ""
 
     def same_as(self, other: LockstepRequest | None) -> bool:
         """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
@@ -42,7 +44,7 @@ class LockstepRequest:
 
     def _key(self) -> tuple[object, ...]:
         bits = struct.pack(f"<{len(self.values)}d", *self.values)
-        return self.run_id, self.target_tick, self.names, bits, self.release
+        return self.run_id, self.target_tick, self.names, bits, self.release, self.sim_run_id
 
 
 @dataclass(frozen=True)
@@ -82,12 +84,13 @@ class Lockstep:
         """The answer, given or still to come, if this is the last accepted request once more."""
         return self._answer if request.same_as(self._last) else None
 
-    def accept(self, request: LockstepRequest, tick: int, last_tick: int) -> Future[LockstepAnswer]:
-        """Take a new request at the present `tick` of a run that ends at `last_tick`; its answer is to be set later.
+    def accept(self, request: LockstepRequest, run: str, tick: int, last_tick: int) -> Future[LockstepAnswer]:
+        """Take a new request; its answer is to be set later. run: the simulation's run id (Line.run_id), which is at
+        `tick` and ends at `last_tick`.
 
         Raises Refused.
         """
-        reason = self._refusal(request, tick, last_tick)
+        reason = self._refusal(request, run, tick, last_tick)
         if reason:
             raise Refused(reason)
         self._owner = "" if request.release else request.run_id
@@ -99,11 +102,18 @@ class Lockstep:
         """Forget the owner and its last request: the simulation was reset."""
         self._owner, self._last, self._answer = "", None, None
 
-    def _refusal(self, request: LockstepRequest, tick: int, last_tick: int) -> str:
+    def _refusal(self, request: LockstepRequest, run: str, tick: int, last_tick: int) -> str:
         if not request.run_id:
             return "run_id is empty; expected the caller's name for its run"
+        if len(request.run_id) > MOST:
+            return f"run_id is {len(request.run_id)} characters long, expected at most {MOST}"
+        if request.sim_run_id not in ("", run):
+            return (
+                f"sim_run_id {printable(request.sim_run_id)} given, but the simulation is in run {run}: it was reset, "
+                "or a checkpoint was loaded"
+            )
         if self._owner and request.run_id != self._owner:
-            return f"the simulation is owned by run {self._owner!r}; expected its release, or a reset"
+            return f"the simulation is owned by run '{printable(self._owner)}'; expected its release, or a reset"
         if self._answer is not None and not self._answer.done():
             return f"the advance to tick {self._last.target_tick if self._last else tick} is still under way"
         if request.target_tick <= tick:

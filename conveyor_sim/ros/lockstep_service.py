@@ -25,6 +25,8 @@ from conveyor_sim.simulation import Simulation
 T = TypeVar("T")
 
 NS = 1_000_000_000
+MOST_WAITING = 100
+"""Requests that wait for an answer at once; one controller has one, sent again a few times."""
 
 
 class Stepped(Protocol):
@@ -32,6 +34,10 @@ class Stepped(Protocol):
 
     @property
     def simulation(self) -> Simulation: ...
+
+    @property
+    def run_id(self) -> str:
+        """Of the present run, as `line` tells it."""
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """From any thread: have a function called in that thread, between two ticks."""
@@ -50,12 +56,28 @@ class LockstepService:
         self._executor = executor
         self._stepper = stepper
         self._frame_id = frame_id
+        self._waiting = 0
         node.create_service(Lockstep, "lockstep", self._serve, callback_group=ReentrantCallbackGroup())
 
     async def _serve(self, request: Any, response: Any) -> Any:
         asked = LockstepRequest(
-            request.run_id, request.target_tick, tuple(request.names), tuple(request.values), request.release
+            request.run_id,
+            request.target_tick,
+            tuple(request.names),
+            tuple(request.values),
+            request.release,
+            request.sim_run_id,
         )
+        if self._waiting >= MOST_WAITING:
+            response.reason = f"{MOST_WAITING} requests wait for their answers already"
+            return self._now(response)
+        self._waiting += 1
+        try:
+            return await self._answer(asked, response)
+        finally:
+            self._waiting -= 1
+
+    async def _answer(self, asked: LockstepRequest, response: Any) -> Any:
 
         def advance() -> Future[LockstepAnswer]:
             try:
@@ -71,11 +93,16 @@ class LockstepService:
             answer = await settled(self._executor, coming)
         except ConveyorError as error:
             response.reason = str(error)
-            response.tick = self._stepper.simulation.tick
-            response.time = to_time(self._stepper.simulation.stamp_ns)
-            return response
+            return self._now(response)
         response.accepted = not response.reason
+        response.sim_run_id = self._stepper.run_id
         self._fill(response, answer)
+        return response
+
+    def _now(self, response: Any) -> Any:
+        response.sim_run_id = self._stepper.run_id
+        response.tick = self._stepper.simulation.tick
+        response.time = to_time(self._stepper.simulation.stamp_ns)
         return response
 
     def _fill(self, response: Any, answer: LockstepAnswer) -> None:

@@ -10,20 +10,24 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-import click
+from conveyor_sim.interrupt import STATUS, one_line, while_importing
 
-from conveyor_sim.bag.recorder import new_run_folder
-from conveyor_sim.compilation import compiling, seconds_to_compile
-from conveyor_sim.errors import ConveyorError
-from conveyor_sim.model import build_model
-from conveyor_sim.progress import ProgressBar, told_if_long
-from conveyor_sim.report import report
-from conveyor_sim.resources import scene_path
-from conveyor_sim.ros.child import Child
-from conveyor_sim.ros.domain import private_domain
-from conveyor_sim.ros.observer import Observer
-from conveyor_sim.ros.stop_request import StopRequest
-from conveyor_sim.scene import load_scene
+with while_importing():
+    import click
+
+    from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.compilation import compiling, seconds_to_compile
+    from conveyor_sim.errors import ConveyorError, Interrupted
+    from conveyor_sim.model import build_model
+    from conveyor_sim.printable import printable_lines
+    from conveyor_sim.progress import ProgressBar, told_if_long
+    from conveyor_sim.report import report
+    from conveyor_sim.resources import scene_path
+    from conveyor_sim.ros.child import Child
+    from conveyor_sim.ros.domain import private_domain
+    from conveyor_sim.ros.observer import Observer
+    from conveyor_sim.ros.stop_request import StopRequest
+    from conveyor_sim.scene import load_scene
 
 LOOK = 0.05  # s of wall time between two looks at the processes
 CONTROLLED = ("feeder", "table")  # belts that plc_node commands unless its parameters say otherwise
@@ -78,7 +82,7 @@ def run_in_lockstep(
                 observer.wait(LOOK)
                 progress.update(observer.time)
         if stop.requested:
-            raise ConveyorError(f"interrupted at {observer.time:.2f} s; what was recorded is in {bag}")
+            raise Interrupted(f"interrupted at {observer.time:.2f} s; what was recorded is in {bag}")
         if plc.exit_code is None or node.exit_code is not None:
             raise ConveyorError(node.obituary())
         if plc.exit_code != 0:
@@ -101,6 +105,7 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 
 
 @click.command()
+@one_line()
 @click.argument("scene", default="paper_plant")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>).")
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
@@ -111,7 +116,8 @@ def main(scene: str, out: Path | None, duration: float | None, outside_tables: b
     try:
         report(bag, run_in_lockstep(scene, bag, duration, outside_tables))
     except ConveyorError as error:
-        sys.exit(f"main job: {error}")
+        print(f"main job: {printable_lines(error)}", file=sys.stderr)
+        sys.exit(STATUS if isinstance(error, Interrupted) else 1)
 
 
 if __name__ == "__main__":

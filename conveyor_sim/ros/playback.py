@@ -11,13 +11,13 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.qos import COMMANDS, LATCHED, QOS, Qos
 from conveyor_sim.bag.reader import Bag, Outcome, to_outcome
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.line import FAULT, WATCHDOG
+from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
 from conveyor_sim.line.process_image import speed_command
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
 """What a node that plays back tells of itself."""
 
-NOT_SENT = frozenset({WATCHDOG, FAULT})
+NOT_SENT = frozenset({WATCHDOG, FAULT, ARRIVAL})
 """Sources of outcomes that nobody sent as a command."""
 
 WALL_CLOCK = 10**18

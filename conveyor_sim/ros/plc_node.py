@@ -10,14 +10,18 @@ from collections.abc import Mapping
 from contextlib import closing, suppress
 from typing import Any
 
-from conveyor_sim.control.level import Count, LevelControl
-from conveyor_sim.control.scan import ControlError, Controller
-from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.process_image import speed_command
-from conveyor_sim.ros.context import new_node, running_ros
-from conveyor_sim.ros.controller import ControllerRun, Stopped
-from conveyor_sim.ros.declared import Entry, declare_table
-from conveyor_sim.ros.stop_request import StopRequest
+from conveyor_sim.interrupt import while_importing
+
+with while_importing():
+    from conveyor_sim.control.level import Count, LevelControl
+    from conveyor_sim.control.scan import ControlError, Controller
+    from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.line.process_image import speed_command
+    from conveyor_sim.printable import printable, printable_lines
+    from conveyor_sim.ros.context import new_node, running_ros
+    from conveyor_sim.ros.controller import ControllerRun, Stopped
+    from conveyor_sim.ros.declared import Entry, declare_table
+    from conveyor_sim.ros.stop_request import StopRequest
 
 SETTINGS = (
     Entry("feeder", "feeder", "Belt that brings bottles to the table."),
@@ -49,7 +53,8 @@ def level_control(line: Any, settings: Mapping[str, Any]) -> Controller:
     for belt in (settings["feeder"], settings["table"]):
         if speed_command(belt) not in line.command_names:
             belts = ", ".join(line.belts) or "no belts"
-            raise ConveyorError(f"belt {belt!r}: not on the line {line.scene_name}, which has {belts}")
+            name = printable(line.scene_name)
+            raise ConveyorError(f"belt '{printable(belt)}': not on the line {name}, which has {printable(belts)}")
     speeds = {name: settings[name] for name in ("feeder", "table", "feeder_speed", "table_slow", "table_fast")}
     count = Count(f"belts/{settings['table']}/bottles")
     try:
@@ -65,7 +70,7 @@ def main() -> None:
             with running_ros():
                 run(stop)
         except ConveyorError as error:
-            sys.exit(f"plc_node: {error}")
+            sys.exit(f"plc_node: {printable_lines(error)}")
 
 
 if __name__ == "__main__":

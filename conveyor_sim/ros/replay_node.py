@@ -20,6 +20,7 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.printable import printable
 from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.context import new_node
 from conveyor_sim.ros.graph_watch import GraphWatch
@@ -122,7 +123,8 @@ class ReplayNode:
             try:
                 kind = message_class(topic.type)
             except (ImportError, AttributeError):
-                self._node.get_logger().warning(f"{topic.name}: left out, {topic.type} is not installed here")
+                left_out, kind_name = printable(topic.name), printable(topic.type)
+                self._node.get_logger().warning(f"{left_out}: left out, {kind_name} is not installed here")
                 continue
             publisher = self._node.create_publisher(kind, topic.name, ros_qos(topic.qos))
             # Bytes are published as they were recorded: of another definition they would be garbage.

@@ -10,7 +10,8 @@ from conveyor_sim.achieved import PeakWatch, achieved
 from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.commands import CommandOutcome, shown
+from conveyor_sim.printable import printable
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stopped import keep_stopped
 
@@ -36,6 +37,7 @@ class Session:
         self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()
         self._peaks = PeakWatch(self.simulation)
+        self._last_outcomes: list[CommandOutcome] = []
 
     @property
     def last_tick(self) -> int:
@@ -49,7 +51,7 @@ class Session:
         try:
             self.simulation.advance(1)
         except SimulationError as error:
-            self.outputs.after_failure()
+            self._last_outcomes = self.outputs.after_failure()
             raise keep_stopped(self.simulation, self.bag, error) from error
         outcomes = self.outputs.after_tick()
         self._peaks.after_tick()
@@ -67,11 +69,21 @@ class Session:
         reached = achieved(simulation.model, self._peaks.force)
         return told if reached is None else f"{told}; {reached.sentence}"
 
+    def take_last_outcomes(self) -> list[CommandOutcome]:
+        """What became of the commands of a tick that failed."""
+        outcomes, self._last_outcomes = self._last_outcomes, []
+        return outcomes
+
+    def tell(self, outcome: CommandOutcome) -> None:
+        """Write an outcome that no tick brought. Raises BagError."""
+        self.outputs.tell(outcome)
+
     def refuse(self, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str) -> None:
         """Tell those who listen that a command came too late to be applied; the recording is closed by then."""
-        tick = self.simulation.tick
-        outcome = CommandOutcome(tick, source, names, values, accepted=False, reason=reason)
-        Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id).tell(outcome)
+        outcome = CommandOutcome(
+            self.simulation.tick, source, shown(names), values, accepted=False, reason=printable(reason, most=2000)
+        )
+        self.outputs.tell(outcome)
 
     def flush(self) -> None:
         """Hand what was recorded to the operating system. Raises BagError."""
@@ -82,4 +94,6 @@ class Session:
         """End the recording; nothing more is recorded. Raises BagError if it can't be completed."""
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
+            # What is still told, of commands that come too late, is told to those who listen.
+            self.outputs = Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
             recorder.close()

@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import sys
 
-from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.stop_request import StopRequest
+from conveyor_sim.interrupt import while_importing
+
+with while_importing():
+    import rclpy
+
+    from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.printable import printable_lines
+    from conveyor_sim.ros.context import start_ros
+    from conveyor_sim.ros.node import SimNode
+    from conveyor_sim.ros.stop_request import StopRequest
 
 
 def main() -> None:
     """Exits with 0 after an orderly end, with 1 and one sentence if the node can't start or go on."""
     with StopRequest() as stop:
-        # Only here: Ctrl-C may come while they are being loaded.
-        import rclpy
-
-        from conveyor_sim.ros.context import start_ros
-        from conveyor_sim.ros.node import SimNode
-
         try:
             start_ros()
             node = SimNode(on_stop=stop.request)
         except ConveyorError as error:
-            sys.exit(f"sim_node: {error}")
+            sys.exit(f"sim_node: {printable_lines(error)}")
         stop.wait()
         node.close()
         rclpy.shutdown()
     if isinstance(node.error, ConveyorError):
-        sys.exit(f"sim_node: {node.error}")
+        sys.exit(f"sim_node: {printable_lines(node.error)}")
     if node.error is not None:
         sys.exit(f"sim_node: {type(node.error).__name__}: {node.error}")
 

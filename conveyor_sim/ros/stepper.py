@@ -19,8 +19,11 @@ from typing import Protocol, TypeVar
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.printable import printable
+from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.pacing import Pacer
+from conveyor_sim.ros.reception import Reception
 from conveyor_sim.ros.session import Session
 from conveyor_sim.simulation import Simulation
 
@@ -87,11 +90,11 @@ class Stepper:
         self._runs = 0  # before this one
         self.state = State.PLAYING if playing else State.PAUSED
         self.failure = ""  # why it can't go on before a reset
-        self.refused_commands = 0
+        self.inbox = Inbox()
+        self.reception = Reception(self.inbox, log.warning)
         self.guard_events = 0
         self.lockstep = Lockstep(lockstep_max_ticks)
         self.pacer = Pacer(real_time_factor, self.session.simulation.model.tick_ns * 1e-9)
-        self._outcomes: list[CommandOutcome] = []  # for the next lockstep answer
         self._advance: _Advance | None = None
         self._ended = False
         self._last_tick_at: float | None = None  # s of wall time; None once the recording has been flushed since
@@ -104,6 +107,11 @@ class Stepper:
     def simulation(self) -> Simulation:
         """That of the present session."""
         return self.session.simulation
+
+    @property
+    def run_id(self) -> str:
+        """That of the present session."""
+        return self.session.run_id
 
     # From any thread
 
@@ -132,15 +140,21 @@ class Stepper:
         self._enqueue(run)
         return future
 
-    def command(self, names: tuple[str, ...], values: tuple[float, ...], source: str) -> None:
-        """Hand a command to the simulation, which applies or refuses it at the start of the next tick."""
+    def command(self, names: tuple[str, ...], values: tuple[float, ...], source: str, size: int) -> None:
+        """Hand a command of so many bytes to the simulation, which applies or refuses it as the next tick starts.
+
+        One for which the queue has no room is turned away (inbox.py).
+        """
+        if reason := self.inbox.admit(size):
+            self.inbox.turn_away(source, reason)
+            return
 
         def hand_over() -> None:
             if reason := self.standstill:  # there is no next tick to refuse it
-                self._refused(source, f"since {reason}")
-                self.session.refuse(names, values, source, reason)
+                self.inbox.release(1, size)
+                self.reception.refuse(self.session, names, values, source, reason)
             else:
-                self.session.simulation.command(names, values, source)
+                self.reception.hand_over(self.session, names, values, source, size)
 
         self._enqueue(hand_over)
 
@@ -188,7 +202,7 @@ class Stepper:
     def save(self, path: Path, folder: Path | None = None) -> None:
         """Write a checkpoint of the present state; the path may not leave the folder. Raises CheckpointError."""
         self.session.simulation.save(path, folder)
-        self._log.info(f"saved tick {self.session.simulation.tick} to {path}")
+        self._log.info(f"saved tick {self.session.simulation.tick} to {printable(path)}")
 
     def load(self, simulation: Simulation, path: Path) -> None:
         """Close this run and its recording and open the next with a Simulation from a checkpoint, PAUSED.
@@ -201,7 +215,7 @@ class Stepper:
         self._enter(session)
         self.state = State.PAUSED
         tick = session.simulation.tick
-        self._log.info(f"loaded {path}: run {session.run_id} from tick {tick}" + _to_bag(session))
+        self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + _to_bag(session))
         if tick >= session.last_tick:
             self._end()
 
@@ -230,14 +244,18 @@ class Stepper:
         if self._advance is not None and not self.lockstep.owner:
             raise Refused(f"an advance to tick {self._advance.target} is still under way")
         simulation = self.session.simulation
-        answer = self.lockstep.accept(request, simulation.tick, self.session.last_tick)
+        size = size_of(request.names, request.values)
+        if size > MESSAGE_BYTES:
+            raise Refused(f"its commands are {TOO_LARGE}")
+        answer = self.lockstep.accept(request, self.session.run_id, simulation.tick, self.session.last_tick)
         if request.names or request.values:
-            simulation.command(request.names, request.values, "lockstep")
+            self.inbox.receive()
+            self.inbox.occupy(1, size)  # even if the queue is full: the advance is what empties it
+            self.reception.hand_over(self.session, request.names, request.values, "lockstep", size)
         self.pacer.catch_breath(time.monotonic())
 
         def done() -> None:
-            outcomes, self._outcomes = tuple(self._outcomes), []
-            answer.set_result(LockstepAnswer.of(simulation, outcomes))
+            answer.set_result(LockstepAnswer.of(simulation, self.reception.take_kept(simulation.tick)))
 
         self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
@@ -250,11 +268,13 @@ class Stepper:
         """End this run, whatever is under way in it."""
         self._abandon(reason)
         self.lockstep.clear()
-        self._outcomes.clear()
+        self.reception.forget_kept()
         self._close_recording()
+        self.reception.give_up(self.session, reason)
 
     def _enter(self, session: Session) -> None:
         self.session = session
+        self.reception.begin(session)
         self.failure, self._ended = "", False
         self.pacer.restart()
 
@@ -278,7 +298,8 @@ class Stepper:
         if self._advance is not None:
             raise Refused(f"an advance to tick {self._advance.target} is still under way")
         if self.lockstep.owner:
-            raise Refused(f"run {self.lockstep.owner!r} owns the simulation; expected its release, or a reset")
+            owner = printable(self.lockstep.owner)
+            raise Refused(f"run '{owner}' owns the simulation; expected its release, or a reset")
 
     # The loop
 
@@ -292,12 +313,14 @@ class Stepper:
             if not self._ended and self.session.simulation.tick > 0:
                 self._log.info(f"stopped, {self.session.account}" + _to_bag(self.session))
             self._close_recording()
+            self.reception.give_up(self.session, "the simulation is shutting down")
 
     def _loop(self) -> None:
         while not self._quit:
             while self._calls:
                 self._calls.popleft()()
             now = time.monotonic()
+            self._tell_of_arrivals(now)
             wait = self._seconds_to_tick(now)
             if wait == 0.0:
                 self._tick()
@@ -327,6 +350,7 @@ class Stepper:
         try:
             outcomes = self.session.tick()
         except Exception as error:
+            self.reception.take_account(self.session.take_last_outcomes())
             self._fail(error)
             return
         self._note(outcomes)
@@ -342,19 +366,26 @@ class Stepper:
             advance.done()
 
     def _note(self, outcomes: list[CommandOutcome]) -> None:
-        for outcome in outcomes:
-            if not outcome.accepted:
-                self._refused(outcome.source, f"at tick {outcome.tick}: {outcome.reason}")
+        self.reception.take_account(outcomes)
         for event in self.session.outputs.take_noticed():
             self.guard_events += 1
             self._log.warning(f"guard: {event.text}")
+        self._keep(outcomes)
+
+    def _keep(self, outcomes: list[CommandOutcome]) -> None:
+        """For the next lockstep answer, if there is one to come."""
         in_lockstep = self._advance is not None and self._advance.paced
         if in_lockstep or self.lockstep.owner:
-            self._outcomes += outcomes
+            self.reception.keep(outcomes)
 
-    def _refused(self, source: str, reason: str) -> None:
-        self.refused_commands += 1
-        self._log.warning(f"{source} refused {reason}")
+    def _tell_of_arrivals(self, now: float) -> None:
+        notes = self.reception.notes(self.session.simulation.tick, now)
+        try:
+            for note in notes:
+                self.session.tell(note)
+        except ConveyorError as error:
+            self._fail(error)
+        self._keep(notes)
 
     def _end(self) -> None:
         self.state, self._ended = State.PAUSED, True

@@ -15,18 +15,21 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import click
-from page_parts import with_parts
+from conveyor_sim.interrupt import one_line, while_importing
 
-from conveyor_sim.accuracy.candidates import preset_setting
-from conveyor_sim.accuracy.files import STUDY, read_study
-from conveyor_sim.accuracy.results import Point, Study
-from conveyor_sim.accuracy.setting import with_setting
-from conveyor_sim.accuracy.tables import markdown
-from conveyor_sim.accuracy.words import duration, percent
-from conveyor_sim.model import build_model
-from conveyor_sim.presets import PRESETS, table
-from conveyor_sim.scene import Scene, load_scene
+with while_importing():
+    import click
+    from page_parts import with_parts
+
+    from conveyor_sim.accuracy.candidates import preset_setting
+    from conveyor_sim.accuracy.files import STUDY, read_study
+    from conveyor_sim.accuracy.results import Point, Study
+    from conveyor_sim.accuracy.setting import with_setting
+    from conveyor_sim.accuracy.tables import markdown
+    from conveyor_sim.accuracy.words import duration, percent
+    from conveyor_sim.model import build_model
+    from conveyor_sim.presets import PRESETS, table
+    from conveyor_sim.scene import Scene, load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy.md"
@@ -128,6 +131,7 @@ def preset_point(study: Study, scene: Scene, preset: str) -> Point | None:
 
 
 @click.command()
+@one_line()
 @click.argument("scenes", nargs=-1, type=click.Choice(SCENES))
 @click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the tables.")
 def main(scenes: tuple[str, ...], only_tables: bool) -> None:

@@ -14,20 +14,22 @@ import sys
 from functools import partial
 from pathlib import Path
 
-import click
+from conveyor_sim.interrupt import one_line, while_importing
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test"), str(Path(__file__).parent)]
 
-import stability_guard  # noqa: E402
-import stability_hour  # noqa: E402
-import stability_kills  # noqa: E402
-import stability_limits  # noqa: E402
-import stability_matrix  # noqa: E402
-from hard_cases.case import read_table  # noqa: E402
-from stability_page import page, picture  # noqa: E402
+with while_importing():
+    import click
+    import stability_guard
+    import stability_hour
+    import stability_kills
+    import stability_limits
+    import stability_matrix
+    from hard_cases.case import read_table
+    from stability_page import page, picture
 
-from conveyor_sim.machine import machine  # noqa: E402
+    from conveyor_sim.machine import machine
 
 PAGE = ROOT / "docs" / "stability.md"
 FOLDER = ROOT / "docs" / "stability"
@@ -35,6 +37,7 @@ ROWS = tuple(case.name for case in read_table())
 
 
 @click.command()
+@one_line()
 @click.argument("rows", nargs=-1, type=click.Choice(ROWS))
 @click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the page.")
 def main(rows: tuple[str, ...], only_tables: bool) -> None:

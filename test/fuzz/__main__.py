@@ -13,16 +13,19 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import click
-from fuzz.attack import TARGETS, attack_of
-from fuzz.case import load_case
-from fuzz.play import play
-from fuzz.report import Figures
-from fuzz.worker import CURRENT, RESULT
-from rich.console import Console
+from conveyor_sim.interrupt import one_line, while_importing
 
-from conveyor_sim.bag.recorder import new_run_folder
-from conveyor_sim.progress import ProgressBar
+with while_importing():
+    import click
+    from fuzz.attack import TARGETS, attack_of
+    from fuzz.case import load_case
+    from fuzz.play import play
+    from fuzz.report import Figures
+    from fuzz.worker import CURRENT, RESULT
+    from rich.console import Console
+
+    from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.progress import ProgressBar
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs" / "stability"
@@ -36,6 +39,7 @@ SILENCE = 400.0
 
 
 @click.command()
+@one_line()
 @click.option("--minutes", default=10.0, show_default=True, help="How long, wall time.")
 @click.option("--seed", default=0, show_default=True, help="Of the first portion; the next has the next seed.")
 @click.option(

@@ -10,7 +10,7 @@ import numpy as np
 from fuzz.crossing import crossed
 from numpy.typing import NDArray
 
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.commands import CommandOutcome, shown
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.contacts import Contact
@@ -192,7 +192,8 @@ class _ExpectedBelts:
 
     def check(self, sent: list[tuple[tuple[str, ...], tuple[float, ...]]], outcomes: list[CommandOutcome]) -> None:
         tick = self._sim.tick - 1
-        told = [(tick, names, accepted) for names, accepted in ((names, self._valid(names, v)) for names, v in sent)]
+        judged = [(names, self._valid(names, values)) for names, values in sent]
+        told = [(tick, names if accepted else shown(names), accepted) for names, accepted in judged]
         for names, values in sent:
             if self._valid(names, values):
                 for name, value in zip(names, values, strict=True):
@@ -212,7 +213,7 @@ class _ExpectedBelts:
             raise Violation("belts", f"{belts} at tick {self._sim.tick}, expected {self._speeds}")
 
     def _valid(self, names: tuple[str, ...], values: tuple[float, ...]) -> bool:
-        if len(names) != len(values) or len(set(names)) < len(names) or not set(names) <= set(self._names):
+        if not names or len(names) != len(values) or len(set(names)) < len(names) or not set(names) <= set(self._names):
             return False
         limits = [self._limits[self._names[name]] for name in names]
         return all(low <= value <= high for (low, high), value in zip(limits, values, strict=True))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import base, belt, bottle, simulation
 
-from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.commands import refusal, shown
 from conveyor_sim.line.process_image import Command, Signal, switch
 from conveyor_sim.simulation import Simulation
 
@@ -72,20 +72,23 @@ def test_switches_and_counts(name: str, value: float, reason: str) -> None:
         (["belts/one/cmd_speed"] * 2, [0.1, 0.2], "belts/one/cmd_speed: given twice"),
         (["belts/one/cmd_speed"], [0.1, 0.2], "1 names and 2 values given, expected as many of both"),
         (["belts/one/cmd_speed"], [], "1 names and 0 values given, expected as many of both"),
+        ([], [], "no name and no value given, expected at least one command"),
+        (["belts/one\x1b[2J\nfake"], [0.1], f"belts/one\\x1b[2J\\nfake: {UNKNOWN}"),
+        (["x" * 5_000_000], [0.1], f"{'x' * 199}…: {UNKNOWN}"),
     ],
 )  # fmt: skip
 def test_what_is_refused_and_why(names: list[str], values: list[float], reason: str) -> None:
     """And the belts keep their speeds, also the one whose own value was good."""
     assert refusal(COMMANDS, "command", names, values) == reason
     sim = two_belts()
-    if names != ["belts/two/cmd_speed"]:
+    if names and names != ["belts/two/cmd_speed"]:
         names, values = ["belts/two/cmd_speed", *names], [0.7, *values]
     sim.command(names, values, source="test")
     sim.advance()
     (outcome,) = sim.take_outcomes()
     assert not outcome.accepted
     assert outcome.reason.split(":")[0] == reason.split(":")[0] or "names and" in outcome.reason
-    assert (outcome.tick, outcome.source, outcome.names) == (0, "test", tuple(names))
+    assert (outcome.tick, outcome.source, outcome.names) == (0, "test", shown(names))
     np.testing.assert_array_equal(outcome.values, values)
     assert sim.belts().commanded.tolist() == [0.2, 0.3]
     assert sim.belts().actual.tolist() == [0.2, 0.3]
@@ -95,7 +98,6 @@ def test_the_limits_themselves_are_accepted() -> None:
     names = [command.name for command in COMMANDS]
     assert refusal(COMMANDS, "command", names, [command.low for command in COMMANDS]) == ""
     assert refusal(COMMANDS, "command", names, [command.high for command in COMMANDS]) == ""
-    assert refusal(COMMANDS, "command", [], []) == ""
 
 
 def test_a_command_takes_effect_at_the_next_tick_and_says_at_which() -> None:
@@ -132,3 +134,23 @@ def test_without_belts_there_is_nothing_to_command() -> None:
     sim.command(["belts/one/cmd_speed"], [0.1])
     sim.advance()
     assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected one of none: there are none"
+
+
+def test_a_refusal_lists_some_of_many_names() -> None:
+    many = [switch(f"gates/{number}/open") for number in range(500)]
+    reason = refusal(many, "command", ["gates/500/open"], [1.0])
+    assert reason.endswith("gates/19/open and 480 others")
+
+
+def test_what_is_refused_is_repeated_in_printable_words_once_and_for_all() -> None:
+    """The outcome's own words are refused in the same words again, so that a recording with them can be replayed."""
+    sim = two_belts()
+    sim.command(["\x1b[31m\u202e" + "ü" * 300], [math.nan], "plc\r\n")
+    sim.advance()
+    (outcome,) = sim.take_outcomes()
+    assert all(text.isprintable() for text in (*outcome.names, outcome.source, outcome.reason))
+    assert len(outcome.names[0]) == 200
+    sim.command(outcome.names, outcome.values, outcome.source)
+    sim.advance()
+    (again,) = sim.take_outcomes()
+    assert (again.names, again.source, again.reason) == (outcome.names, outcome.source, outcome.reason)

@@ -154,6 +154,15 @@ def test_what_can_not_be_saved_is_told(line: LineClient, folder: Path) -> None:
     assert "is a folder, expected a file" in save(line, "").message
 
 
+@pytest.mark.parametrize("ask", [save, load])
+def test_a_path_is_repeated_in_printable_words(line: LineClient, ask: Callable[..., Any]) -> None:
+    forged = ask(line, "\n[ERROR] forged\x1b[2J" + "x" * 500).message
+    assert forged.isprintable()
+    assert len(forged) < 500
+    assert not ask(line, "~nobody_at_all/x").success
+    line.step(1)
+
+
 def test_a_load_breaks_off_what_is_under_way(line: LineClient, folder: Path) -> None:
     """An advance far ahead is answered, and the owner of the lockstep is no longer one."""
     line.step(5)

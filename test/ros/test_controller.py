@@ -118,3 +118,16 @@ def test_a_scan_that_fails_ends_it_with_a_sentence(start_controller: StartContro
     controller = start_controller(controller="conveyor_sim.control.jam:JamAlarm", parameters=JAM)
     until(lambda: controller.exit_code is not None, "the end of the controller")
     assert "controller_node: scan at tick 0: outfeeds/out/removed: no such signal" in controller.log.read_text()
+
+
+def test_a_reset_in_the_middle_of_a_scan_makes_it_begin_anew(
+    start_controller: StartController, line: LineClient
+) -> None:
+    """Its scan was of the run before: it goes on in the new one, and nothing of the old one is carried out there."""
+    controller = start_controller(scan_ticks=1)
+    until(lambda: line.lockstep(0, run_id="look").tick > 30, "some scans")
+    line.reset()
+    until(lambda: controller.log.read_text().count("from tick 0") == 2, "another beginning")
+    before = line.lockstep(0, run_id="look").tick
+    until(lambda: line.lockstep(0, run_id="look").tick > before + 30, "more scans")
+    assert controller.exit_code is None

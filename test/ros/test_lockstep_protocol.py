@@ -9,6 +9,7 @@ import pytest
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 
 END = 1000
+RUN = "5ee2"
 
 
 def request(target: int, run_id: str = "plc", speed: float = 0.1, release: bool = False) -> LockstepRequest:
@@ -16,7 +17,7 @@ def request(target: int, run_id: str = "plc", speed: float = 0.1, release: bool 
 
 
 def answer_to(lockstep: Lockstep, asked: LockstepRequest, tick: int) -> Future[LockstepAnswer]:
-    coming = lockstep.accept(asked, tick, END)
+    coming = lockstep.accept(asked, RUN, tick, END)
     coming.set_result(LockstepAnswer(asked.target_tick, 0, np.zeros(0), 0, ()))
     return coming
 
@@ -29,7 +30,7 @@ def test_a_repeated_request_gets_the_same_answer() -> None:
 
 def test_a_request_repeated_before_its_answer_waits_for_it() -> None:
     lockstep = Lockstep(100)
-    coming = lockstep.accept(request(10), 0, END)
+    coming = lockstep.accept(request(10), RUN, 0, END)
     assert lockstep.repeated(request(10)) is coming
     assert not coming.done()
 
@@ -76,16 +77,16 @@ def test_refusals_say_why_and_change_nothing(asked: LockstepRequest, reason: str
     lockstep = Lockstep(100)
     coming = answer_to(lockstep, request(10), 0)
     with pytest.raises(Refused, match=reason):
-        lockstep.accept(asked, 10, END)
+        lockstep.accept(asked, RUN, 10, END)
     assert lockstep.owner == "plc"
     assert lockstep.repeated(request(10)) is coming
 
 
 def test_a_second_request_during_the_advance_is_refused() -> None:
     lockstep = Lockstep(100)
-    lockstep.accept(request(10), 0, END)
+    lockstep.accept(request(10), RUN, 0, END)
     with pytest.raises(Refused, match="the advance to tick 10 is still under way"):
-        lockstep.accept(request(20), 5, END)
+        lockstep.accept(request(20), RUN, 5, END)
 
 
 def test_after_a_release_another_may_own_it() -> None:

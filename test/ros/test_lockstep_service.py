@@ -93,6 +93,34 @@ def test_a_reset_clears_the_owner(line: LineClient) -> None:
     assert response.tick == 10
 
 
+def test_a_request_of_the_run_before_a_reset_is_refused_as_such(line: LineClient) -> None:
+    """And one that names the run that is under way now is carried out."""
+    first = line.lockstep(10, names=[FEEDER], values=[0.25])
+    again = {"names": [FEEDER], "values": [0.25], "sim_run_id": first.sim_run_id}
+    line.reset()
+    late = line.lockstep(10, **again)
+    assert not late.accepted
+    assert late.tick == 0
+    assert late.sim_run_id not in ("", first.sim_run_id)
+    assert late.reason == (
+        f"sim_run_id {first.sim_run_id} given, but the simulation is in run {late.sim_run_id}: it was reset, "
+        "or a checkpoint was loaded"
+    )
+    assert line.lockstep(10, **(again | {"sim_run_id": late.sim_run_id})).state_hash == first.state_hash
+
+
+def test_what_no_controller_sends_is_refused_in_short(line: LineClient) -> None:
+    long = line.lockstep(10, run_id="x" * 5_000_000)
+    assert long.reason == "run_id is 5000000 characters long, expected at most 200"
+    large = line.lockstep(10, names=["x" * 300_000], values=[0.0])
+    assert large.reason == "its commands are larger than 262144 bytes, expected at most that for one command"
+    assert (long.accepted, large.accepted, large.tick) == (False, False, 0)
+    assert line.lockstep(10, run_id="\x1b[2J\n").accepted
+    assert line.lockstep(20, run_id="plc").reason == (
+        "the simulation is owned by run '\\x1b[2J\\n'; expected its release, or a reset"
+    )
+
+
 def test_a_reset_breaks_off_an_advance(line: LineClient) -> None:
     request = srv.Lockstep.Request(run_id="test", target_tick=10**5)
     future = line.client(srv.Lockstep, "lockstep").call_async(request)

@@ -85,7 +85,7 @@ def test_an_interrupted_job_leaves_a_whole_bag_and_no_process(tmp_path: Path, nu
     job, processes = start_main_job(tmp_path / "bag")
     job.send_signal(number)
     output, _ = job.communicate(timeout=60)
-    assert job.returncode == 1
+    assert job.returncode == 130
     assert "main job: interrupted at " in output
     assert f"what was recorded is in {tmp_path / 'bag'}" in output
     assert not any(Path(f"/proc/{process}").exists() for process in processes.values())

@@ -49,3 +49,7 @@ def test_a_value_that_cannot_be_is_refused_with_the_reason(name: str, value: obj
 
 def test_a_whole_number_will_do_where_a_number_is_expected() -> None:
     assert ENTRIES["real_time_factor"].refusal(2) == ""
+
+
+def test_a_long_text_is_refused_in_short() -> None:
+    assert len(ENTRIES["real_time_factor"].refusal("x\n" * 1_000_000)) < 300

@@ -1,0 +1,71 @@
+"""Ctrl-C ends a command with one line and the status that a shell gives it, never with a traceback.
+
+Imported before anything heavy, so that it holds while that is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+STATUS = 130
+"""128 and the number of SIGINT, as shells have it."""
+AGAIN = 0.05
+"""s of wall time after which an interrupt that was lost comes again."""
+
+
+@contextmanager
+def while_importing() -> Iterator[None]:
+    """End at once on Ctrl-C: nothing is under way yet, and modules half imported may swallow a KeyboardInterrupt."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals are only the main thread's to handle
+        return
+    before = signal.signal(signal.SIGINT, _end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def one_line() -> Iterator[None]:
+    """End the program in order on Ctrl-C, files closed and children ended; a second Ctrl-C ends it at once.
+
+    Raises SystemExit.
+    """
+    before, lost = sys.unraisablehook, False
+
+    def not_lost(unraisable: sys.UnraisableHookArgs) -> None:
+        # Where Python can't raise, in the compiler's callbacks for one, it comes again a little later.
+        nonlocal lost
+        if unraisable.exc_type is KeyboardInterrupt:
+            lost = True
+            signal.signal(signal.SIGALRM, signal.default_int_handler)
+            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = not_lost
+    try:
+        yield
+    except (KeyboardInterrupt, Exception) as error:
+        if not (lost or isinstance(error, KeyboardInterrupt)):
+            raise
+        # A callback that was broken off makes others fail: still the same interrupt.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        print("interrupted", file=sys.stderr)
+        raise SystemExit(STATUS) from None
+    finally:
+        if lost:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = before
+
+
+def _end(_number: int, _frame: FrameType | None) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(STATUS)

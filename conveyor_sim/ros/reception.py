@@ -1,0 +1,131 @@
+"""Commands on their way into the line and what came of them, told in bounded words. For the stepping thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
+from conveyor_sim.ros.inbox import Inbox, size_of
+from conveyor_sim.ros.session import Session
+
+PERIOD = 1.0
+"""s of wall time between two accounts of what was turned away, and between two counts of refusals not logged."""
+LINES = 10
+"""Refusals that are logged one by one in such a time."""
+KEPT = 1000
+"""Outcomes that are kept for the next lockstep answer."""
+
+
+class Reception:
+    """Hands commands over to a session, and counts, logs and keeps what became of them."""
+
+    def __init__(self, inbox: Inbox, warn: Callable[[str], object]) -> None:
+        self._inbox = inbox
+        self._warn = warn
+        self.applied = 0
+        self.refused = 0
+        """Of those that reached the queue."""
+        self._handed = self._handed_bytes = 0
+        self._kept: list[CommandOutcome] = []
+        self._dropped = 0  # of those that would have been kept
+        self._lines = self._unsaid = 0
+        self._since = -PERIOD  # s of wall time, when lines were counted from 0
+        self._told = -PERIOD
+
+    def hand_over(
+        self, session: Session, names: tuple[str, ...], values: tuple[float, ...], source: str, size: int
+    ) -> None:
+        """Have the next tick judge a command that was admitted with so many bytes."""
+        session.simulation.command(names, values, source)
+        self._handed += 1
+        self._handed_bytes += size
+
+    def inject(self, session: Session, name: str, value: float, size: int) -> None:
+        """Likewise a fault."""
+        session.simulation.inject(name, value)
+        self._handed += 1
+        self._handed_bytes += size
+
+    def refuse(
+        self, session: Session, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str
+    ) -> None:
+        """Refuse a command for which there is no tick."""
+        self.refused += source != FAULT
+        self._log(f"{source} refused since {reason}")
+        session.refuse(names, values, source, reason)
+
+    def begin(self, session: Session) -> None:
+        """Another run: what waits in it came from a checkpoint."""
+        waiting = session.simulation.waiting
+        for _, _, source in waiting:
+            if source != FAULT:
+                self._inbox.receive()
+        self._handed = len(waiting)
+        self._handed_bytes = sum(size_of(names, values) for names, values, _ in waiting)
+        self._inbox.occupy(self._handed, self._handed_bytes)
+
+    def take_account(self, outcomes: Sequence[CommandOutcome]) -> None:
+        """After a tick: nothing waits in the line any more."""
+        self._release()
+        for outcome in outcomes:
+            if not outcome.accepted:
+                self.refused += outcome.source != FAULT
+                self._log(f"{outcome.source} refused at tick {outcome.tick}: {outcome.reason}")
+            elif outcome.source not in (WATCHDOG, FAULT):
+                self.applied += 1
+
+    def give_up(self, session: Session, reason: str) -> None:
+        """Refuse what waits for a tick that will not come; the recording is closed by then."""
+        for names, values, source in session.simulation.take_waiting():
+            self.refuse(session, names, values, source, reason)
+        self._release()
+
+    def notes(self, tick: int, now: float) -> list[CommandOutcome]:
+        """Outcomes, many commands in one, of what never reached the queue; `now`: s of wall time."""
+        self._count_lines(now)
+        if now < self._told + PERIOD or not (notes := self._inbox.take_notes()):
+            return []
+        self._told = now
+        for note in notes:
+            self._warn(note)
+        return [CommandOutcome(tick, ARRIVAL, (), (), False, note) for note in notes]
+
+    # For the answers of lockstep
+
+    def keep(self, outcomes: Sequence[CommandOutcome]) -> None:
+        """Keep outcomes for the next answer, as many as it may hold."""
+        room = KEPT - len(self._kept)
+        self._kept += outcomes[:room]
+        self._dropped += max(0, len(outcomes) - room)
+
+    def take_kept(self, tick: int) -> tuple[CommandOutcome, ...]:
+        """For an answer; the last one says how many more there were."""
+        kept = self._kept
+        if self._dropped:
+            reason = f"{self._dropped} more outcomes are not told here, expected at most {KEPT} between two answers"
+            kept.append(CommandOutcome(tick, ARRIVAL, (), (), False, reason))
+        self.forget_kept()
+        return tuple(kept)
+
+    def forget_kept(self) -> None:
+        """The run has ended, and its owner with it."""
+        self._kept, self._dropped = [], 0
+
+    def _release(self) -> None:
+        self._inbox.release(self._handed, self._handed_bytes)
+        self._handed = self._handed_bytes = 0
+
+    def _log(self, line: str) -> None:
+        self._lines += 1
+        if self._lines <= LINES:
+            self._warn(line)
+        else:
+            self._unsaid += 1
+
+    def _count_lines(self, now: float) -> None:
+        if now < self._since + PERIOD:
+            return
+        if self._unsaid:
+            self._warn(f"{self._unsaid} more commands were refused; each outcome says why")
+        self._since, self._lines, self._unsaid = now, 0, 0

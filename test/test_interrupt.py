@@ -1,0 +1,93 @@
+"""Ctrl-C, as a terminal sends it to a command, at any moment of its life."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MAIN = "print('began', flush=True); import sys; from conveyor_sim.cli import main; sys.exit(main())"
+"""As the console script has it."""
+FUZZ = "print('began', flush=True); import runpy; runpy.run_module('fuzz', run_name='__main__')"
+
+SWALLOWED = """
+import ctypes, time
+from conveyor_sim.interrupt import one_line
+
+@ctypes.CFUNCTYPE(None)
+def callback():
+    print("compiling", flush=True)
+    time.sleep(60.0)
+
+with one_line():
+    callback()
+    time.sleep(60.0)
+"""
+"""As llvmlite calls back from the compiler, where Python loses exceptions."""
+
+FAILS_LATER = SWALLOWED.replace(
+    "    callback()\n    time.sleep(60.0)", "    callback()\n    raise RuntimeError('none yet')"
+)
+
+
+def interrupted(arguments: list[str], after: float = 0.0, words: str = "") -> tuple[int, str]:
+    """Status and output of a Python that is sent SIGINT so long after it was started, or has said some words."""
+    process = subprocess.Popen(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT / "test"), os.environ.get("PYTHONPATH", "")])},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert process.stdout is not None
+    said = ""
+    while words not in said:
+        line = process.stdout.readline()
+        assert line, said
+        said += line
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    said += process.communicate(timeout=60)[0]
+    return process.returncode, said
+
+
+@pytest.mark.parametrize("after", [0.2, 0.6, 1.2])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["-c", MAIN, "check", "glass_line", "--out", "/proc/no_such_folder"],
+        ["-c", MAIN, "explain", "--price", "paper_plant"],
+        ["-c", FUZZ],
+    ],
+    ids=["check", "explain", "fuzz"],
+)
+def test_a_command_ends_with_one_line(arguments: list[str], after: float) -> None:
+    status, said = interrupted(arguments, after, "began")
+    assert "Error: /proc/no_such_folder" in said or (status, said.splitlines()[-1]) == (130, "interrupted")
+    assert "Traceback" not in said
+    assert "Aborted" not in said
+
+
+def test_an_interrupt_that_a_callback_loses_comes_again() -> None:
+    status, said = interrupted(["-c", SWALLOWED], 0.2, "compiling")
+    assert (status, said) == (130, "compiling\ninterrupted\n")
+
+
+def test_what_fails_after_a_lost_interrupt_is_an_interrupt() -> None:
+    status, said = interrupted(["-c", FAILS_LATER], 0.2, "compiling")
+    assert (status, said) == (130, "compiling\ninterrupted\n")
+
+
+def test_other_errors_stay_what_they_are() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "from conveyor_sim.interrupt import one_line\nwith one_line(): 1 / 0"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, "ZeroDivisionError" in done.stderr) == (1, True)
