@@ -41,8 +41,8 @@ def _radii(scene: Scene, on: Collection[str]) -> Cause | None:
 SEGMENT_RAILS = Effect(
     name="segment_rails",
     law="contact with the nearest point of a segment, its ends included; pieces that meet push as one surface (where "
-    "three or more touch at once, their push may be off sideways by 5 % of the deepest one, by 25 % between pieces that "
-    "face each other)",
+    "three or more touch at once, their push may be off sideways by 5 % of the deepest one, by 25 % between pieces "
+    "that face each other)",
     source="(22)-(23)",
     called_for=_segments,
     absent="no straight rail",
