@@ -119,9 +119,9 @@ def test_a_bottle_through_a_rail_is_noticed() -> None:
 
 
 DEVICES = {
-    "counters": {"c": {"from": [0.02, 0.5], "to": [0.02, -0.5]}},
+    "counters": {"c": {"from": [0.02, -0.5], "to": [0.02, 0.5]}},
     "zones": {"z": {"region": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]}},
-    "photo_eyes": {"e": {"from": [0.0, 0.5], "to": [0.0, -0.5]}},
+    "photo_eyes": {"e": {"from": [0.03, 0.5], "to": [0.03, -0.5]}},
 }
 
 
