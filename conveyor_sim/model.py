@@ -13,6 +13,7 @@ from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, S
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws import build_laws
+from conveyor_sim.mouths import cut_at_mouths
 from conveyor_sim.plant import plant_grid, rail_arrays
 from conveyor_sim.prediction import Impact, Prediction
 from conveyor_sim.presets import target
@@ -102,11 +103,12 @@ def build_model(scene: Scene) -> Model:
     """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
     effects = choose_effects(scene)
     on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
-    rails, belts, moving = rail_shapes(scene), belt_shapes(scene), moving_shapes(scene)
-    all_rails = [*rails, *(shape.shape(shape.first) for shape in moving)]
     types = list(scene.bottle_types.values())
-    rail_materials = sorted({rail.material for rail in all_rails})
     radius = np.array([kind.radius for kind in types])
+    rails, belts, moving = rail_shapes(scene), belt_shapes(scene), moving_shapes(scene)
+    rails = cut_at_mouths(rails, float(radius.max()))
+    all_rails = [*rails, *(shape.shape(shape.first) for shape in moving)]
+    rail_materials = sorted({rail.material for rail in all_rails})
     laws = build_laws(scene, rail_materials, on)
     skin = SKIN * float(radius.min())
     segments, arcs = rail_arrays(rails, rail_materials)

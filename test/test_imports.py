@@ -13,7 +13,7 @@ FLOORS = [
     ["errors", "version", "machine", "signals", "files", "interrupt", "printable"],
     ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
-    ["plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
+    ["mouths", "plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
     ["model"],
     ["empty_damage"],
     ["empty_world"],

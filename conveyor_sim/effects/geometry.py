@@ -40,7 +40,9 @@ def _radii(scene: Scene, on: Collection[str]) -> Cause | None:
 
 SEGMENT_RAILS = Effect(
     name="segment_rails",
-    law="contact with the nearest point of a segment, its ends included",
+    law="contact with the nearest point of a segment, its ends included; pieces that meet push as one surface (where "
+    "three or more touch at once, their push may be off sideways by 5 % of the deepest one, by 25 % between pieces "
+    "that face each other)",
     source="(22)-(23)",
     called_for=_segments,
     absent="no straight rail",
@@ -48,7 +50,8 @@ SEGMENT_RAILS = Effect(
 )
 ARC_RAILS = Effect(
     name="arc_rails",
-    law="contact with the nearest point of an arc",
+    law="contact with the nearest point of an arc; one like a C, both tips of which can touch a bottle at once, is two "
+    "halves",
     source="(21)-(23)",
     called_for=_arcs,
     absent="no arc rail",

@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +15,12 @@ from worlds import (
     nearest_on_segment,
     push,
     rail_forces,
+    rail_scene,
 )
 
 from conveyor_sim.engine.keep import keep_deepest
 from conveyor_sim.engine.team import MOST_CONTACTS
+from conveyor_sim.model import build_model
 
 RANDOM = np.random.default_rng(20240229)
 ROUNDING = 1e-9
@@ -52,9 +55,76 @@ def test_an_arc_pushes_from_its_nearest_point(start: float, span: float, radius:
     centre = (0.2, -0.1)
     reach = radius + 1.5 * RADIUS
     points = around((centre[0] - reach, centre[1] - reach), (centre[0] + reach, centre[1] + reach))
+    points = points[~touches_twice(centre, radius, start, span, points)]
     expected = push(nearest_on_arc(centre, radius, start, span, points), points)
     forces = rail_forces({"rail": arc(centre, radius, start, span)}, points)
     np.testing.assert_allclose(forces, expected, atol=ROUNDING)
+
+
+def touches_twice(centre: tuple[float, float], radius: float, start: float, span: float, points: np.ndarray) -> Any:
+    """Whether a bottle at a point touches an open arc at more than one nearest place: at a tip, and elsewhere."""
+    places = []
+    for angle, inward in ((start, 1.0), (start + span, -1.0)):
+        away = np.array(centre) + radius * np.array([math.cos(angle), math.sin(angle)]) - points
+        nearest = away @ [-inward * math.sin(angle), inward * math.cos(angle)] > 0.0
+        places.append(nearest & (np.hypot(*away.T) < RADIUS))
+    seen = points - np.array(centre)
+    within = np.mod(np.arctan2(seen[:, 1], seen[:, 0]) - start, 2.0 * math.pi) < span
+    places.append(within & (np.abs(np.hypot(*seen.T) - radius) < RADIUS))
+    return (np.sum(places, axis=0) > 1) & (span < 2.0 * math.pi)
+
+
+@pytest.mark.parametrize("half", [0.4, 1.2, math.pi / 2, 2.5, 3.1])
+@pytest.mark.parametrize("radius", [0.03, 0.05, 0.2])
+def test_a_bottle_in_the_mouth_of_an_arc_is_pushed_straight_out(half: float, radius: float) -> None:
+    """It is symmetric about the middle of the mouth, and both tips push, by the shortest way out if they can."""
+    rails = {"c": arc((0.3, 0.1), radius, math.pi - half, 2.0 * half)}
+    away = np.linspace(0.001, RADIUS, 200) + max(0.0, radius * math.cos(math.pi - half))
+    forces = rail_forces(rails, np.column_stack([0.3 + away, np.full(away.size, 0.1)]))
+    tip = radius * np.array([-math.cos(half), math.sin(half)])
+    distance = np.hypot(away + radius * math.cos(half), tip[1])
+    along = (away + radius * math.cos(half)) / distance
+    overlap = np.maximum(RADIUS - distance, 0.0)
+    together = np.where(along > math.sqrt(0.5), 1.0 / along, 2.0 * along)
+    scale = STIFFNESS * RADIUS
+    np.testing.assert_allclose(forces[:, 0], STIFFNESS * overlap * together, atol=1e-9 * scale)
+    np.testing.assert_allclose(forces[:, 1], 0.0, atol=1e-9 * scale)
+    assert forces.any() == (radius * (math.sin(half) if half > math.pi / 2 else 1.0) < RADIUS)
+
+    beside = around((0.3 - radius - RADIUS, 0.1), (0.3 + radius + RADIUS, 0.1 + radius + RADIUS), 1000)
+    above, below = rail_forces(rails, beside), rail_forces(rails, (beside - [0.0, 0.1]) * [1.0, -1.0] + [0.0, 0.1])
+    np.testing.assert_allclose(above, below * [1.0, -1.0], atol=1e-9 * scale)
+
+
+@pytest.mark.parametrize(("opening", "most"), [((0.2, 0.75), 0.05), ((0.75, 3.1), 0.25)])
+def test_many_pieces_at_once_push_sideways_by_no_more(opening: tuple[float, float], most: float) -> None:
+    """A polyline along a C, on whose axis of symmetry a bottle is pushed along it but for so much of its deepest push.
+
+    Three or more pieces share their push by sweeps in their order, which may end early where they face each other.
+    """
+    random = np.random.default_rng(3)
+    points = np.column_stack([np.linspace(-0.3, 0.3, 120), np.zeros(120)])
+    for _ in range(25):
+        radius, half, count = random.uniform(0.02, 0.2), random.uniform(*opening), int(random.integers(4, 40))
+        angles = np.linspace(math.pi - half, math.pi + half, count)
+        corners = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+        forces = rail_forces({"c": polyline(corners)}, points)
+        sides = [np.hypot(*(nearest_on_segment(*ends, points) - points).T) for ends in pairwise(corners)]
+        nearest = np.min(sides, axis=0)
+        overlap = np.maximum(RADIUS - nearest, 0.0)
+        held = overlap < 0.75 * RADIUS  # the guard stops what is deeper
+        assert (np.abs(forces[held, 1]) <= most * STIFFNESS * overlap[held] + ROUNDING).all()
+
+
+def test_wider_mouths_and_joined_ends_leave_an_arc_whole() -> None:
+    wide = arc((0.0, 0.0), 0.5, 0.2, 5.8)
+    narrow = arc((0.0, 0.0), 0.05, 0.0, 4.0)
+    closed = arc((0.0, 0.0), 0.05, 0.0, 2.0 * math.pi)
+    fillet = {"arc": arc((0.0, 0.0), 0.05, 0.0, math.pi / 2), "a": segment((0.05, 0.0), (0.05, -1.0)),
+              "b": segment((0.0, 0.05), (-1.0, 0.05))}  # fmt: skip
+    for rails, pieces in (({"a": wide}, 1), ({"a": narrow}, 2), ({"a": closed}, 1), (fillet, 3)):
+        model = build_model(rail_scene(rails))
+        assert sum(len(shape.pieces) for shape in model.rail_shapes) == pieces
 
 
 def test_collinear_pieces_push_as_one_segment() -> None:

@@ -58,7 +58,10 @@ def load_case(file: Path) -> Case:
     """The case that a scene file and the script beside it are."""
     yaml = YAML(typ="safe", pure=True)
     script = yaml.load(file.with_suffix(".script.yaml").read_text(encoding="utf-8"))
-    sent = [Command(one["tick"], tuple(one["names"]), tuple(map(float, one["values"]))) for one in script["commands"]]
+    sent = [
+        Command(one["tick"], tuple(one["names"]), tuple(map(float, one["values"])), one.get("fault", False))
+        for one in script["commands"]
+    ]
     return Case(yaml.load(file.read_text(encoding="utf-8")), **{**script, "commands": sent})
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 INTEGRATORS = ("semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit")
+MOVING = INTEGRATORS[:2]
+"""Those that move rails."""
 ELASTIC = ("linear", "hertz", "table")
 DAMPING = ("none", "paper", "normal", "tsuji", "onset")
 FORCED = (
@@ -45,11 +47,17 @@ class Family:
     types: int = 1
     infeeds: bool = False
     outfeeds: bool = False
+    drives: bool = False
+    movers: bool = False
+    machines: bool = False
+    sensors: bool = False
+    ledger: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
         parts = [self.integrator, *self.elastic, *(f"{law} damping" for law in self.damping)]
         parts += [name for name in ("implicit_friction", "atan", "friction", "springs", "ring") if getattr(self, name)]
+        parts += [name for name in ("drives", "movers", "machines", "sensors", "ledger") if getattr(self, name)]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
         parts += [f"{self.types} types", *(f"{name} {value}" for name, value in self.effects)]
         return ", ".join(parts)
@@ -61,7 +69,7 @@ def random_family(seed: int) -> Family:
     integrator = INTEGRATORS[seed % len(INTEGRATORS)]
     euler = integrator == INTEGRATORS[0]
     friction = draw.random() < 0.8
-    return Family(
+    family = Family(
         integrator=integrator,
         implicit_friction=euler and draw.random() < 0.3,
         atan=draw.random() < 0.25,
@@ -78,6 +86,16 @@ def random_family(seed: int) -> Family:
         outfeeds=draw.random() < 0.4,
         effects=tuple(draw.choice(FORCED if draw.random() < 0.5 else FORCED[:1]).items()),
     )
+    # Rails that move have no tangential springs, and two integrators only.
+    move = integrator in MOVING and not family.springs
+    return replace(
+        family,
+        drives=draw.random() < 0.5,
+        movers=move and draw.random() < 0.6,
+        machines=draw.random() < 0.5,
+        sensors=draw.random() < 0.5,
+        ledger=draw.random() < 0.3,
+    )
 
 
 def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
@@ -86,15 +104,19 @@ def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[
     return tuple(name for name in names if name in chosen)
 
 
-CI_FAMILIES = (
-    Family(
-        elastic=("linear",),
-        damping=("paper", "normal"),
-        belts=("straight", "curved"),
-        rails=("segment", "arc"),
-        types=2,
-        infeeds=True,
-        outfeeds=True,
-    ),
+_PLAIN = Family(
+    elastic=("linear",),
+    damping=("paper", "normal"),
+    belts=("straight", "curved"),
+    rails=("segment", "arc"),
+    types=2,
+    infeeds=True,
+    outfeeds=True,
 )
-"""One, so that CI compiles few kernels."""
+
+CI_FAMILIES = (
+    _PLAIN,
+    replace(_PLAIN, drives=True, machines=True, sensors=True),
+    Family(types=2, drives=True, movers=True, machines=True, sensors=True, ledger=True),
+)
+"""Two mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

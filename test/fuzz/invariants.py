@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 from fuzz.crossing import crossed
+from fuzz.device_invariants import DeviceWatch
+from fuzz.drive_invariants import ExpectedBelts
+from fuzz.violation import Violation
 from numpy.typing import NDArray
 
-from conveyor_sim.line.commands import CommandOutcome, shown
-from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.simulation import Simulation
+
+__all__ = ["Sent", "Violation", "Watch", "work"]
 
 F8 = NDArray[np.float64]
 
@@ -22,12 +26,8 @@ TOUCH = 1e-7
 """Of the radius: what rounding may make of a distance at which two things touch."""
 
 
-class Violation(AssertionError):
-    """Something that must never be."""
-
-    def __init__(self, kind: str, sentence: str) -> None:
-        super().__init__(f"{kind}: {sentence}")
-        self.kind = kind
+Sent = list[tuple[tuple[str, ...], tuple[float, ...], bool]]
+"""Names and values of the inputs of a tick, and whether they are faults."""
 
 
 class Watch:
@@ -39,10 +39,11 @@ class Watch:
         self._radius, self._mass = model.type_radius, model.type_mass
         on = {"SegmentPiece": model.segments is not None, "ArcPiece": model.arcs is not None}
         self._pieces = [
-            (rail.name, piece) for rail in model.rail_shapes for piece in rail.pieces if on[type(piece).__name__]
+            (rail.name, piece) for rail in model.rails_at_rest for piece in rail.pieces if on[type(piece).__name__]
         ]
         self._regions = {name: np.array(feed.region) for name, feed in simulation.scene.outfeeds.items()}
-        self._belts = _ExpectedBelts(simulation)
+        self._belts = ExpectedBelts(simulation)
+        self._devices = DeviceWatch(simulation)
         self._stable = model.dt <= min((bound.dt for bound in model.bounds if bound.stability), default=math.inf)
         self._before = simulation.bottles()
         self._first = len(self._before.id) - simulation.counts.fed
@@ -52,10 +53,11 @@ class Watch:
         self.most_contacts = 0
         self._finite()
 
-    def after_tick(self, sent: list[tuple[tuple[str, ...], tuple[float, ...]]], outcomes: list[CommandOutcome]) -> None:
-        """The checks; sent: the commands of this tick, and what was told of them."""
+    def after_tick(self, sent: Sent, outcomes: list[CommandOutcome]) -> None:
+        """The checks; sent: the inputs of this tick, and what was told of them."""
         self._belts.check(sent, outcomes)
         now = self._finite()
+        self._devices.check(self._before, now, sent)
         self.bottle_ticks += len(now.id)
         fresh = self._identities(now)
         self._births(now, fresh)
@@ -105,6 +107,7 @@ class Watch:
         """A bottle enters beside others and beside rails, never in them."""
         radius, at = self._radius[now.type], np.column_stack([now.x, now.y])
         paired = self._sim.model.pair_law is not None
+        pieces = [*self._pieces, *((rail.name, rail.pieces[0]) for rail in self._sim.moving_rails())]
         for index in np.flatnonzero(fresh):
             reach = radius[index] * (1.0 - TOUCH) - 2e-9
             gap = np.hypot(*(at - at[index]).T) - radius
@@ -114,7 +117,7 @@ class Watch:
                     "born in a bottle", f"bottle {now.id[index]} in bottle {now.id[gap.argmin()]} "
                     f"by {radius[index] - gap.min():.3g} m at tick {self._sim.tick}"
                 )  # fmt: skip
-            for name, piece in self._pieces:
+            for name, piece in pieces:
                 apart = float(piece.distance(at[index : index + 1])[0])
                 if apart < reach:
                     raise Violation(
@@ -142,10 +145,11 @@ class Watch:
         speed = np.maximum(np.hypot(self._before.vx, self._before.vy)[was], np.hypot(now.vx, now.vy)[kept])
         # A long way may lead round a free end: it counts where both ends are farther than the bottle can have come.
         come = 2.0 * speed * self._sim.scene.tick + way
-        for name, piece in self._pieces:
-            through = crossed(piece, before, after)
+        seen = [(name, piece, before, after) for name, piece in self._pieces]
+        for name, piece, come_from, gone_to in [*seen, *self._devices.in_frames(before, after)]:
+            through = crossed(piece, come_from, gone_to)
             for index in np.flatnonzero(through):
-                ends = [math.dist(before[index], end) + math.dist(after[index], end) for end in piece.ends]
+                ends = [math.dist(come_from[index], end) + math.dist(gone_to[index], end) for end in piece.ends]
                 if way[index] < 0.5 * radius[index] or min(ends) > come[index]:
                     energy = 0.5 * mass[index] * speed[index] ** 2
                     raise Violation(
@@ -171,52 +175,6 @@ class Watch:
         for field in fields(contacts):
             if not np.isfinite(getattr(contacts, field.name)).all():
                 raise Violation("not finite", f"{field.name} of a contact at tick {self._sim.tick}")
-
-
-class _ExpectedBelts:
-    """The speeds that the belts must have, from the commands and the scene alone."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self._sim = simulation
-        belts = simulation.scene.belts
-        self._names = {speed_command(name): n for n, name in enumerate(belts)}
-        self._limits = [belt.speed_limits for belt in belts.values()]
-        self._speeds = np.array([belt.speed for belt in belts.values()])
-        tick = simulation.scene.tick
-        self._patience = [
-            math.inf if belt.watchdog is None else max(1, math.ceil(belt.watchdog / tick - 1e-9))
-            for belt in belts.values()
-        ]
-        self._heard = [0] * len(belts)
-        self._tripped = [False] * len(belts)
-
-    def check(self, sent: list[tuple[tuple[str, ...], tuple[float, ...]]], outcomes: list[CommandOutcome]) -> None:
-        tick = self._sim.tick - 1
-        judged = [(names, self._valid(names, values)) for names, values in sent]
-        told = [(tick, names if accepted else shown(names), accepted) for names, accepted in judged]
-        for names, values in sent:
-            if self._valid(names, values):
-                for name, value in zip(names, values, strict=True):
-                    self._speeds[self._names[name]] = value
-                    self._heard[self._names[name]], self._tripped[self._names[name]] = tick, False
-        for name, n in self._names.items():
-            if not self._tripped[n] and tick - self._heard[n] >= self._patience[n]:
-                self._speeds[n], self._tripped[n] = 0.0, True
-                told.append((tick, (name,), True))
-        found = [(outcome.tick, outcome.names, outcome.accepted) for outcome in outcomes]
-        if found != told:
-            raise Violation("outcomes", f"{found} told, expected {told}")
-        if any(outcome.accepted == bool(outcome.reason) for outcome in outcomes):
-            raise Violation("outcomes", "a refusal without a reason, or a reason without a refusal")
-        belts = self._sim.belts()
-        if not (np.array_equal(belts.commanded, self._speeds) and np.array_equal(belts.actual, self._speeds)):
-            raise Violation("belts", f"{belts} at tick {self._sim.tick}, expected {self._speeds}")
-
-    def _valid(self, names: tuple[str, ...], values: tuple[float, ...]) -> bool:
-        if not names or len(names) != len(values) or len(set(names)) < len(names) or not set(names) <= set(self._names):
-            return False
-        limits = [self._limits[self._names[name]] for name in names]
-        return all(low <= value <= high for (low, high), value in zip(limits, values, strict=True))
 
 
 def work(contact: Contact, overlap: float) -> float:

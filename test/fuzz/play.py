@@ -8,11 +8,13 @@ import tempfile
 import traceback
 from collections import defaultdict
 from dataclasses import dataclass
+from hashlib import blake2b
 from itertools import cycle
 from pathlib import Path
 
 from fuzz.case import Case
-from fuzz.invariants import Violation, Watch
+from fuzz.invariants import Sent, Watch
+from fuzz.violation import Violation
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
@@ -58,7 +60,8 @@ def kind_of(sentence: str) -> str:
 
 
 def play(case: Case) -> Played:
-    """Runs a case watched; again unwatched, on one or two threads; again divided differently; again from its bag.
+    """Runs a case watched; again unwatched, on one or two threads; again divided differently, by a checkpoint half-way;
+    again from its bag.
 
     Raises Violation where something must never be; any other exception than SceneError and SimulationError is a failure
     as well.
@@ -76,7 +79,8 @@ def play(case: Case) -> Played:
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag" if case.recorded and any(map(scene.every, scene.TOPICS)) else None
         first = _watched(scene, case, ticks, bag)
-        runs = [_Run(scene, case, threads=case.threads), _Run(scene, case, threads=1, calls=case.calls)]
+        half = len(first.hashes) // 2, Path(folder) / "half.npz"
+        runs = [_Run(scene, case, threads=case.threads), _Run(scene, case, threads=1, calls=case.calls, save=half)]
         for run in runs:
             run.until(len(first.hashes))
             first.compare(run)
@@ -118,26 +122,37 @@ def failure_kind(error: Exception) -> str:
 class _Run:
     """One run of a case: nobody looks at it but for its hash at the end of each call."""
 
-    def __init__(self, scene: Scene, case: Case, threads: int, calls: list[int] | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        case: Case,
+        threads: int,
+        calls: list[int] | None = None,
+        save: tuple[int, Path] | None = None,
+    ) -> None:
+        """calls: ticks of each call of `advance`, in turn. save: from what tick on it goes on from a checkpoint."""
         self.simulation = Simulation(scene, threads=threads)
         self.name = f"{threads} threads" if calls is None else f"calls of {calls} ticks"
-        self.hashes: dict[int, int] = {0: self.simulation.state_hash()}
+        self.hashes: dict[int, str] = {0: state_of(self.simulation)}
         self.outcomes: list[CommandOutcome] = []
         self.stopped = ""
         self._calls = cycle(calls or [1])
         self._commands = by_tick(case)
+        self._save = save
 
     def until(self, ticks: int) -> None:
         """Runs to so many ticks, and one more where the watched run was stopped in it."""
-        simulation = self.simulation
-        while simulation.tick < ticks and not self.stopped:
-            self.step(min(next(self._calls), ticks - simulation.tick))
+        while self.simulation.tick < ticks and not self.stopped:
+            self.step(min(next(self._calls), ticks - self.simulation.tick))
 
     def step(self, ticks: int) -> None:
         """One call of `advance`, which ends where a command is sent."""
+        if self._save is not None and self.simulation.tick >= self._save[0]:
+            self.simulation.save(self._save[1])
+            self.simulation = Simulation.load(self._save[1], threads=1)
+            self._save = None
         simulation = self.simulation
-        for names, values in self._commands.get(simulation.tick, []):
-            simulation.command(names, values)
+        send(simulation, self._commands.get(simulation.tick, []))
         ahead = [tick - simulation.tick for tick in self._commands if tick > simulation.tick]
         try:
             simulation.advance(min([ticks, *ahead]))
@@ -145,12 +160,12 @@ class _Run:
             self.stopped = str(error)
             return
         self.outcomes += simulation.take_outcomes()
-        self.hashes[simulation.tick] = simulation.state_hash()
+        self.hashes[simulation.tick] = state_of(simulation)
 
 
 @dataclass
 class _Watched:
-    hashes: list[int]
+    hashes: list[str]
     """At the end of each tick."""
     outcomes: list[CommandOutcome]
     stopped: str
@@ -178,8 +193,7 @@ def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched
     seen = _Watched([], [], "", simulation.counts.present, 0, 0)
     while simulation.tick < ticks and not seen.stopped:
         now = sent.get(simulation.tick, [])
-        for names, values in now:
-            simulation.command(names, values)
+        send(simulation, now)
         try:
             simulation.advance(1)
         except SimulationError as error:
@@ -188,7 +202,7 @@ def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched
         outcomes = outputs.after_tick()
         watch.after_tick(now, outcomes)
         seen.outcomes += outcomes
-        seen.hashes.append(simulation.state_hash())
+        seen.hashes.append(state_of(simulation))
     if recorder is not None:
         recorder.close()
     seen.bottles += simulation.counts.fed
@@ -196,12 +210,26 @@ def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched
     return seen
 
 
-def by_tick(case: Case) -> dict[int, list[tuple[tuple[str, ...], tuple[float, ...]]]]:
-    """The commands of a case by the ticks after which they are sent."""
-    sent: dict[int, list[tuple[tuple[str, ...], tuple[float, ...]]]] = defaultdict(list)
+def by_tick(case: Case) -> dict[int, Sent]:
+    """The inputs of a case by the ticks after which they are sent."""
+    sent: dict[int, Sent] = defaultdict(list)
     for command in case.commands:
-        sent[command.tick].append((command.names, command.values))
+        sent[command.tick].append((command.names, command.values, command.fault))
     return sent
+
+
+def state_of(simulation: Simulation) -> str:
+    """Bottles, belts and rails, and all that controllers see."""
+    return f"{simulation.state_hash():016x}{blake2b(simulation.signals().tobytes(), digest_size=8).hexdigest()}"
+
+
+def send(simulation: Simulation, inputs: Sent) -> None:
+    """Queues the inputs of a tick."""
+    for names, values, fault in inputs:
+        if fault:
+            simulation.inject(names[0], values[0])
+        else:
+            simulation.command(names, values)
 
 
 def _replayed(bag: Path) -> int:

@@ -7,14 +7,15 @@ import math
 from typing import Any
 
 import numpy as np
+from fuzz.devices import drives, machines, movers, sensors
+from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.geometry import rail_shapes
-
-Data = dict[str, Any]
+from conveyor_sim.scene.moving import moving_shapes
 
 STEEL, CHAIN = "steel", "chain"
 MATERIALS = ("glass", "pet", "glass")
@@ -23,21 +24,6 @@ MATERIALS = ("glass", "pet", "glass")
 TICKS = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 
 WILD = "faster, softer or more unequal than contacts can hold"
-
-fractions = st.one_of(st.integers(0, 16).map(lambda n: n / 16), st.floats(0.0, 1.0, allow_nan=False))
-"""From 0 to 1: coarse, so that things coincide, or fine."""
-signed = fractions.map(lambda share: 2.0 * share - 1.0)
-
-
-def between(low: float, high: float) -> st.SearchStrategy[float]:
-    """Evenly from low to high."""
-    return fractions.map(lambda share: low + (high - low) * share)
-
-
-def scaled(low: float, high: float) -> st.SearchStrategy[float]:
-    """Evenly in the logarithm from low to high, both greater than 0."""
-    return fractions.map(lambda share: low * (high / low) ** share)
-
 
 angles = st.one_of(
     st.sampled_from([0.0, math.pi / 2, -math.pi / 2, math.pi, math.pi / 4]),
@@ -80,7 +66,17 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
     }
     if not family.base_friction:
         data["base"] = [{**base, "friction": 0.0} for base in data["base"]]
+    if family.drives:
+        data["belts"] = {name: {**belt, **draw(drives(frame))} for name, belt in data["belts"].items()}
+    if family.movers:
+        data |= draw(movers(frame, STEEL))
     clear = _Clear(data, frame)
+    if family.machines:
+        data |= draw(machines(frame, clear))
+    if family.sensors:
+        data |= draw(sensors(frame, list(data["belts"])))
+    if family.ledger:
+        data["outputs"]["ledger"] = round(1.0 / frame.tick)
     if family.infeeds:
         data["infeeds"] = {f"in_{n}": feed for n, feed in enumerate(draw(_infeeds(frame, clear)))}
     if family.outfeeds:
@@ -292,7 +288,8 @@ class _Clear:
         except SceneError:
             self._pieces = []
         else:
-            self._pieces = [piece for rail in rail_shapes(scene) for piece in rail.pieces]
+            rails = [*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))]
+            self._pieces = [piece for rail in rails for piece in rail.pieces]
 
     def of_rails(self, points: Any, radius: float) -> bool:
         """Whether bottles of a radius (m) at points touch no rail."""

@@ -9,9 +9,9 @@ from typing import Any
 
 from fuzz.case import yaml_text
 from fuzz.families import Family
-from fuzz.invariants import Violation
 from fuzz.play import check_sentence
 from fuzz.scenes import scenes
+from fuzz.violation import Violation
 from hypothesis import strategies as st
 
 from conveyor_sim.errors import SceneError

@@ -1,0 +1,231 @@
+"""What holds of the devices of a line at every tick: the process image against bottles, commands and the scene."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from fuzz.crossing import crossed
+from fuzz.violation import Violation
+from numpy.typing import NDArray
+
+from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.scene.geometry import SegmentPiece
+from conveyor_sim.scene.machines import Inspection, Reject, Sink, Source
+from conveyor_sim.scene.moving import MovingShape, moving_shapes
+from conveyor_sim.simulation import Simulation
+
+F8 = NDArray[np.float64]
+
+NEAR = 1e-7
+"""Of a length: what rounding may make of a place at which something begins or ends."""
+
+RISING = {
+    "fed", "removed", "produced", "taken", "taken_bad", "count", "bad", "rejected", "rejected_bad", "rejected_good",
+    "missed", "dropped", "edges", "forward", "backward", "starved_time", "blocked_time", "time", "bad_time",
+}  # fmt: skip
+"""Signals that never fall."""
+
+
+class DeviceWatch:
+    """Looks at the process image after every tick. Raises Violation."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._sim = simulation
+        self._signals = simulation.process_image.signals
+        self._scene = simulation.scene
+        self._faulty: set[str] = set()
+        """Devices that a fault was ever sent to."""
+        self._shapes = moving_shapes(simulation.scene) if simulation.model.has("moving_rails") else []
+        self._now = self._before = self._values()
+        self._still = dict.fromkeys((shape.name for shape in self._shapes), 0)
+        """Ticks for which each moving rail has stood."""
+        ledger = simulation.ledger()
+        self._work = None if ledger is None else ledger.rail_work.copy()
+        self._image()
+
+    def check(self, before: BottleColumns, now: BottleColumns, sent: list[tuple[Any, ...]]) -> None:
+        """The checks, between two ticks. sent: names, values, and whether they are faults."""
+        self._faulty |= {name.rpartition("/")[0] for names, _, fault in sent if fault for name in names}
+        self._before, self._now = self._now, self._values()
+        self._image()
+        self._rising()
+        self._conservation()
+        self._lines(before, now)
+        self._zones(now)
+        self._eyes(before, now)
+        self._movers()
+        self._ledger()
+
+    def in_frames(self, before: F8, after: F8) -> list[tuple[str, SegmentPiece, F8, F8]]:
+        """Each moving rail at home, with the places before and after a tick, (n, 2), as seen from it."""
+        return [
+            (shape.name, shape.at(0.0), _seen(shape, self._place(shape, self._before), before),
+             _seen(shape, self._place(shape, self._now), after))
+            for shape in self._shapes
+        ]  # fmt: skip
+
+    def _values(self) -> dict[str, float]:
+        return dict(zip(self._sim.process_image.signal_names, self._sim.signals().tolist(), strict=True))
+
+    def _place(self, shape: MovingShape, values: dict[str, float]) -> float:
+        return values[f"{shape.name}/position"] * shape.stroke
+
+    def _image(self) -> None:
+        """Every signal is of its type."""
+        for signal in self._signals:
+            value = self._now[signal.name]
+            good = math.isfinite(value)
+            if signal.type == "bool":
+                good = value in (0.0, 1.0)
+            elif signal.type == "count":
+                good = float(value).is_integer() and (value >= 0.0 or signal.name.endswith("/pulses"))
+            if not good:
+                raise Violation("signal of another type", f"{signal.name} is {value} ({signal.type})")
+
+    def _rising(self) -> None:
+        for name, value in self._now.items():
+            if name.rpartition("/")[2] in RISING and value < self._before[name]:
+                raise Violation("count that falls", f"{name} went from {self._before[name]} to {value}")
+
+    def _conservation(self) -> None:
+        """All bottles that come and go do so by a device."""
+        scene, now, counts = self._scene, self._now, self._sim.counts
+        fed = sum(now[f"infeeds/{name}/fed"] for name in scene.infeeds)
+        fed += sum(now[f"spills/{name}/dropped"] for name in scene.spills)
+        gone = sum(now[f"outfeeds/{name}/removed"] for name in scene.outfeeds)
+        for name, machine in scene.machines.items():
+            place = f"machines/{name}"
+            if isinstance(machine, Source):
+                fed += now[f"{place}/produced"]
+            elif isinstance(machine, Sink):
+                gone += now[f"{place}/taken"]
+                _at_most(now, f"{place}/taken_bad", f"{place}/taken")
+            elif isinstance(machine, Reject):
+                gone += now[f"{place}/rejected"]
+                if now[f"{place}/rejected_bad"] + now[f"{place}/rejected_good"] != now[f"{place}/rejected"]:
+                    raise Violation("bad and good", f"{place}: not all rejected are one or the other")
+            else:
+                _at_most(now, f"{place}/bad", f"{place}/count")
+        if (fed, gone) != (counts.fed, counts.removed):
+            raise Violation("lost bottle", f"devices fed {fed} and removed {gone}, {counts} told")
+
+    def _lines(self, before: BottleColumns, now: BottleColumns) -> None:
+        """Counters and inspections count those that passed."""
+        scene = self._scene
+        lines = [(f"counters/{name}", line, ("forward", "backward")) for name, line in scene.counters.items()]
+        lines += [
+            (f"machines/{name}", machine, ("count", ""))
+            for name, machine in scene.machines.items()
+            if isinstance(machine, Inspection)
+        ]
+        gone = np.setdiff1d(before.id, now.id).size
+        for place, line, words in lines:
+            passed = _passed(np.array(line.from_), np.array(line.to), before, now)
+            for word, (least, most) in zip(words, passed, strict=True):
+                counted = 0.0 if not word else self._now[f"{place}/{word}"] - self._before[f"{place}/{word}"]
+                # Those that were taken away after this tick's steps may have passed.
+                if word and not least <= counted <= most + gone:
+                    raise Violation("counted wrongly", f"{place}/{word}: {counted} in a tick, {least} to {most} passed")
+
+    def _zones(self, now: BottleColumns) -> None:
+        for name, zone in self._scene.zones.items():
+            if f"zones/{name}" in self._faulty:
+                continue
+            corners, at = np.array(zone.region), np.column_stack([now.x, now.y])
+            count = self._now[f"zones/{name}/bottles"]
+            size = float(np.ptp(corners, axis=0).max())
+            sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+            edge = np.min([SegmentPiece(tuple(a), tuple(b)).distance(at) for a, b in sides], axis=0, initial=math.inf)
+            inside, unsure = _winds(corners, at), edge < NEAR * size
+            least, most = np.count_nonzero(inside & ~unsure), np.count_nonzero(inside | unsure)
+            if not least <= count <= most:
+                raise Violation("counted wrongly", f"zones/{name}: {count} told, {least} to {most} inside")
+            if zone.full_at is not None and self._now[f"zones/{name}/full"] != (count >= zone.full_at):
+                raise Violation("counted wrongly", f"zones/{name}/full with {count} of {zone.full_at}")
+
+    def _eyes(self, before: BottleColumns, now: BottleColumns) -> None:
+        """An eye without delays and faults shows who is in its beam; later comers are seen at the next tick."""
+        radius = self._sim.model.type_radius[now.type]
+        at, there = np.column_stack([now.x, now.y]), np.isin(now.id, before.id)
+        gone = np.setdiff1d(before.id, now.id).size
+        for name, eye in self._scene.photo_eyes.items():
+            if f"photo_eyes/{name}" in self._faulty or eye.debounce or eye.on_delay or eye.off_delay:
+                continue
+            away = SegmentPiece(eye.from_, eye.to).distance(at)
+            sure, perhaps = away < radius * (1.0 - 1e-4), away < radius * (1.0 + 1e-4)
+            blocked = self._now[f"photo_eyes/{name}/blocked"]
+            if blocked and not (perhaps & there).any() and not gone:
+                raise Violation("eye", f"{name} is blocked at tick {self._sim.tick}, and no bottle is in its beam")
+            if not blocked and (sure & there).any():
+                raise Violation("eye", f"{name} is free at tick {self._sim.tick}, and a bottle is in its beam")
+            rose, fell = (self._now[f"photo_eyes/{name}/{edge}"] for edge in ("rose", "fell"))
+            if max(rose, fell) > self._sim.time + 1e-9:
+                raise Violation("eye", f"{name}: an edge at {rose} or {fell} s, at {self._sim.time} s")
+
+    def _movers(self) -> None:
+        """No rail is off its course, or faster than it can."""
+        for shape in self._shapes:
+            before, now = self._place(shape, self._before), self._place(shape, self._now)
+            position = self._now[f"{shape.name}/position"]
+            if not 0.0 <= position <= 1.0:
+                raise Violation("off its course", f"{shape.name} at {position} of its stroke")
+            most = shape.max_speed * self._scene.tick * (1.0 + 1e-9) + 1e-12 * shape.stroke
+            if abs(now - before) > most:
+                raise Violation("off its course", f"{shape.name} went {now - before} in a tick, {most} at most")
+            self._still[shape.name] = self._still[shape.name] + 1 if now == before else 0
+
+    def _ledger(self) -> None:
+        """A rail that stands does no work."""
+        ledger = self._sim.ledger()
+        if ledger is None or self._work is None:
+            return
+        if not np.isfinite([ledger.residual, ledger.turnover, *ledger.rail_work, *ledger.belt_work]).all():
+            raise Violation("not finite", f"the ledger at tick {self._sim.tick}")
+        for n, shape in enumerate(self._shapes):
+            if self._still[shape.name] > 1 and ledger.rail_work[n] != self._work[n]:
+                raise Violation("work of a rail at rest", f"{shape.name} at tick {self._sim.tick}")
+        self._work = ledger.rail_work.copy()
+
+
+def _at_most(values: dict[str, float], one: str, other: str) -> None:
+    if values[one] > values[other]:
+        raise Violation("bad and good", f"{one} is more than {other}")
+
+
+def _passed(start: F8, end: F8, before: BottleColumns, now: BottleColumns) -> list[tuple[int, int]]:
+    """Least and most that passed from the left to the right of a line, and back."""
+    was = np.column_stack([before.x, before.y])[np.isin(before.id, now.id)]
+    at = np.column_stack([now.x, now.y])[np.isin(now.id, before.id)]
+    along = end - start
+    length = float(np.hypot(*along))
+    left, right = (along[0] * (points - start)[:, 1] - along[1] * (points - start)[:, 0] for points in (was, at))
+    crossing = crossed(SegmentPiece(tuple(start), tuple(end)), was, at)
+    # What begins or ends on the line, or passes at one of its ends, may be counted or not.
+    scale = length * max(1.0, float(np.abs([start, end]).max()))
+    unsure = (np.abs(left) < NEAR * scale) | (np.abs(right) < NEAR * scale)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place = ((was + (left / (left - right))[:, None] * (at - was) - start) @ along) / length**2
+    unsure |= (np.abs(place) < NEAR * scale) | (np.abs(place - 1.0) < NEAR * scale)
+    ways = []
+    for way in (left > right, left < right):
+        ways.append((int(np.count_nonzero(crossing & way & ~unsure)), int(np.count_nonzero((crossing & way) | unsure))))
+    return ways
+
+
+def _winds(corners: F8, at: F8) -> NDArray[np.bool_]:
+    """Whether a polygon winds about points."""
+    turned = np.zeros(len(at))
+    for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        a, b = one - at, other - at
+        turned += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
+    return np.asarray(np.abs(turned) > math.pi)
+
+
+def _seen(shape: MovingShape, position: float, points: F8) -> F8:
+    """Points (n, 2) as seen from a moving rail at a position (m or rad): as if it were at home."""
+    start = np.array(shape.start)
+    moved = points - start - np.array(shape.along) * position
+    cos, sin = math.cos(-shape.turning * position), math.sin(-shape.turning * position)
+    return np.asarray(start + moved @ np.array([[cos, sin], [-sin, cos]]))

@@ -1,0 +1,138 @@
+"""Random devices of a scene: drives, rails that move, machines, spills, sensors and indicators, as data."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+from fuzz.draws import Data, between, fractions, scaled
+from hypothesis import strategies as st
+
+
+class Frame(Protocol):
+    """Sizes that the parts of a scene share."""
+
+    unit: float
+    speed: float
+    tick: float
+    types: dict[str, Data]
+
+    @property
+    def points(self) -> st.SearchStrategy[list[float]]:
+        """Points of the area."""
+
+
+class Clear(Protocol):
+    """Where bottles may be born."""
+
+    def of_rails(self, points: Any, radius: float) -> bool:
+        """Whether bottles of a radius (m) at points touch no rail."""
+
+
+@st.composite
+def drives(draw: st.DrawFn, frame: Frame) -> Data:
+    """The drive of a belt, or none."""
+    if draw(st.integers(0, 2)) == 0:
+        return {}
+    ticks = draw(st.sampled_from([0.5, 3.0, 17.0]))
+    drive: Data = {"acceleration": frame.speed / (ticks * frame.tick)}
+    if draw(st.booleans()):
+        drive["jerk"] = drive["acceleration"] / (frame.tick * draw(st.sampled_from([0.7, 5.0])))
+    if draw(st.booleans()):
+        drive["pulses_per_metre"] = draw(scaled(0.1, 1e4))
+    return {"drive": drive}
+
+
+@st.composite
+def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
+    """Gates, pushers and diverters; at least one."""
+    found: dict[str, dict[str, Data]] = {"gates": {}, "pushers": {}, "diverters": {}}
+    for n in range(draw(st.integers(1, 3))):
+        field = draw(st.sampled_from(sorted(found)))
+        start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
+        length = frame.unit * draw(st.integers(1, 6))
+        end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
+        speed = frame.speed * draw(between(0.1, 0.7))
+        swings = field == "diverters" or (field == "gates" and draw(st.booleans()))
+        rail: Data = {"from": start, "to": end, "material": material}
+        if field == "gates":
+            rail |= {"kind": "swing" if swings else "slide", "open": draw(st.booleans())}
+        if swings:
+            rail |= {"angle": draw(between(0.2, 2.0)) * draw(st.sampled_from([1.0, -1.0])), "max_speed": speed / length}
+        else:
+            rail |= {"direction": draw(between(-math.pi, math.pi)), "stroke": frame.unit * draw(between(0.3, 5.0))}
+            rail["max_speed"] = speed
+        rail["acceleration"] = rail["max_speed"] / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
+        found[field][f"mover_{n}"] = rail
+    return found
+
+
+@st.composite
+def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
+    """Sources, sinks, inspections, rejects and spills; at least one."""
+    found: dict[str, dict[str, Data]] = {"machines": {}, "spills": {}}
+    for n in range(draw(st.integers(1, 5))):
+        what = draw(st.sampled_from(["source", "sink", "inspection", "reject", "spill"]))
+        if what in ("source", "spill"):
+            kind, at = draw(st.sampled_from(sorted(frame.types))), draw(frame.points)
+            if not clear.of_rails([at], frame.types[kind]["radius"]):
+                continue
+            if what == "spill":
+                found["spills"][f"spill_{n}"] = {"bottle": kind, "position": at, "count": draw(st.integers(1, 4))}
+                continue
+            entry: Data = {"kind": what, "bottle": kind, "position": at, "direction": draw(between(-math.pi, math.pi))}
+            entry["speed"] = frame.speed * draw(fractions)
+            entry |= draw(st.sampled_from([{}, {"bad_every": 2}, {"bad_share": 0.3}, {"bad_share": 1.0}]))
+        elif what == "inspection":
+            entry = {"kind": what, **draw(_lines(frame))}
+        else:
+            entry = {"kind": what, "region": draw(_regions(frame))}
+        if what in ("source", "sink"):
+            entry["rate"] = draw(scaled(0.02, 2.0)) / frame.tick
+            entry |= draw(st.sampled_from([{}, {"rate_limit": 3.0 * entry["rate"]}]))
+        elif what == "reject":
+            entry |= {"delay": frame.tick * draw(st.sampled_from([0.0, 2.5])),
+                      "window": frame.tick * draw(st.sampled_from([0.5, 4.0]))}  # fmt: skip
+        found["machines"][f"machine_{n}"] = entry
+    return found
+
+
+@st.composite
+def sensors(draw: st.DrawFn, frame: Frame, belts: list[str]) -> Data:
+    """Photo-eyes, zones, counters, and an indicator where there is a belt for it."""
+    delays = st.sampled_from([0.0, 0.0, 0.4 * frame.tick, 2.0 * frame.tick, 7.3 * frame.tick])
+    eyes = [
+        {**draw(_lines(frame)), "debounce": draw(delays), "on_delay": draw(delays), "off_delay": draw(delays)}
+        for _ in range(draw(st.integers(1, 2)))
+    ]
+    zones: list[Data] = [{"region": draw(_regions(frame))} for _ in range(draw(st.integers(1, 2)))]
+    zones[0]["full_at"] = draw(st.integers(1, 5))
+    found: Data = {
+        "photo_eyes": {f"eye_{n}": eye for n, eye in enumerate(eyes)},
+        "zones": {f"zone_{n}": zone for n, zone in enumerate(zones)},
+        "counters": {f"counter_{n}": draw(_lines(frame)) for n in range(draw(st.integers(1, 2)))},
+    }
+    if belts:
+        indicator: Data = {"counter": "counter_0", "belt": belts[0], "zone": f"zone_{len(zones) - 1}"}
+        indicator |= {"jam_time": frame.tick * draw(st.sampled_from([0.5, 6.0]))}
+        indicator |= draw(st.sampled_from([{}, {"window": 5.0 * frame.tick}, {"starved_time": 3.0 * frame.tick}]))
+        if len(belts) > 1 and draw(st.booleans()):
+            indicator["downstream"] = belts[1]
+        if len(zones) > 1 and draw(st.booleans()):
+            indicator["backup"] = "zone_0"
+        found["indicators"] = {"exit": indicator}
+    return found
+
+
+@st.composite
+def _lines(draw: st.DrawFn, frame: Frame) -> Data:
+    start, angle = draw(frame.points), draw(st.sampled_from([0.0, math.pi / 2, 1.0]))
+    length = frame.unit * draw(st.integers(1, 12)) * draw(st.sampled_from([1.0, -1.0]))
+    return {"from": start, "to": [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]}
+
+
+@st.composite
+def _regions(draw: st.DrawFn, frame: Frame) -> list[list[float]]:
+    x, y = draw(frame.points)
+    w, h = draw(st.integers(1, 10)) * frame.unit, draw(st.integers(1, 10)) * frame.unit
+    return [[x, y], [x + w, y], [x + w, y + h], [x, y + h]][: draw(st.sampled_from([4, 3]))]

@@ -1,0 +1,70 @@
+"""What a line takes, from its scene alone: commands and faults, with their types and limits (docs/line.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from conveyor_sim.scene import Scene
+from conveyor_sim.scene.machines import Inspection, Reject, Sink, Source
+
+
+@dataclass(frozen=True)
+class Input:
+    """One of them."""
+
+    type: str = "bool"
+    low: float = 0.0
+    high: float = 1.0
+
+    def takes(self, value: float) -> bool:
+        """Whether a value is accepted."""
+        whole = self.type == "number" or float(value).is_integer()
+        return math.isfinite(value) and self.low <= value <= self.high and whole
+
+
+Table = Mapping[str, Input]
+
+MOVERS = (("gates", "open"), ("pushers", "push"), ("diverters", "divert"))
+
+
+def commands_of(scene: Scene) -> Table:
+    """The commands."""
+    table: dict[str, Input] = {}
+    for name, belt in scene.belts.items():
+        table[f"belts/{name}/cmd_speed"] = Input("number", *belt.speed_limits)
+        if belt.drive is not None:
+            table |= {f"belts/{name}/{what}": Input() for what in ("run", "reverse", "reset")}
+    for field, order in MOVERS:
+        table |= {f"{field}/{name}/{order}": Input() for name in getattr(scene, field)}
+    for name, machine in scene.machines.items():
+        if isinstance(machine, Source | Sink):
+            most = machine.rate if machine.rate_limit is None else machine.rate_limit
+            table |= {f"machines/{name}/run": Input(), f"machines/{name}/rate": Input("number", 0.0, most)}
+        elif isinstance(machine, Reject):
+            table[f"machines/{name}/fire"] = Input()
+    return table
+
+
+def faults_of(scene: Scene) -> Table:
+    """The faults."""
+    table = {f"belts/{name}/trip": Input() for name, belt in scene.belts.items() if belt.drive is not None}
+    for field, _ in MOVERS:
+        table |= {f"{field}/{name}/jammed": Input() for name in getattr(scene, field)}
+    machines = scene.machines.items()
+    table |= {f"machines/{name}/stop": Input() for name, machine in machines if not isinstance(machine, Inspection)}
+    table |= {f"spills/{name}/drop": Input() for name in scene.spills}
+    for name in scene.photo_eyes:
+        table |= {f"photo_eyes/{name}/{what}": Input() for what in ("stuck_on", "stuck_off")}
+        table[f"photo_eyes/{name}/chatter"] = Input("number", 0.0, 1000.0)
+        table[f"photo_eyes/{name}/delay"] = Input("number", 0.0, 60.0)
+    table |= {f"zones/{name}/offset": Input("count", -1000.0, 1000.0) for name in scene.zones}
+    return table
+
+
+def accepted(table: Table, names: Sequence[str], values: Sequence[float]) -> bool:
+    """Whether a set of them is applied; else it is refused as a whole."""
+    if not names or len(names) != len(values) or len(set(names)) < len(names) or not set(names) <= set(table):
+        return False
+    return all(table[name].takes(value) for name, value in zip(names, values, strict=True))
