@@ -126,7 +126,13 @@ class Station:
         place = self._folder / str(self._nodes)
         place.mkdir()
         self._bag = place / "bag"
-        given = {"scene": SMALL_LINE, "start_paused": True, "real_time_factor": 0.0, "duration": 1000.0}
+        given = {
+            "scene": SMALL_LINE,
+            "start_paused": True,
+            "real_time_factor": 0.0,
+            "duration": 1000.0,
+            "checkpoint_folder": "/",
+        }
         self._node = Child("sim_node", given | {"record": self._bag, "threads": 1}, self._environment, place)
         self.present()
         for publisher in self._publishers.values():
@@ -354,13 +360,23 @@ def _reset(station: Station, rng: random.Random, _: Path) -> str:
 
 
 def _checkpoint(station: Station, rng: random.Random, folder: Path) -> str:
-    odd = ["", "/", "~", "~nobody_at_all/x", "/proc/version", "/no/such/file", str(folder), "\n\x1b[2J/", "x/" * 3000]
-    path = rng.choice([str(folder / "checkpoint"), str(folder / "checkpoint"), *odd])
+    whole, pipe = folder / "checkpoint", folder / "pipe"
+    if not pipe.exists():
+        os.mkfifo(pipe)
+    odd = [
+        "", "/", "~", "~nobody_at_all/x", "../../etc/passwd", "/proc/version", "/dev/zero", "/dev/tty", "/no/such/file",
+        str(folder), str(pipe), "\n\x1b[2J/", "x/" * 3000,
+    ]  # fmt: skip
+    path = rng.choice([str(whole), str(whole), *odd])
     if rng.random() < 0.6 and path not in odd:
         station.ask(srv.SaveCheckpoint, "save_checkpoint", path=path)
-    else:
-        station.ask(srv.LoadCheckpoint, "load_checkpoint", path=path)
-        station.others += 1000  # those that waited when it was saved
+        return "checkpoint"
+    if whole.exists() and rng.random() < 0.3:
+        content = bytearray(whole.read_bytes())
+        content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
+        whole.write_bytes(content)
+    station.ask(srv.LoadCheckpoint, "load_checkpoint", path=path)
+    station.others += 1000  # those that waited when it was saved
     return "checkpoint"
 
 
