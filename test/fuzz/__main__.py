@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -34,8 +35,9 @@ SCENES = "scenes"
 """The target that draws scenes and commands with Hypothesis; the others are those of `targets/`."""
 SHARE = 150.0
 """s for one portion, what it takes to compile its kernels included."""
-SILENCE = 400.0
-"""s without a new case after which a process is taken to hang; a mixture compiles in less on a busy machine."""
+BUSY, SILENCE = 300.0, 1800.0
+"""s of a core, and of wall time, without a new case after which a process is taken to hang. A mixture compiles in a
+third of the former; the latter is for what waits for ever, on a machine however busy."""
 
 
 @click.command()
@@ -143,13 +145,15 @@ class _Hunt:
                     self._console.print(f"{target} {number}: {kind}: {file}")
 
     def _wait(self, process: subprocess.Popen[bytes], place: Path) -> bool:
-        """Waits for the end of a process; whether it was silent for too long instead."""
-        heard = time.time()
+        """Waits for the end of a process; whether it came to no new case for too long instead."""
+        current = place / f"{CURRENT}.yaml"
+        case, since, used = 0.0, time.monotonic(), 0.0
         while process.poll() is None and not self._stopped:
             time.sleep(0.5)
-            current = place / f"{CURRENT}.yaml"
-            heard = max(heard, current.stat().st_mtime) if current.exists() else heard
-            if time.time() - heard > SILENCE:
+            began = current.stat().st_mtime if current.exists() else 0.0
+            if began != case:
+                case, since, used = began, time.monotonic(), _core_seconds(process.pid)
+            elif time.monotonic() - since > SILENCE or _core_seconds(process.pid) - used > BUSY:
                 return True
         return False
 
@@ -160,6 +164,15 @@ class _Hunt:
             if (file := place / f"{CURRENT}{suffix}").exists():
                 (self._folder / f"{stem}{suffix}").write_bytes(file.read_bytes())
         return self._folder / f"{stem}.yaml"
+
+
+def _core_seconds(process: int) -> float:
+    """CPU time of a process, s; 0 if it has ended."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # utime and stime, proc(5)
 
 
 if __name__ == "__main__":
