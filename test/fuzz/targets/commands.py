@@ -291,8 +291,9 @@ def _garbage(station: Station, rng: random.Random, _: Path) -> str:
             data[rng.randrange(before_numbers)] = rng.choice([0, 255, rng.randrange(256)])
         if rng.random() < 0.4:
             del data[rng.randrange(1, len(data)) :]
-    if topic != "commands" and len(data) >= 12:
-        station.valid[topic] |= _any_speed(topic, bytes(data))
+    arrives = bytes(data).ljust(len(data) + -len(data) % 4, b"\0")  # DDS fills up to whole words of four bytes
+    if topic != "commands" and len(arrives) >= 12:
+        station.valid[topic] |= _any_speed(topic, arrives)
     station.publish(topic, bytes(data))
     return "garbage"
 
