@@ -15,7 +15,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.errors import CheckpointError, ConveyorError
-from conveyor_sim.printable import printable
+from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
@@ -23,8 +23,6 @@ from conveyor_sim.simulation import Simulation
 
 LONGEST = 1000
 """Characters of a path."""
-SENTENCE = 2000
-"""Characters of an answer."""
 
 
 class CheckpointServices:
