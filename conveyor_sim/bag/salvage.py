@@ -242,7 +242,7 @@ class Salvage:
         head = head_at(self._data, after, len(self._data))
         return head is not None and head[0] in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX)
 
-    # What it amounts to
+    # The verdict
 
     def _names(self) -> None:
         """Topics and types that no chunk names any more are taken from the index."""

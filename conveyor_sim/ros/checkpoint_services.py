@@ -77,7 +77,7 @@ class CheckpointServices:
             raise CheckpointError("the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in")
         if not text.isprintable() or len(text) > LONGEST:
             expected = f"expected at most {LONGEST} characters that can be printed"
-            raise CheckpointError(f"path: {printable(text)} given, {expected}")
+            raise CheckpointError(f"path: '{printable(text)}' given, {expected}")
         return self._folder, self._folder / text
 
     async def _between_ticks(self, response: Any, what: Callable[[], None], done: str) -> Any:
