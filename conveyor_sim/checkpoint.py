@@ -24,6 +24,7 @@ from conveyor_sim.errors import CheckpointError, SceneError
 from conveyor_sim.files import MB, FileError, in_mb, read_file, write_file
 from conveyor_sim.model import versions_here
 from conveyor_sim.part_memory import wrong
+from conveyor_sim.printable import printable
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.difference import scene_difference
 from conveyor_sim.world_arrays import Arrays
@@ -125,9 +126,8 @@ def read_checkpoint(path: Path, scene: Scene | None = None, folder: Path | None 
 
 def damaged(path: Path, reason: object) -> CheckpointError:
     """The error for a file whose contents do not fit together."""
-    text = " ".join(str(reason).split()) or type(reason).__name__
-    short = text if len(text) <= 200 else f"{text[:196]} ..."
-    return CheckpointError(f"{path}: is damaged or cut short ({short}), expected a whole checkpoint")
+    text = printable(" ".join(str(reason).split())) or type(reason).__name__
+    return CheckpointError(f"{path}: is damaged or cut short ({text}), expected a complete checkpoint")
 
 
 def versions() -> list[str]:

@@ -15,7 +15,7 @@ with while_importing():
     from rich.table import Table
 
     from conveyor_sim.errors import ConveyorError
-    from conveyor_sim.printable import printable_lines
+    from conveyor_sim.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.progress import ProgressBar
     from conveyor_sim.signals import HandledOnce
     from conveyor_sim.version import __version__
@@ -210,9 +210,9 @@ def recover(bag: Path) -> None:
 
     report = recover_bag(bag)
     for sentence in report.damage:
-        click.echo(sentence)
+        click.echo(printable(sentence, SENTENCE))
     for phrase in report.unverified:
-        click.echo(f"{phrase}: has no checksum, so it can't be verified")
+        click.echo(f"{printable(phrase, SENTENCE)}: has no checksum, so it can't be verified")
     what = f"{report.message_count} messages up to {report.end_ns * 1e-9:.2f} s"
     if not report.healthy:
         click.echo(f"{bag}: repaired, with {what}")
@@ -258,7 +258,7 @@ def replay(
     with ProgressBar(f"replay {bag}", 0.0) as bar:
         report = replay_bag(bag, bar.update)
     for sentence in report.environment:
-        click.echo(f"not the same as in the recording: {sentence}")
+        click.echo(f"not the same as in the recording: {printable(sentence, SENTENCE)}")
     near = f"{TOLERANCE['x']:g} m, {TOLERANCE['vx']:g} m/s and {TOLERANCE['peak_force']:g} N"
     how = "bit for bit" if report.exact else f"within {near}"
     count = sum(report.compared.values())

@@ -2,6 +2,8 @@
 
 MOST = 200
 """Characters of one foreign text that are repeated."""
+SENTENCE = 10 * MOST
+"""Characters of a sentence that holds some of them."""
 
 
 def printable(text: object, most: int = MOST) -> str:
@@ -15,7 +17,7 @@ def printable(text: object, most: int = MOST) -> str:
     return shown if len(shown) <= most else f"{shown[: most - 1]}…"
 
 
-def printable_lines(text: object, most: int = 10 * MOST) -> str:
+def printable_lines(text: object, most: int = SENTENCE) -> str:
     """The same for text that may have several lines, each of at most `most` characters."""
     return "\n".join(printable(line, most) for line in str(text).split("\n"))
 

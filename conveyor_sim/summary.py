@@ -24,13 +24,11 @@ from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.printable import printable
+from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3
-SENTENCE = 2000
-"""Characters of one that was recorded."""
 TAKEN = (BOTTLES, SIGNALS, LEDGER, DAMAGE, DAMAGE_EVENT, OUTCOME, GUARD_EVENT)
 
 

@@ -344,7 +344,7 @@ def test_a_file_cut_short_anywhere_is_refused(saved: Path, tmp_path: Path) -> No
     for length in [4, *np.linspace(100, len(whole) - 1, 12, dtype=int)]:
         cut.write_bytes(whole[:length])
         assert refusal(cut).startswith("is damaged or cut short ("), length
-        assert refusal(cut).endswith("), expected a whole checkpoint"), length
+        assert refusal(cut).endswith("), expected a complete checkpoint"), length
 
 
 def test_every_flipped_bit_is_refused(saved: Path, tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""Whether a folder can take a recording, found out before anything is simulated or compiled for it."""
+"""The folder of a recording: whether it can take one, found out before anything is simulated or compiled for it."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,19 +12,44 @@ from conveyor_sim.errors import BagError
 
 def require_recordable(path: Path) -> None:
     """Raises BagError unless a folder is empty or can be made, and can be written to. Nothing stays behind."""
-    made: list[Path] = []
+    made = make_folder(path)
     try:
-        for folder in [*reversed(path.absolute().parents), path.absolute()]:
-            if not folder.is_dir():
-                folder.mkdir()
-                made.append(folder)
-        if any(path.iterdir()):
-            raise BagError(f"{path}: is not empty, expected a new or an empty folder to record into")
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
-        raise BagError(f"{path}: can't be created as the folder of a recording ({error.strerror})") from error
+        raise _refused(path, error) from error
     finally:
-        for folder in reversed(made):
-            with suppress(OSError):
-                folder.rmdir()
+        remove_folders(made)
+
+
+def make_folder(path: Path) -> list[Path]:
+    """Makes a folder for a recording; returns the folders that were not there before, the innermost first.
+
+    Raises BagError if it can't be made, or is not empty.
+    """
+    made: list[Path] = []
+    try:
+        made += [folder for folder in (path, *path.parents) if not folder.exists()]
+        path.mkdir(parents=True, exist_ok=True)
+        occupied = sorted(file.name for file in path.iterdir())
+    except OSError as error:
+        remove_folders(made)
+        raise _refused(path, error) from error
+    if occupied:
+        bag = next((name for name in occupied if ".mcap" in name), None)
+        holds = f" (it holds a recording, {bag})" if bag else ""
+        raise BagError(f"{path}: is not empty{holds}, expected a new or an empty folder to record into")
+    return made
+
+
+def remove_folders(folders: Iterable[Path]) -> None:
+    """Removes those that are empty, in this order."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _refused(path: Path, error: OSError) -> BagError:
+    # Only what is no folder makes mkdir say that the file exists.
+    why = "a file is in its place" if isinstance(error, FileExistsError) else error.strerror
+    return BagError(f"{path}: can't be created as the folder of a recording ({why})")

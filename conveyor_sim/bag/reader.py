@@ -25,11 +25,9 @@ from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.printable import printable
 
 T = TypeVar("T")
-
-TOLD = 200
-"""Characters of a library's error that are told."""
 
 
 @dataclass(frozen=True)
@@ -253,9 +251,8 @@ def in_one_sentence(path: Path, what: str = "can't be read as a bag") -> Iterato
     except ConveyorError:
         raise
     except Exception as error:
-        told = " ".join(f"{type(error).__name__}: {error}".split())
-        cut = told if len(told) <= TOLD else f"{told[:TOLD]}..."
-        raise BagError(f"{path}: {what} ({cut}); damaged? `conveyor-sim recover` may help") from error
+        reason = printable(" ".join(f"{type(error).__name__}: {error}".split()))
+        raise BagError(f"{path}: {what} ({reason}); damaged? `conveyor-sim recover` may help") from error
 
 
 def mcap_files(path: Path) -> list[Path]:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, McapFile, Schema
 from conveyor_sim.bag.metadata import to_yaml, write_metadata
 from conveyor_sim.bag.outputs import OUTPUTS
@@ -35,7 +36,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._waiting_since: float | None = None  # s of wall time; None: all has been flushed
         self._changed = threading.Condition()  # its lock is held by whoever uses the file
         name = f"{self.path.resolve().name}_0.mcap"
-        self._made = self._make_folder()
+        self._made = make_folder(self.path)
         self._storage = self.path / name
         try:
             self._stream = self._storage.open("xb")
@@ -48,21 +49,6 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._begun = False  # the first message, the line, is flushed at once: without it a bag can't be understood
         self._flusher = threading.Thread(target=self._keep_flushing, name="recorder", daemon=True)
         self._flusher.start()
-
-    def _make_folder(self) -> list[Path]:
-        """Makes the folder; returns the folders that were not there before, the innermost first."""
-        made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            occupied = sorted(file.name for file in self.path.iterdir())
-        except OSError as error:
-            self._remove(made)
-            raise BagError(f"{self.path}: can't be created as the folder of a recording ({error.strerror})") from error
-        if occupied:
-            bag = next((name for name in occupied if ".mcap" in name), None)
-            holds = f" (it holds a recording, {bag})" if bag else ""
-            raise BagError(f"{self.path}: is not empty{holds}, expected a new or an empty folder to record into")
-        return made
 
     def _register(self, topic: str) -> int:
         output = OUTPUTS[topic]
@@ -175,13 +161,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             self._stream.close()
         with contextlib.suppress(OSError):
             self._storage.unlink(missing_ok=True)
-        self._remove(self._made)
-
-    @staticmethod
-    def _remove(folders: Iterable[Path]) -> None:
-        for folder in folders:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
+        remove_folders(self._made)
 
 
 def new_run_folder(root: str | Path = "runs") -> Path:

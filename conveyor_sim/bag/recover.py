@@ -90,7 +90,7 @@ def recover(path: str | Path) -> RecoverReport:
             _require_states(path, contents)
         kept += [_put_in_place(file) for file, content in zip(files, contents, strict=True) if content.damage]
         if path.is_dir() and (aside := _refresh_metadata(path, contents)) is not None:
-            damage.append(f"{FILE_NAME} was missing or did not fit")
+            damage.append(f"{FILE_NAME} was missing or does not fit any more; it was written anew")
             kept += aside
     except OSError as error:
         raise BagError(f"{path}: can't be recovered ({error.strerror}); no original was deleted") from error

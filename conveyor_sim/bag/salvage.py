@@ -15,8 +15,6 @@ from conveyor_sim.bag.index import CRC_SIZE, DATA_END, DATA_END_HEAD, Index, rea
 from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, Data, Malformed, checksum, head_at, parse
 from conveyor_sim.errors import BagError
 
-WALL_CLOCK = 10**18
-"""ns: later log times are dates (from 2001 on), not simulated times."""
 PRIVATE = 0x80
 """Opcodes from here on are a writer's own, to be skipped."""
 
@@ -244,7 +242,7 @@ class Salvage:
         head = head_at(self._data, after, len(self._data))
         return head is not None and head[0] in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX)
 
-    # What it amounts to
+    # The verdict
 
     def _names(self) -> None:
         """Topics and types that no chunk names any more are taken from the index."""

@@ -34,7 +34,7 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
         if name not in known:
-            return f"{printable(name)}: no such {what}, expected one of {_listed(list(known))}"
+            return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
         if name in seen:
             return f"{name}: given twice"
         seen.add(name)
@@ -55,6 +55,7 @@ def shown(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _listed(known: Sequence[str]) -> str:
-    if len(known) <= LISTED:
-        return ", ".join(known) or "none: there are none"
-    return f"{', '.join(known[:LISTED])} and {len(known) - LISTED} others"
+    if not known:
+        return "none: the line has none"
+    others = f" and {len(known) - LISTED} others" if len(known) > LISTED else ""
+    return f"one of {', '.join(known[:LISTED])}{others}"

@@ -26,7 +26,7 @@ WATCHDOG = "watchdog"
 """Source of outcomes that the line itself brings about."""
 
 ARRIVAL = "arrival"
-"""Source of outcomes that tell of commands which never reached the line, many in one."""
+"""Source of outcomes that report commands which never reached the line, many in one."""
 
 _Pending = tuple[tuple[str, ...], tuple[Unchecked, ...], str]
 _Outcome = tuple[int, str, tuple[str, ...], tuple[Unchecked, ...], bool, str]

@@ -15,7 +15,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.errors import CheckpointError, ConveyorError
-from conveyor_sim.printable import printable
+from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
@@ -23,8 +23,6 @@ from conveyor_sim.simulation import Simulation
 
 LONGEST = 1000
 """Characters of a path."""
-SENTENCE = 2000
-"""Characters of an answer."""
 
 
 class CheckpointServices:
@@ -79,7 +77,7 @@ class CheckpointServices:
             raise CheckpointError("the parameter checkpoint_folder is empty, expected a folder to keep checkpoints in")
         if not text.isprintable() or len(text) > LONGEST:
             expected = f"expected at most {LONGEST} characters that can be printed"
-            raise CheckpointError(f"path: {printable(text)} given, {expected}")
+            raise CheckpointError(f"path: '{printable(text)}' given, {expected}")
         return self._folder, self._folder / text
 
     async def _between_ticks(self, response: Any, what: Callable[[], None], done: str) -> Any:

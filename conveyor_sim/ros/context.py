@@ -11,12 +11,17 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.errors import ConveyorError
 
 LAST_DOMAIN = 232  # beyond it the UDP ports of a domain (DDSI-RTPS 9.6.1.1) would be above 65535
+UNPROTECTED = (
+    "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_STRATEGY is not Enforce: where ROS finds no keys, this node goes on "
+    "without protection"
+)
 # rcl appends where in its sources an error came up, once a layer.
 _SOURCES = re.compile(r",? at \S+\.(?:c|cpp|h|hpp):\d+")
 
@@ -27,9 +32,14 @@ def start_ros(context: Context | None = None) -> None:
     Raises ConveyorError if the environment or the arguments (`--ros-args ...`) keep ROS from starting.
     """
     _check_domain()
-    _check_keystore()
+    is_asked_for = os.environ.get("ROS_SECURITY_ENABLE") == "true"
+    is_enforced = os.environ.get("ROS_SECURITY_STRATEGY") == "Enforce"
+    if is_asked_for and is_enforced:
+        _check_keystore()
     with _one_sentence():
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    if is_asked_for and not is_enforced:
+        get_logger("conveyor_sim").warning(UNPROTECTED)
 
 
 @contextmanager
@@ -56,9 +66,7 @@ def _check_domain() -> None:
 
 
 def _check_keystore() -> None:
-    """Without ROS_SECURITY_STRATEGY=Enforce ROS itself goes on unprotected; with it, not every cause is named."""
-    if os.environ.get("ROS_SECURITY_ENABLE") != "true" or os.environ.get("ROS_SECURITY_STRATEGY") != "Enforce":
-        return
+    """ROS itself does not name every cause."""
     keystore = os.environ.get("ROS_SECURITY_KEYSTORE", "")
     if not keystore:
         found = "not set"

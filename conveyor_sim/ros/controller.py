@@ -19,7 +19,7 @@ from rclpy.node import Node
 from conveyor_sim.bag.qos import QOS
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.printable import printable
+from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
@@ -114,7 +114,7 @@ class ControllerRun:
                 raise ConveyorError(f"lockstep to tick {target} refused: {response.reason}")
             for outcome in response.outcomes:
                 if not outcome.accepted:
-                    log.warning(f"{printable(', '.join(outcome.names))} refused: {printable(outcome.reason, 2000)}")
+                    log.warning(f"{printable(', '.join(outcome.names))} refused: {printable(outcome.reason, SENTENCE)}")
             tick, values = response.tick, response.signals.values
         log.info(f"ends at tick {tick}")
 

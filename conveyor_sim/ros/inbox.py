@@ -1,7 +1,7 @@
 """What became of all commands that were sent to the node, and how many may wait for the next tick.
 
 While the simulation is paused nothing takes commands away, so what waits is bounded, by count and by bytes. What is
-over, what can't be read and what DDS lost is counted and told of in one outcome for many, so that the telling is
+over, what can't be read and what DDS lost is counted, and reported in one outcome for many, so that the reports are
 bounded too.
 """
 

@@ -1,4 +1,4 @@
-"""Commands on their way into the line and what came of them, told in bounded words. For the stepping thread."""
+"""Commands on their way into the line, and their outcomes, counted and logged in bounds. For the stepping thread."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Reception:
         """For an answer; the last one says how many more there were."""
         kept = self._kept
         if self._dropped:
-            reason = f"{self._dropped} more outcomes are not told here, expected at most {KEPT} between two answers"
+            reason = f"{self._dropped} more outcomes were left out, expected at most {KEPT} between two answers"
             kept.append(CommandOutcome(tick, ARRIVAL, (), (), False, reason))
         self.forget_kept()
         return tuple(kept)

@@ -11,7 +11,7 @@ from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome, shown
-from conveyor_sim.printable import printable
+from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stopped import keep_stopped
 
@@ -81,7 +81,7 @@ class Session:
     def refuse(self, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str) -> None:
         """Tell those who listen that a command came too late to be applied; the recording is closed by then."""
         outcome = CommandOutcome(
-            self.simulation.tick, source, shown(names), values, accepted=False, reason=printable(reason, most=2000)
+            self.simulation.tick, source, shown(names), values, accepted=False, reason=printable(reason, SENTENCE)
         )
         self.outputs.tell(outcome)
 

@@ -190,13 +190,15 @@ class Stepper:
 
         Raises ConveyorError if the next run can't be opened; there is none to step then, until a reset succeeds.
         """
-        self._leave("the simulation was reset")
+        answer = self._leave("the simulation was reset")
         self._runs += 1
         try:
             self._enter(self._open_session(self._runs, None))
         except ConveyorError as error:
             self._fail(error)
             raise
+        finally:
+            answer()
         self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
 
     def save(self, path: Path, folder: Path | None = None) -> None:
@@ -211,9 +213,10 @@ class Stepper:
         """
         session = self._open_session(self._runs + 1, simulation)
         self._runs += 1
-        self._leave("a checkpoint was loaded")
+        answer = self._leave("a checkpoint was loaded")
         self._enter(session)
         self.state = State.PAUSED
+        answer()
         tick = session.simulation.tick
         self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + _to_bag(session))
         if tick >= session.last_tick:
@@ -264,13 +267,21 @@ class Stepper:
         """What the simulation is now, without outcomes."""
         return LockstepAnswer.of(self.simulation)
 
-    def _leave(self, reason: str) -> None:
-        """End this run, whatever is under way in it."""
-        self._abandon(reason)
+    def _leave(self, reason: str) -> Callable[[], None]:
+        """End this run, whatever is under way in it. Call the result once the next run is there: it answers a request
+        that was broken off, and the answer says by its run id that there is another run.
+        """
+        advance, self._advance = self._advance, None
         self.lockstep.clear()
         self.reception.forget_kept()
         self._close_recording()
         self.reception.give_up(self.session, reason)
+
+        def answer() -> None:
+            if advance is not None:
+                advance.failed(Refused(reason))
+
+        return answer
 
     def _enter(self, session: Session) -> None:
         self.session = session

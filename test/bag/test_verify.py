@@ -311,7 +311,7 @@ def test_a_bag_of_several_files_is_read_and_repaired_as_one(folder: Path, tmp_pa
             for topic, time, data in part:
                 file.add_message(topics[topic], data, time, time)
             file.finish()
-    assert recover(split).damage == ("metadata.yaml was missing or did not fit",)
+    assert recover(split).damage == ("metadata.yaml was missing or does not fit any more; it was written anew",)
     assert sorted(messages(split)) == sorted(before)
     assert replay(split).difference is None
     os.truncate(split / "split_1.mcap", (split / "split_1.mcap").stat().st_size - 60)
@@ -336,3 +336,20 @@ def test_the_example_tells_of_a_damaged_bag_in_one_line(scene: Scene, tmp_path: 
     assert done.returncode == 1
     assert "can't be read" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_a_damaged_attachment_is_left_out_and_its_name_escaped(tmp_path: Path) -> None:
+    file = tmp_path / "notes.mcap"
+    with file.open("wb") as stream:
+        writer = McapFile(stream, file.name, "jazzy")
+        channel = writer.add_topic("/on", Schema("std_msgs/msg/Bool", "ros2msg", b"bool data"), "cdr", {})
+        writer.add_message(channel, b"\x00\x01\x00\x00\x01", log_time=1, publish_time=1)
+        for name in ("good", "bad\x1b[2J\nforged"):
+            writer.add_attachment(name, "text/plain", f"text of {name}".encode(), log_time=1, create_time=1)
+        writer.finish()
+    file.write_bytes(file.read_bytes().replace(b"text of bad", b"text of Bad"))
+    done = CliRunner().invoke(main, ["recover", str(file)])
+    assert "notes.mcap: the attachment bad\\x1b[2J\\nforged is damaged" in done.output
+    assert "\x1b" not in done.output
+    with file.open("rb") as stream:
+        assert [attachment.name for attachment in make_reader(stream).iter_attachments()] == ["good"]

@@ -133,7 +133,7 @@ def test_without_belts_there_is_nothing_to_command() -> None:
     sim = simulation(bottles=[bottle(0.0, 0.0)])
     sim.command(["belts/one/cmd_speed"], [0.1])
     sim.advance()
-    assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected one of none: there are none"
+    assert sim.take_outcomes()[0].reason == "belts/one/cmd_speed: no such command, expected none: the line has none"
 
 
 def test_a_refusal_lists_some_of_many_names() -> None:

@@ -12,6 +12,8 @@ import pytest
 from ros.conftest import SMALL_LINE
 from ros.recording import record
 
+from conveyor_sim.ros.context import UNPROTECTED
+
 SIM_NODE = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", "-p", f"scene:={SMALL_LINE}"]
 CONVEYOR_SIM = str(Path(sys.executable).with_name("conveyor-sim"))
 ENFORCE = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
@@ -25,6 +27,11 @@ ALONE = {"ROS_DOMAIN_ID": "99", "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
 
 def refused(arguments: list[str], environment: Mapping[str, str]) -> str:
     """The sentence with which a program ends."""
+    return said(arguments, environment).splitlines()[-1]
+
+
+def said(arguments: list[str], environment: Mapping[str, str]) -> str:
+    """All that a program says until it ends with exit code 1."""
     done = subprocess.run(
         [sys.executable, *arguments],
         env={**os.environ, **ALONE, **environment},
@@ -35,7 +42,7 @@ def refused(arguments: list[str], environment: Mapping[str, str]) -> str:
     )
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stdout + done.stderr
-    return done.stderr.splitlines()[-1]
+    return done.stderr
 
 
 @pytest.mark.parametrize(
@@ -66,6 +73,12 @@ def test_of_a_keystore_that_cannot_be_used(tmp_path: Path) -> None:
         (enclave / f"{name}.p7s").write_text("none")
     text = refused(SIM_NODE, {**ENFORCE, "ROS_SECURITY_KEYSTORE": str(tmp_path)})
     assert text.startswith("sim_node: ROS can't start: ")
+
+
+@pytest.mark.parametrize("strategy", [{}, {"ROS_SECURITY_STRATEGY": "enforce"}], ids=["none", "wrong"])
+def test_who_asks_for_security_and_does_not_enforce_it_is_warned(strategy: Mapping[str, str]) -> None:
+    environment = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_KEYSTORE": "/no/such", **strategy}
+    assert UNPROTECTED in said([*SIM_NODE, "-p", "clock_rate:=-1.0"], environment)
 
 
 @pytest.mark.parametrize("name", ["plc_node", "controller_node"])

@@ -50,6 +50,18 @@ def test_a_request_sent_twice_at_once_is_carried_out_once(line: LineClient) -> N
     assert answers[2] == answers[0]
 
 
+def test_what_a_reset_breaks_off_is_answered_with_the_new_run(line: LineClient) -> None:
+    """Or its controller would take the refusal for one of the run that it is in."""
+    client = line.client(srv.Lockstep, "lockstep")
+    for _ in range(10):
+        answer = client.call_async(srv.Lockstep.Request(run_id="plc", target_tick=90_000))
+        until(lambda: line.lockstep(0).tick > 0, "the advance to begin")
+        line.reset()
+        response = until(answer.result, "the answer")
+        assert (response.accepted, response.reason) == (False, "the simulation was reset")
+        assert response.sim_run_id == line.lockstep(0).sim_run_id
+
+
 def test_a_stale_request_is_refused_and_tells_the_present_tick_and_signals(line: LineClient) -> None:
     at_ten = line.lockstep(10)
     response = line.lockstep(9)
