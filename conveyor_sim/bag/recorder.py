@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from conveyor_sim.bag.lock import claim
 from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, McapFile, Schema
 from conveyor_sim.bag.metadata import to_yaml, write_metadata
 from conveyor_sim.bag.outputs import OUTPUTS
@@ -39,6 +42,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._storage = self.path / name
         try:
             self._stream = self._storage.open("xb")
+            claim(self._stream)
             self._file = McapFile(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
             self._file.flush()  # a disk without room is noticed here
@@ -142,6 +146,8 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
     def _flush(self) -> None:
         try:
             self._file.flush()
+            if os.fstat(self._stream.fileno()).st_nlink == 0:
+                raise FileNotFoundError(errno.ENOENT, "the file was deleted")
         except OSError as error:
             self._fail(error)
         self._waiting_since = None
@@ -164,8 +170,14 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                 f"{self.path}: can't be recorded to ({error.strerror}): there is no room for the first message; "
                 "nothing was left there"
             ) from error
+        stopped = f"{self.path}: recording stopped at {self._file.info.end_ns * 1e-9:.2f} s"
+        if isinstance(error, FileNotFoundError):
+            raise BagError(
+                f"{stopped}, for the folder or its file was moved or deleted; if it was moved, `conveyor-sim recover` "
+                "repairs it where it is now"
+            ) from error
         raise BagError(
-            f"{self.path}: recording stopped at {self._file.info.end_ns * 1e-9:.2f} s ({error.strerror}); "
+            f"{stopped} ({error.strerror}); "
             f"what was written is kept: make room, then `conveyor-sim recover {self.path}`"
         ) from error
 

@@ -61,18 +61,26 @@ class _Found:
         return self.chunk.start_ns, self.chunk.end_ns, self.chunk.size
 
 
+class NothingLeft(BagError):
+    """A file in which there is nothing to recover; `why` is a phrase."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        super().__init__(f"{path}: {why}; nothing in it can be recovered")
+        self.why = why
+
+
 class Salvage:
     """Walks over a file's bytes when it is made; then says what was found.
 
-    Raises BagError if the file does not begin as an MCAP file does.
+    Raises NothingLeft if the file does not begin as an MCAP file does, and has no chunk either.
     """
 
     def __init__(self, path: Path, data: Data) -> None:
-        if data[: len(MAGIC)] != MAGIC:
-            what = "is empty" if len(data) == 0 else "does not begin as an MCAP file"
-            raise BagError(f"{path}: {what}; nothing in it can be recovered")
+        begins = data[: len(MAGIC)] == MAGIC
+        if not begins and next_chunk(data, 0, len(data)) is None:
+            raise NothingLeft(path, "is empty" if len(data) == 0 else "does not begin as an MCAP file")
         self.path = path
-        self.damage: list[str] = []
+        self.damage: list[str] = [] if begins else ["it does not begin as an MCAP file"]
         """What is wrong, a phrase each; nothing: what can be verified is as it was written."""
         self.unverified: list[str] = []
         """What carries no checksum, a phrase each."""

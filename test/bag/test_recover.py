@@ -195,9 +195,9 @@ def test_damaged_original_is_kept_unchanged(record_line: Make) -> None:
 
 def test_recovered_bag_damaged_again_keeps_both_originals(record_line: Make) -> None:
     folder = record_line("twice", TICKS)
-    cut(folder, 20_000)
+    file = cut(folder, 20_000)
     recover(folder)
-    cut(folder, 15_000)
+    cut(folder, file.stat().st_size - 20)
     report = recover(folder)
     assert [file.name for file in report.kept] == ["twice_0.mcap.damaged-2"]
     assert (folder / "twice_0.mcap.damaged").stat().st_size == 20_000
