@@ -136,7 +136,7 @@ def run(
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
     from conveyor_sim.achieved import achieved
     from conveyor_sim.bag.folder import require_recordable
-    from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.compilation import Compilation
     from conveyor_sim.explain import setting_line
     from conveyor_sim.model import build_model
@@ -148,7 +148,7 @@ def run(
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
     click.echo(setting_line(model))
-    folder = None if no_record else out or new_run_folder()
+    folder = None if no_record else click.get_current_context().with_resource(run_folder(out))
     if folder is not None:
         require_recordable(folder)  # not only once everything has been compiled
     Compilation(loaded, _say).run()

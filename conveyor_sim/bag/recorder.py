@@ -7,7 +7,7 @@ import errno
 import os
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from conveyor_sim.bag.lock import claim
@@ -42,6 +42,10 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._storage = self.path / name
         try:
             self._stream = self._storage.open("xb")
+        except OSError as error:  # it may be that of another process, which was faster
+            self._remove(self._made)
+            raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
+        try:
             claim(self._stream)
             self._file = McapFile(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
@@ -183,7 +187,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
     def _leave_nothing(self) -> None:
         """Removes what was made before the first message, so that the same folder can be recorded to later."""
-        with contextlib.suppress(OSError, AttributeError):
+        with contextlib.suppress(OSError):
             self._stream.close()
         with contextlib.suppress(OSError):
             self._storage.unlink(missing_ok=True)
@@ -197,10 +201,29 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
 
 def new_run_folder(root: str | Path = "runs") -> Path:
-    """A folder name that is not taken yet: ROOT/<UTC time>, such as runs/20250131T120501Z. Nothing is created."""
+    """Makes a folder ROOT/<UTC time>, such as runs/20250131T120501Z, which no other process has. Raises BagError."""
     stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     candidate, number = Path(root) / stamp, 2
-    while candidate.exists():
-        candidate = Path(root) / f"{stamp}-{number}"
-        number += 1
-    return candidate
+    while True:
+        try:
+            candidate.mkdir(parents=True)
+        except FileExistsError:
+            candidate = Path(root) / f"{stamp}-{number}"
+            number += 1
+        except OSError as error:
+            raise BagError(f"{candidate}: can't be created as the folder of a recording ({error.strerror})") from error
+        else:
+            return candidate
+
+
+@contextlib.contextmanager
+def run_folder(given: Path | None) -> Iterator[Path]:
+    """The folder given, or a new one of `new_run_folder`, which is gone afterwards if nothing is in it."""
+    folder = given or new_run_folder()
+    try:
+        yield folder
+    finally:
+        if given is None:
+            for empty in (folder, folder.parent):
+                with contextlib.suppress(OSError):
+                    empty.rmdir()

@@ -255,10 +255,11 @@ class Salvage:
     # What it amounts to
 
     def _names(self) -> None:
-        """Topics and types that no chunk names any more are taken from the index."""
+        """Topics and types that the data do not name any more are taken from the index."""
+        self._learn(self._loose_names)
+        self._named = {key for key, channel in self.channels.items() if channel.schema_id in self.schemas}
         if self._index is not None:
             self._learn((*self._index.schemas.values(), *self._index.channels.values()))
-        self._learn(self._loose_names)
         self.channels = {key: value for key, value in self.channels.items() if value.schema_id in self.schemas}
 
     def _judge(self) -> None:
@@ -277,6 +278,9 @@ class Salvage:
         nameless = sum(count for channel, count in counts.items() if channel not in self.channels)
         if nameless:
             self.damage.append(f"{nameless} messages were left out: what named their topics is damaged")
+        by_index = sum(count for channel, count in counts.items() if channel in self.channels.keys() - self._named)
+        if by_index and not self.damage:
+            self.damage.append(f"only the index names the topics of {by_index} messages")
         if any(found.chunk.crc == 0 for found in self._found):
             self.unverified.append("chunks")
         if self._loose:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import NonSeekingReader
 from mcap.writer import IndexType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as StockWriter
@@ -100,6 +101,21 @@ def test_a_recording_whose_folder_is_moved_is_complete_but_for_its_metadata(fold
         recorder.close()
     assert recover(tmp_path / "there").damage == ("metadata.yaml was missing or did not fit",)
     assert replay(tmp_path / "there").last_tick == TICKS
+
+
+def test_a_topic_that_only_the_index_names_is_damage(folder: Path, tmp_path: Path) -> None:
+    """Whoever reads the file from its beginning can't tell what the messages are."""
+    bag = written(folder, tmp_path / "flat", use_chunking=False)
+    file = bag / "flat_0.mcap"
+    content = file.read_bytes()
+    start = content.index(b"\x08\0\0\0/bottles\x03\0\0\0cdr") - 13  # opcode, length, number, schema
+    stop = start + 9 + int.from_bytes(content[start + 1 : start + 9], "little")
+    file.write_bytes(content[:start] + content[stop:])
+    assert any(sentence.startswith("flat_0.mcap: only the index names") for sentence in recover(bag).damage)
+    assert recover(bag).healthy
+    with file.open("rb") as stream:
+        topics = [channel.topic for _, channel, _ in NonSeekingReader(stream).iter_messages()]
+    assert "/bottles" in topics
 
 
 @pytest.mark.parametrize("count", [1, 8])
