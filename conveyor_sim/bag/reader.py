@@ -333,13 +333,16 @@ def _checked_files(path: Path) -> list[Path]:
     if not (path / FILE_NAME).exists():
         hint = "`conveyor-sim recover` repairs it" if files else "expected a rosbag2 folder"
         raise BagError(f"{path}: {FILE_NAME} is missing; {hint}")
-    if not files:
-        return []
     information = read_metadata(path)
     try:
         names = [] if information is None else file_names(information)
     except (KeyError, TypeError):
         names = []
+    for name in names:
+        if (path / name).exists() and not (path / name).is_file():  # a pipe would be waited for
+            raise BagError(f"{path / name}: is no regular file, expected one that {FILE_NAME} names")
+    if not files:
+        return []
     compressed = information is not None and str(information.get("compression_mode") or "none").lower() != "none"
     if names and (compressed or all(PurePath(name).suffix != ".mcap" for name in names)):
         return []  # rosbags unpacks what was compressed message by message or file by file

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -176,6 +177,17 @@ def test_metadata_that_calls_its_files_compressed_is_put_right(folder: Path) -> 
     assert not recover(folder).healthy
     assert (read_metadata(folder) or {})["compression_mode"] == ""
     assert replay(folder).last_tick == TICKS
+
+
+def test_a_pipe_in_place_of_a_file_is_not_waited_for(folder: Path) -> None:
+    metadata = folder / FILE_NAME
+    metadata.write_text(
+        metadata.read_text().replace("bag_0.mcap", "bag_0.db3").replace("identifier: mcap", "identifier: sqlite3")
+    )
+    next(folder.glob("*.mcap")).unlink()
+    os.mkfifo(folder / "bag_0.db3")
+    with pytest.raises(BagError, match=r"bag_0\.db3: is no regular file"):
+        open_bag(folder)
 
 
 @pytest.mark.parametrize("name", ["x" * 300, "no.yaml"])
