@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import signal
 import sys
 from pathlib import Path
@@ -41,6 +43,11 @@ class _Group(click.Group):
                 return super().invoke(ctx)
         except ConveyorError as error:
             raise click.ClickException(printable_lines(error)) from error
+        except OSError as error:
+            if error.errno == errno.EPIPE:
+                raise  # whoever read the output has gone: click ends without a word
+            where = f"{error.filename}: " if error.filename else ""
+            raise click.ClickException(printable_lines(f"{where}{error.strerror or error}")) from error
 
 
 @click.group(cls=_Group)
@@ -48,6 +55,9 @@ class _Group(click.Group):
 @click.pass_context
 def main(context: click.Context) -> None:
     """Bottles on industrial conveyors, simulated by force."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files may be bytes that are no text
     context.with_resource(HandledOnce([signal.SIGINT], signal.default_int_handler))
 
 
@@ -126,7 +136,7 @@ def run(
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
     from conveyor_sim.achieved import achieved
     from conveyor_sim.bag.folder import require_recordable
-    from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.compilation import Compilation
     from conveyor_sim.explain import setting_line
     from conveyor_sim.model import build_model
@@ -138,7 +148,7 @@ def run(
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
     click.echo(setting_line(model))
-    folder = None if no_record else out or new_run_folder()
+    folder = None if no_record else click.get_current_context().with_resource(run_folder(out))
     if folder is not None:
         require_recordable(folder)  # not only once everything has been compiled
     Compilation(loaded, _say).run()
@@ -320,7 +330,7 @@ def _account(scene: Scene, model: Model) -> Table:
 
     table = Table.grid(padding=(0, 2))
     fed = [_supply(entry) for _, entry in scene.entries()]
-    table.add_row("scene", f"{model.name}: {scene.description}" if scene.description else model.name)
+    table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))
     table.add_row("bottles", f"{len(initial_bottles(scene))} at the start; fed: {', '.join(fed) or 'none'}")
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")

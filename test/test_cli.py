@@ -8,11 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from bag.small_line import SMALL_LINE
+from bag.small_line import SMALL_LINE, record
 from click.testing import CliRunner, Result
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.cli import main
+from conveyor_sim.scene import load_scene
 
 Command = Callable[..., Result]
 
@@ -167,6 +168,34 @@ def test_bag_that_is_not_there_is_refused(command: Command, name: str) -> None:
 
 def test_scene_that_is_not_there_is_refused(command: Command) -> None:
     assert_refused(command("run", "gone.yaml"), "gone.yaml")
+
+
+def test_a_description_does_not_command_the_terminal(command: Command, tmp_path: Path) -> None:
+    text = SMALL_LINE.read_text(encoding="utf-8")
+    (tmp_path / "evil.yaml").write_text(re.sub("description: .*", r'description: "red \\e[31m"', text))
+    output = command("check", "evil.yaml").output
+    assert r"red \x1b[31m" in output
+    assert "\x1b" not in output
+
+
+def test_what_can_not_be_written_out_is_one_sentence(tmp_path: Path) -> None:
+    """A full disk behind the output, and a path that is no text."""
+    code = "from conveyor_sim.cli import main; main()"
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code, "explain", str(SMALL_LINE)], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert (done.returncode, done.stderr) == (1, "Error: No space left on device\n")
+    odd = tmp_path / "\udcff"
+    record(load_scene(SMALL_LINE), odd, 5)
+    done = subprocess.run([sys.executable, "-c", code, "recover", str(odd)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert r"\udcff: is whole" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["recover", "replay", "plot"])
+def test_a_path_that_is_too_long_is_refused(command: Command, name: str) -> None:
+    assert_refused(command(name, "x" * 300), "File name too long")
 
 
 def test_help_names_the_commands(command: Command) -> None:

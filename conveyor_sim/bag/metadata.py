@@ -156,6 +156,7 @@ def _essence(information: Mapping[str, Any]) -> tuple[Any, ...]:
         information["message_count"],
         topics,
         file_names(information),
+        str(information.get("compression_mode")).lower() == "file",  # then they would have other names
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
+from rosbags.rosbag2 import Reader
 
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.index import sealed
@@ -28,6 +30,9 @@ from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.printable import printable
 
 T = TypeVar("T")
+
+SUFFIXES = (".mcap", ".db3")
+"""Of files that are a bag by themselves."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,7 @@ class Bag(AbstractContextManager["Bag"]):
         self.verified = verified
         """Every byte is as it was written; False: some carry no checksum."""
         self._reader = reader
+        self._shares_position = _is_scanned(reader)
         line_topics = [c.topic for c in reader.connections if c.msgtype == messages.LINE and c.msgcount]
         if not line_topics:
             raise BagError(f"{path}: no message of type {messages.LINE}, expected the latched topic line")
@@ -138,12 +144,23 @@ class Bag(AbstractContextManager["Bag"]):
 
         If given: of some topics, from a log time on, before a log time.
         """
-        chosen = [c for c in self._reader.connections if topics is None or self._relative(c.topic) in topics]
-        if not chosen:
-            return
-        with in_one_sentence(self.path):
-            for connection, log_time, data in self._reader.messages(chosen, start_ns, stop_ns):
+        count, stated = 0, 0
+        with in_one_sentence(self.path), self._own_reader() as reader:
+            chosen = [c for c in reader.connections if topics is None or self._relative(c.topic) in topics]
+            if not chosen:
+                return
+            stated = sum(connection.msgcount for connection in chosen)
+            for connection, log_time, data in reader.messages(chosen, start_ns, stop_ns):
+                count += 1
                 yield self._relative(connection.topic), log_time, data
+        if start_ns is None and stop_ns is None and count < stated:
+            raise BagError(f"{self.path}: only {count} of {stated} messages can be read; damaged or cut short?")
+
+    def _own_reader(self) -> AbstractContextManager[AnyReader]:
+        """A reader that nobody else moves on: rosbags has one position for all who read a file without an index."""
+        if not self._shares_position:
+            return nullcontext(self._reader)
+        return AnyReader(self._reader.paths, default_typestore=typestore())
 
     def decode(self, topic: str, data: bytes) -> Any:
         """A rosbags message object. Raises BagError if the bytes are not one of the topic's type."""
@@ -220,6 +237,13 @@ class Bag(AbstractContextManager["Bag"]):
         return int(message.tick_ns if message.__msgtype__ == messages.LINE else self.line.tick_ns)
 
 
+def _is_scanned(reader: AnyReader) -> bool:
+    """Whether rosbags finds messages by going through a file, for want of an index of chunks."""
+    bags: list[Any] = [bag.storage for bag in reader.readers if isinstance(bag, Reader)]
+    storages = [file for bag in bags for file in getattr(bag, "storages", [bag])]
+    return any(not getattr(storage, "chunks", True) for storage in storages)
+
+
 def _offered(connection: Connection) -> Qos:
     profiles = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
     if not profiles:
@@ -269,9 +293,8 @@ def open_bag(path: str | Path) -> Bag:
     Raises BagError, in one sentence, if it is missing, cut short or damaged, or holds no `line`.
     """
     path = Path(path)
-    if not path.exists():
-        raise BagError(f"{path}: no such bag; expected a rosbag2 folder or an .mcap file")
     with in_one_sentence(path):
+        _require_bag(path)
         files = _checked_files(path)
         seals = [_verify(path, file) for file in files]
         verified = bool(seals) and all(seals)
@@ -286,6 +309,20 @@ def open_bag(path: str | Path) -> Bag:
             raise
 
 
+def _require_bag(path: Path) -> None:
+    """Raises BagError for what can't be one."""
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        raise BagError(f"{path}: no such bag; expected a rosbag2 folder or an .mcap file") from None
+    except OSError as error:
+        raise BagError(
+            f"{path}: can't be read ({error.strerror}), expected a rosbag2 folder or an .mcap file"
+        ) from error
+    if not (stat.S_ISDIR(kind) or (stat.S_ISREG(kind) and path.suffix in SUFFIXES)):
+        raise BagError(f"{path}: is no bag; expected a rosbag2 folder or an .mcap file")
+
+
 def _checked_files(path: Path) -> list[Path]:
     """The MCAP files that a bag consists of; none if rosbags must read it by its metadata.yaml."""
     if path.is_file():
@@ -294,13 +331,16 @@ def _checked_files(path: Path) -> list[Path]:
     if not (path / FILE_NAME).exists():
         hint = "`conveyor-sim recover` repairs it" if files else "expected a rosbag2 folder"
         raise BagError(f"{path}: {FILE_NAME} is missing; {hint}")
-    if not files:
-        return []
     information = read_metadata(path)
     try:
         names = [] if information is None else file_names(information)
     except (KeyError, TypeError):
         names = []
+    for name in names:
+        if (path / name).exists() and not (path / name).is_file():  # a pipe would be waited for
+            raise BagError(f"{path / name}: is no regular file, expected one that {FILE_NAME} names")
+    if not files:
+        return []
     compressed = information is not None and str(information.get("compression_mode") or "none").lower() != "none"
     if names and (compressed or all(PurePath(name).suffix != ".mcap" for name in names)):
         return []  # rosbags unpacks what was compressed message by message or file by file

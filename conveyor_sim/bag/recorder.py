@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from conveyor_sim.bag.folder import make_folder, remove_folders
+from conveyor_sim.bag.lock import claim
 from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, McapFile, Schema
 from conveyor_sim.bag.metadata import to_yaml, write_metadata
 from conveyor_sim.bag.outputs import OUTPUTS
@@ -40,6 +43,11 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._storage = self.path / name
         try:
             self._stream = self._storage.open("xb")
+        except OSError as error:  # it may be that of another process, which was faster
+            remove_folders(self._made)
+            raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
+        try:
+            claim(self._stream)
             self._file = McapFile(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
             self._file.flush()  # a disk without room is noticed here
@@ -128,6 +136,8 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
     def _flush(self) -> None:
         try:
             self._file.flush()
+            if os.fstat(self._stream.fileno()).st_nlink == 0:
+                raise FileNotFoundError(errno.ENOENT, "the file was deleted")
         except OSError as error:
             self._fail(error)
         self._waiting_since = None
@@ -150,14 +160,20 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
                 f"{self.path}: can't be recorded to ({error.strerror}): there is no room for the first message; "
                 "nothing was left there"
             ) from error
+        stopped = f"{self.path}: recording stopped at {self._file.info.end_ns * 1e-9:.2f} s"
+        if isinstance(error, FileNotFoundError):
+            raise BagError(
+                f"{stopped}, for the folder or its file was moved or deleted; if it was moved, `conveyor-sim recover` "
+                "repairs it where it is now"
+            ) from error
         raise BagError(
-            f"{self.path}: recording stopped at {self._file.info.end_ns * 1e-9:.2f} s ({error.strerror}); "
+            f"{stopped} ({error.strerror}); "
             f"what was written is kept: make room, then `conveyor-sim recover {self.path}`"
         ) from error
 
     def _leave_nothing(self) -> None:
         """Removes what was made before the first message, so that the same folder can be recorded to later."""
-        with contextlib.suppress(OSError, AttributeError):
+        with contextlib.suppress(OSError):
             self._stream.close()
         with contextlib.suppress(OSError):
             self._storage.unlink(missing_ok=True)
@@ -165,10 +181,29 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
 
 
 def new_run_folder(root: str | Path = "runs") -> Path:
-    """A folder name that is not taken yet: ROOT/<UTC time>, such as runs/20250131T120501Z. Nothing is created."""
+    """Makes a folder ROOT/<UTC time>, such as runs/20250131T120501Z, which no other process has. Raises BagError."""
     stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     candidate, number = Path(root) / stamp, 2
-    while candidate.exists():
-        candidate = Path(root) / f"{stamp}-{number}"
-        number += 1
-    return candidate
+    while True:
+        try:
+            candidate.mkdir(parents=True)
+        except FileExistsError:
+            candidate = Path(root) / f"{stamp}-{number}"
+            number += 1
+        except OSError as error:
+            raise BagError(f"{candidate}: can't be created as the folder of a recording ({error.strerror})") from error
+        else:
+            return candidate
+
+
+@contextlib.contextmanager
+def run_folder(given: Path | None) -> Iterator[Path]:
+    """The folder given, or a new one of `new_run_folder`, which is gone afterwards if nothing is in it."""
+    folder = given or new_run_folder()
+    try:
+        yield folder
+    finally:
+        if given is None:
+            for empty in (folder, folder.parent):
+                with contextlib.suppress(OSError):
+                    empty.rmdir()

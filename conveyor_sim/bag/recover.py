@@ -7,13 +7,14 @@ import os
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
 from conveyor_sim.bag.compare import COMPARERS
 from conveyor_sim.bag.index import read_index, sealed
+from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.mcap_file import McapFile, Schema, topic_info
 from conveyor_sim.bag.metadata import (
     FILE_NAME,
@@ -21,6 +22,7 @@ from conveyor_sim.bag.metadata import (
     FileInfo,
     TopicInfo,
     bag_information,
+    file_names,
     fits,
     read_metadata,
     write_metadata,
@@ -28,7 +30,7 @@ from conveyor_sim.bag.metadata import (
 from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.bag.records import mapped
-from conveyor_sim.bag.salvage import Salvage
+from conveyor_sim.bag.salvage import NothingLeft, Salvage
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import BagError
 
@@ -63,6 +65,7 @@ class _Content:
     topics: tuple[TopicInfo, ...]
     damage: tuple[str, ...] = ()
     unverified: tuple[str, ...] = ()
+    nothing_left: bool = False
 
 
 def recover(path: str | Path) -> RecoverReport:
@@ -70,34 +73,42 @@ def recover(path: str | Path) -> RecoverReport:
 
     The copy takes the old file's place only when all is written and at least one recorded state is left; the old file
     stays as *.damaged, a metadata.yaml that does not fit too.
-    Raises BagError if there is nothing to recover or no room for the new file; then nothing has changed.
+    Raises BagError if there is nothing to recover, no room for the new file, or if it is still being recorded; then
+    nothing has changed.
     """
     path = Path(path)
-    files = mcap_files(path)
-    if not files:
-        raise BagError(f"{path}: no MCAP file found, expected a rosbag2 folder or an .mcap file")
     damage: list[str] = []
     unverified: list[str] = []
     kept: list[Path] = []
     contents: list[_Content] = []
-    try:
-        for file in files:
-            content = _repair(file)
-            damage += [f"{file.name}: {sentence}" for sentence in content.damage]
-            unverified += [f"{file.name}: {phrase}" for phrase in content.unverified]
-            contents.append(content)
-        if damage:
-            _require_states(path, contents)
-        kept += [_put_in_place(file) for file, content in zip(files, contents, strict=True) if content.damage]
-        if path.is_dir() and (aside := _refresh_metadata(path, contents)) is not None:
-            damage.append(f"{FILE_NAME} was missing or does not fit any more; it was written anew")
-            kept += aside
-    except OSError as error:
-        raise BagError(f"{path}: can't be recovered ({error.strerror}); no original was deleted") from error
-    finally:
-        for file in files:
-            with contextlib.suppress(OSError):
-                _temporary(file).unlink()
+    files: list[Path] = []
+    with contextlib.ExitStack() as locks:
+        try:
+            files = mcap_files(path)
+            if not files:
+                raise BagError(f"{path}: no MCAP file found, expected a rosbag2 folder or an .mcap file")
+            for file in files:
+                locks.enter_context(alone(file))
+            contents = _repair_all(files)
+            for content in contents:
+                damage += [f"{content.file.path}: {sentence}" for sentence in content.damage]
+                unverified += [f"{content.file.path}: {phrase}" for phrase in content.unverified]
+            damage += _missing(path)
+            if damage:
+                _require_states(path, contents)
+            for file, content in zip(files, contents, strict=True):
+                if content.damage:
+                    kept.append(_set_aside(file) if content.nothing_left else _put_in_place(file))
+            contents = [content for content in contents if not content.nothing_left]
+            if path.is_dir() and (aside := _refresh_metadata(path, contents)) is not None:
+                damage.append(f"{FILE_NAME} was missing or does not fit any more; it was written anew")
+                kept += aside
+        except OSError as error:
+            raise BagError(f"{path}: can't be recovered ({error.strerror}); no original was deleted") from error
+        finally:
+            for file in files:
+                with contextlib.suppress(OSError):
+                    _temporary(file).unlink()
     return RecoverReport(
         path=path,
         healthy=not damage,
@@ -112,6 +123,36 @@ def recover(path: str | Path) -> RecoverReport:
 
 def _temporary(file: Path) -> Path:
     return file.with_name(f"{file.name}.recovering")
+
+
+def _repair_all(files: list[Path]) -> list[_Content]:
+    """What is sound of each file. Raises BagError if nothing can be recovered of any."""
+    contents: list[_Content] = []
+    failures: list[NothingLeft] = []
+    for file in files:
+        try:
+            contents.append(_repair(file))
+        except NothingLeft as failure:
+            failures.append(failure)
+            contents.append(_Content(FileInfo(file.name, 0, 0, 0), (), (failure.why,), nothing_left=True))
+    if len(failures) == len(files):
+        raise failures[0]
+    return contents
+
+
+def _missing(folder: Path) -> list[str]:
+    """The MCAP files that metadata.yaml names and that are not there, a sentence each."""
+    information = read_metadata(folder) or {}
+    try:
+        names = [name for name in file_names(information) if PurePath(name).suffix == ".mcap"]
+        counts = {PurePath(file["path"]).name: file["message_count"] for file in information.get("files") or []}
+    except (KeyError, TypeError):
+        return []
+    return [
+        f"{name}: is missing, with {counts.get(name, 'an unknown number of')} messages"
+        for name in names
+        if not (folder / name).exists()
+    ]
 
 
 def _repair(file: Path) -> _Content:
@@ -195,6 +236,13 @@ def _put_in_place(file: Path) -> Path:
     return aside
 
 
+def _set_aside(file: Path) -> Path:
+    """Gives a file of which nothing is left a name ending in .damaged; returns that name."""
+    aside = _aside(file)
+    file.rename(aside)
+    return aside
+
+
 def _aside(file: Path) -> Path:
     aside, number = file.with_name(f"{file.name}.damaged"), 2
     while aside.exists():
@@ -217,6 +265,11 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | No
     old = read_metadata(folder)
     distro = str(old["ros_distro"]) if old and old.get("ros_distro") else default_distro()
     expected = bag_information(merged, [content.file for content in contents], distro)
+    if old is not None:  # what no MCAP file tells
+        told = ["custom_data"]
+        if str(old.get("compression_mode")).lower() == "message":  # a compressed file would not be MCAP
+            told += ["compression_format", "compression_mode"]
+        expected |= {key: old[key] for key in told if key in old}
     if old is not None and fits(old, expected):
         return None
     kept = []

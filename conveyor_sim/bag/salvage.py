@@ -59,18 +59,26 @@ class _Found:
         return self.chunk.start_ns, self.chunk.end_ns, self.chunk.size
 
 
+class NothingLeft(BagError):
+    """A file in which there is nothing to recover; `why` is a phrase."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        super().__init__(f"{path}: {why}; nothing in it can be recovered")
+        self.why = why
+
+
 class Salvage:
     """Walks over a file's bytes when it is made; then says what was found.
 
-    Raises BagError if the file does not begin as an MCAP file does.
+    Raises NothingLeft if the file does not begin as an MCAP file does, and has no chunk either.
     """
 
     def __init__(self, path: Path, data: Data) -> None:
-        if data[: len(MAGIC)] != MAGIC:
-            what = "is empty" if len(data) == 0 else "does not begin as an MCAP file"
-            raise BagError(f"{path}: {what}; nothing in it can be recovered")
+        begins = data[: len(MAGIC)] == MAGIC
+        if not begins and next_chunk(data, 0, len(data)) is None:
+            raise NothingLeft(path, "is empty" if len(data) == 0 else "does not begin as an MCAP file")
         self.path = path
-        self.damage: list[str] = []
+        self.damage: list[str] = [] if begins else ["it does not begin as an MCAP file"]
         """What is wrong, a phrase each; nothing: what can be verified is as it was written."""
         self.unverified: list[str] = []
         """What carries no checksum, a phrase each."""
@@ -245,10 +253,11 @@ class Salvage:
     # The verdict
 
     def _names(self) -> None:
-        """Topics and types that no chunk names any more are taken from the index."""
+        """Topics and types that the data do not name any more are taken from the index."""
+        self._learn(self._loose_names)
+        self._named = {key for key, channel in self.channels.items() if channel.schema_id in self.schemas}
         if self._index is not None:
             self._learn((*self._index.schemas.values(), *self._index.channels.values()))
-        self._learn(self._loose_names)
         self.channels = {key: value for key, value in self.channels.items() if value.schema_id in self.schemas}
 
     def _judge(self) -> None:
@@ -267,6 +276,9 @@ class Salvage:
         nameless = sum(count for channel, count in counts.items() if channel not in self.channels)
         if nameless:
             self.damage.append(f"{nameless} messages were left out: what named their topics is damaged")
+        by_index = sum(count for channel, count in counts.items() if channel in self.channels.keys() - self._named)
+        if by_index and not self.damage:
+            self.damage.append(f"only the index names the topics of {by_index} messages")
         if any(found.chunk.crc == 0 for found in self._found):
             self.unverified.append("chunks")
         if self._loose:

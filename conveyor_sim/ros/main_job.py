@@ -15,7 +15,7 @@ from conveyor_sim.interrupt import STATUS, one_line, while_importing
 with while_importing():
     import click
 
-    from conveyor_sim.bag.recorder import new_run_folder
+    from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.compilation import compiling, seconds_to_compile
     from conveyor_sim.errors import ConveyorError, Interrupted
     from conveyor_sim.model import build_model
@@ -112,9 +112,9 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 @click.option("--outside-tables", is_flag=True, help="Let SCENE name tables (CSV) that lie outside its own folder.")
 def main(scene: str, out: Path | None, duration: float | None, outside_tables: bool) -> None:
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
-    bag = out or new_run_folder()
     try:
-        report(bag, run_in_lockstep(scene, bag, duration, outside_tables))
+        with run_folder(out) as bag:
+            report(bag, run_in_lockstep(scene, bag, duration, outside_tables))
     except ConveyorError as error:
         print(f"main job: {printable_lines(error)}", file=sys.stderr)
         sys.exit(STATUS if isinstance(error, Interrupted) else 1)

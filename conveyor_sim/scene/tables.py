@@ -61,14 +61,14 @@ def _points(path: str, beside: Beside | None) -> list[list[float]]:
         raise ValueError("expected a CSV file in UTF-8") from None
     points: list[list[float]] = []
     rows = csv.reader(text.splitlines())
-    for row in rows:
+    while (row := _next(rows)) is not None:
         cells = [cell.strip() for cell in row]
         if not any(cells):
             continue
         try:
             overlap, force = (float(cell) for cell in cells)
         except ValueError:
-            if not points and rows.line_num == 1:
+            if rows.line_num == 1 and not any(map(_is_number, cells)):
                 continue  # the names of the columns
             # What lies elsewhere may be no table but somebody's secret.
             wrong = f"is {shown(','.join(row))}" if is_inside else "is something else"
@@ -79,6 +79,23 @@ def _points(path: str, beside: Beside | None) -> list[list[float]]:
     if not points:
         raise ValueError(f"{_ROWS}: it has none")
     return points
+
+
+def _next(rows: Any) -> list[str] | None:
+    """The next row of a CSV reader; None after the last. ValueError for what is no CSV."""
+    try:
+        row: list[str] | None = next(rows, None)
+    except csv.Error as error:
+        raise ValueError(f"{_ROWS}: line {rows.line_num} of it can't be read ({error})") from None
+    return row
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _content(path: str, beside: Beside) -> tuple[bytes, bool]:

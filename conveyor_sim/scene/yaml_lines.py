@@ -111,9 +111,12 @@ class Document:
             value = self._yaml.constructor.construct_object(node)
             if isinstance(value, int) and value.bit_length() > 1024:
                 raise ValueError("beyond every float")
-        except (ConstructorError, ValueError):
+            if isinstance(value, str):
+                value.encode()  # half of a character ("\\ud800") can be neither shown nor recorded
+        except (ConstructorError, ValueError, KeyError):  # KeyError: "!!bool maybe"
             line = node.start_mark.line + 1
-            raise self._error(line, f"a value that can't be read: {cut(str(node.value))}") from None
+            text = str(node.value).encode(errors="backslashreplace").decode()
+            raise self._error(line, f"a value that can't be read: {cut(text)}") from None
         return value if value is None or isinstance(value, (str, int, float)) else str(node.value)
 
 

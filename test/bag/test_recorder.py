@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 
 from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.bag.recorder import Recorder, new_run_folder
+from conveyor_sim.bag.recorder import Recorder, new_run_folder, run_folder
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import BagError
@@ -134,11 +134,32 @@ def test_closing_twice_is_harmless_and_ends_the_recording(tmp_path: Path) -> Non
 
 
 def test_run_folders_do_not_collide(tmp_path: Path) -> None:
-    taken = new_run_folder(tmp_path)
-    taken.mkdir()
-    again = new_run_folder(tmp_path)
-    assert again != taken
-    assert not again.exists()
+    """Those of processes that begin in the same second."""
+    folders = [new_run_folder(tmp_path / "runs") for _ in range(3)]
+    assert sorted(folders) == sorted((tmp_path / "runs").iterdir())
+
+
+def test_run_folder_of_a_run_that_failed_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ZeroDivisionError), run_folder(None) as folder:
+        assert folder.is_dir()
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+class Slower(Recorder):
+    """One that another process overtakes: it records to the folder that this one has just found empty."""
+
+    def _make_folder(self) -> list[Path]:
+        made = super()._make_folder()
+        (self.path / "both_0.mcap").write_bytes(b"of the other")
+        return made
+
+
+def test_a_recorder_that_comes_second_does_not_take_away_the_first_ones_file(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match=r"both_0\.mcap: can't be written"):
+        Slower(tmp_path / "both")
+    assert (tmp_path / "both" / "both_0.mcap").read_bytes() == b"of the other"
 
 
 FILL = """

@@ -60,7 +60,6 @@ def main(minutes: float, seed: int, targets: tuple[str, ...], jobs: int, again: 
         click.echo(_again(again))
         return
     folder, figures = new_run_folder(ROOT / "runs" / "fuzz"), Figures(seed)
-    folder.mkdir(parents=True)
     console = Console(file=sys.stderr, markup=False, highlight=False)
     hunt = _Hunt(targets or (SCENES, *TARGETS), seed, folder, figures, console, until=time.monotonic() + 60.0 * minutes)
     begin = time.monotonic()

@@ -38,6 +38,21 @@ def test_points_are_read_beside_the_scene(content: str | bytes, tmp_path: Path) 
     assert load_scene(written(tmp_path, content)).contacts[1].table == POINTS
 
 
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("0,0.O\n0.001,5\n", 'line 1 of it is "0,0.O"'),
+        ("0,0\n0.001," + "5" * 200_000, "line 2 of it can't be read"),
+    ],
+    ids=["typing error in the first row", "endless cell"],
+)
+def test_a_row_that_can_not_be_read_is_named(content: str, says: str, tmp_path: Path) -> None:
+    """A first row that holds a number is no header."""
+    with pytest.raises(SceneError) as caught:
+        load_scene(written(tmp_path, content))
+    assert says in str(caught.value)
+
+
 def test_a_table_that_starts_above_zero_is_kept_as_it_is(tmp_path: Path) -> None:
     """Its first point (0, 0) is filled in where the columns are built."""
     assert load_scene(written(tmp_path, "0.001,5\n0.002,15.5")).contacts[1].table == POINTS[1:]
@@ -89,7 +104,7 @@ def test_lines_stay_those_of_the_scene(tmp_path: Path) -> None:
     [
         ("0,0\n0.001,x\n", 'expected two numbers a line, overlap and force (m, N): line 2 of it is "0.001,x"'),
         ("0,0\n0.001\n", 'expected two numbers a line, overlap and force (m, N): line 2 of it is "0.001"'),
-        ("0,0,0\n1,1,1\n", 'expected two numbers a line, overlap and force (m, N): line 2 of it is "1,1,1"'),
+        ("0,0,0\n1,1,1\n", 'expected two numbers a line, overlap and force (m, N): line 1 of it is "0,0,0"'),
         ("overlap,force\n", "expected two numbers a line, overlap and force (m, N): it has none"),
         ("", "expected two numbers a line, overlap and force (m, N): it has none"),
         (b"\xff\xfe", "expected a CSV file in UTF-8"),

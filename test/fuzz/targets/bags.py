@@ -76,14 +76,15 @@ def bases() -> tuple[Base, ...]:
     bag = _base("own", own, checked=True, sealed=True)
     end = max(stop for opcode, _, stop in bag.records if opcode == 7)
     killed = Base("killed", bag.content[:end], b"", _records(bag.content[:end]), bag.messages, True, True)
-    return (bag, killed, _stock(own), _bare(own, compressed=True), _bare(own, compressed=False))
+    bare = (_bare(own, compressed=True), _bare(own, compressed=False))
+    return (bag, killed, _stock(own, "stock"), *bare, _stock(own, "flat"))
 
 
 def attack(seed: int, place: Path) -> str:
     """Damages a bag, then reads, replays, draws and repairs it."""
     rng = np.random.default_rng(seed)
     known = bases()
-    base = known[int(rng.choice(len(known), p=[0.4, 0.15, 0.25, 0.1, 0.1]))]
+    base = known[int(rng.choice(len(known), p=[0.4, 0.15, 0.2, 0.1, 0.05, 0.1]))]
     content = base.content
     for _ in range(int(rng.choice([1, 2, 3], p=[0.7, 0.2, 0.1]))):
         content = EDITS[int(rng.integers(len(EDITS)))](base, content, rng)
@@ -283,13 +284,13 @@ def _records(content: bytes) -> tuple[tuple[int, int, int], ...]:
     return tuple(found)
 
 
-def _stock(own: Path) -> Base:
-    """As rosbag2 writes by default: checksums of chunks and index, none over all."""
-    bag = folder() / "stock"
+def _stock(own: Path, name: str) -> Base:
+    """As rosbag2 writes: checksums of chunks and index, none over all; "flat": without chunks."""
+    bag, chunked = folder() / name, name != "flat"
     bag.mkdir()
-    (bag / METADATA).write_bytes((own / METADATA).read_bytes().replace(b"own_0.mcap", b"stock_0.mcap"))
-    with (own / "own_0.mcap").open("rb") as source, (bag / "stock_0.mcap").open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=40_000)
+    (bag / METADATA).write_bytes((own / METADATA).read_bytes().replace(b"own_0.mcap", f"{name}_0.mcap".encode()))
+    with (own / "own_0.mcap").open("rb") as source, (bag / f"{name}_0.mcap").open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=40_000, use_chunking=chunked)
         writer.start("ros2", "stock")
         reader = make_reader(source)
         summary = reader.get_summary()
@@ -307,7 +308,7 @@ def _stock(own: Path) -> Base:
         for _, channel, message in reader.iter_messages(log_time_order=False):
             writer.add_message(channels[channel.id], message.log_time, message.data, message.publish_time)
         writer.finish()
-    return _base("stock", bag, checked=True, sealed=False)
+    return _base(name, bag, checked=chunked, sealed=False)
 
 
 def _bare(own: Path, *, compressed: bool) -> Base:
