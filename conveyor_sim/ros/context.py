@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import rclpy
 from rclpy.context import Context
@@ -15,8 +16,10 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.parameter_types import refuse_unknown_types
 
 LAST_DOMAIN = 232  # beyond it the UDP ports of a domain (DDSI-RTPS 9.6.1.1) would be above 65535
+PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # of Jazzy, of Kilted
 # rcl appends where in its sources an error came up, once a layer.
 _SOURCES = re.compile(r",? at \S+\.(?:c|cpp|h|hpp):\d+")
 
@@ -28,7 +31,8 @@ def start_ros(context: Context | None = None) -> None:
     """
     _check_domain()
     _check_keystore()
-    with _one_sentence():
+    _check_profile()
+    with one_sentence():
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
@@ -44,8 +48,10 @@ def running_ros() -> Iterator[None]:
 
 def new_node(name: str, **options: Any) -> Node:
     """rclpy's Node(name, **options). Raises ConveyorError if DDS or ROS refuses it."""
-    with _one_sentence():
-        return Node(name, **options)
+    with one_sentence():
+        node = Node(name, **options)
+    refuse_unknown_types(node)
+    return node
 
 
 def _check_domain() -> None:
@@ -72,10 +78,26 @@ def _check_keystore() -> None:
     )
 
 
+def _check_profile() -> None:
+    """Fast DDS goes on without a profile that it can't read, and whoever it was to keep out comes in."""
+    for name in PROFILES:
+        file = os.environ.get(name, "")
+        try:
+            if file:
+                ElementTree.parse(file)
+        except OSError as error:
+            raise ConveyorError(f"{name}: {file!r} given, which can't be read ({error.strerror})") from error
+        except ElementTree.ParseError as error:
+            raise ConveyorError(f"{name}: {file!r} given, which is no XML ({error}), expected a profile") from error
+
+
 @contextmanager
-def _one_sentence() -> Iterator[None]:
+def one_sentence() -> Iterator[None]:
+    """What rclpy raises becomes a ConveyorError."""
     try:
         yield
+    except ConveyorError:
+        raise
     except Exception as error:  # rclpy's own classes, and RuntimeError for what a library of C++ raises
         text = " ".join(_SOURCES.sub("", str(error)).split())
         if "security libraries" in text:

@@ -126,6 +126,7 @@ class Stepper:
             self._wake.notify()
         if self._thread.is_alive():
             self._thread.join()
+        self._close_recording()  # of a run that never began
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """Have `function` called between two ticks; calls and commands are taken in the order of their arrival."""
