@@ -191,13 +191,16 @@ class Stepper:
 
         Raises ConveyorError if the next run can't be opened; there is none to step then, until a reset succeeds.
         """
-        self._leave("the simulation was reset")
+        reason = "the simulation was reset"
+        broken_off = self._leave(reason)
         self._runs += 1
         try:
             self._enter(self._open_session(self._runs, None))
         except ConveyorError as error:
             self._fail(error)
             raise
+        finally:
+            _refuse(broken_off, reason)
         self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
 
     def save(self, path: Path, folder: Path | None = None) -> None:
@@ -212,8 +215,10 @@ class Stepper:
         """
         session = self._open_session(self._runs + 1, simulation)
         self._runs += 1
-        self._leave("a checkpoint was loaded")
+        reason = "a checkpoint was loaded"
+        broken_off = self._leave(reason)
         self._enter(session)
+        _refuse(broken_off, reason)
         self.state = State.PAUSED
         tick = session.simulation.tick
         self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + _to_bag(session))
@@ -256,22 +261,24 @@ class Stepper:
         self.pacer.catch_breath(time.monotonic())
 
         def done() -> None:
-            answer.set_result(LockstepAnswer.of(simulation, self.reception.take_kept(simulation.tick)))
+            outcomes = self.reception.take_kept(simulation.tick)
+            answer.set_result(LockstepAnswer.of(simulation, self.run_id, outcomes))
 
         self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
 
     def present(self) -> LockstepAnswer:
         """What the simulation is now, without outcomes."""
-        return LockstepAnswer.of(self.simulation)
+        return LockstepAnswer.of(self.simulation, self.run_id)
 
-    def _leave(self, reason: str) -> None:
-        """End this run, whatever is under way in it."""
-        self._abandon(reason)
+    def _leave(self, reason: str) -> _Advance | None:
+        """End this run; what was under way in it is to be refused once the next one is there, which the answer names."""
+        broken_off, self._advance = self._advance, None
         self.lockstep.clear()
         self.reception.forget_kept()
         self._close_recording()
         self.reception.give_up(self.session, reason)
+        return broken_off
 
     def _enter(self, session: Session) -> None:
         self.session = session
@@ -403,9 +410,8 @@ class Stepper:
         self._close_recording()
 
     def _abandon(self, reason: str) -> None:
-        if self._advance is not None:
-            advance, self._advance = self._advance, None
-            advance.failed(Refused(reason))
+        advance, self._advance = self._advance, None
+        _refuse(advance, reason)
 
     def _close_recording(self) -> None:
         try:
@@ -413,6 +419,11 @@ class Stepper:
         except ConveyorError as error:
             self.failure = str(error)
             self._log.error(f"the recording may be incomplete: {error}")
+
+
+def _refuse(advance: _Advance | None, reason: str) -> None:
+    if advance is not None:
+        advance.failed(Refused(reason))
 
 
 def _to_bag(session: Session) -> str:
