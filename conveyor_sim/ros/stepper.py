@@ -29,6 +29,8 @@ from conveyor_sim.simulation import Simulation
 
 T = TypeVar("T")
 IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens
+MOST_CALLS = 100
+"""Requests of services that may wait for the stepping thread at once; a reset that records takes 0.1 s of it."""
 REST = 1.0  # s of wall time without a tick after which the recording is flushed: no tick will do it
 
 
@@ -99,6 +101,7 @@ class Stepper:
         self._ended = False
         self._last_tick_at: float | None = None  # s of wall time; None once the recording has been flushed since
         self._calls: deque[Callable[[], None]] = deque()
+        self._requests = 0  # of the calls, those of call()
         self._wake = threading.Condition()
         self._quit = False
         self._thread = threading.Thread(target=self._run, name="stepper", daemon=True)
@@ -129,10 +132,21 @@ class Stepper:
         self._close_recording()  # of a run that never began
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """Have `function` called between two ticks; calls and commands are taken in the order of their arrival."""
+        """Have `function` called between two ticks; calls and commands are taken in the order of their arrival.
+
+        Refused, in the future, if too many wait already.
+        """
         future: Future[T] = Future()
+        with self._wake:
+            full = self._requests >= MOST_CALLS
+            self._requests += not full
+        if full:
+            future.set_exception(Refused(f"{MOST_CALLS} requests wait for their answers already, expected fewer"))
+            return future
 
         def run() -> None:
+            with self._wake:
+                self._requests -= 1
             try:
                 future.set_result(function())
             except Exception as error:
@@ -161,7 +175,7 @@ class Stepper:
 
     def set_real_time_factor(self, factor: float) -> None:
         """From the next tick on."""
-        self.call(lambda: setattr(self.pacer, "factor", factor))
+        self._enqueue(lambda: setattr(self.pacer, "factor", factor))
 
     def _enqueue(self, function: Callable[[], None]) -> None:
         with self._wake:
@@ -272,7 +286,7 @@ class Stepper:
         return LockstepAnswer.of(self.simulation, self.run_id)
 
     def _leave(self, reason: str) -> _Advance | None:
-        """End this run; what was under way in it is to be refused once the next one is there, which the answer names."""
+        """End this run; what it was asked for is to be refused once the next one is there, which the answer names."""
         broken_off, self._advance = self._advance, None
         self.lockstep.clear()
         self.reception.forget_kept()
@@ -325,7 +339,7 @@ class Stepper:
 
     def _loop(self) -> None:
         while not self._quit:
-            while self._calls:
+            while self._calls and not self._quit:
                 self._calls.popleft()()
             now = time.monotonic()
             self._tell_of_arrivals(now)
