@@ -215,7 +215,7 @@ class _Turns:
 
     def present(self) -> LockstepAnswer:
         """What the simulation is now, without outcomes."""
-        return LockstepAnswer.of(self._simulation)
+        return LockstepAnswer.of(self._simulation, self.run_id)
 
     # By the thread that scans
 
@@ -230,7 +230,7 @@ class _Turns:
             outcomes, self.outcomes = tuple(self.outcomes), []
             self._released = self.request.release
             self.request = None
-            self._answer.set_result(LockstepAnswer.of(self._simulation, outcomes))
+            self._answer.set_result(LockstepAnswer.of(self._simulation, self.run_id, outcomes))
         return self.request is None and not self._released
 
     def end(self) -> None:

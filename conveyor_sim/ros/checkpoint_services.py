@@ -6,6 +6,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from rclpy.node import Node
 
 from conveyor_sim.errors import CheckpointError, ConveyorError
 from conveyor_sim.printable import SENTENCE, printable
+from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
@@ -90,12 +92,16 @@ class CheckpointServices:
                 response.message = printable(error, SENTENCE)
             self._stamp(response)
 
-        await settled(self._executor, self._stepper.call(now))
+        try:
+            await settled(self._executor, self._stepper.call(now))
+        except Refused as error:
+            response.message = str(error)
         return response
 
     async def _refuse(self, response: Any, reason: object) -> Any:
         response.message = printable(reason, SENTENCE)
-        await settled(self._executor, self._stepper.call(lambda: self._stamp(response)))
+        with suppress(Refused):  # the reason counts
+            await settled(self._executor, self._stepper.call(lambda: self._stamp(response)))
         return response
 
     def _stamp(self, response: Any) -> None:

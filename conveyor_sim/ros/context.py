@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import rclpy
 from rclpy.context import Context
@@ -16,12 +17,14 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.ros.parameter_types import refuse_unknown_types
 
 LAST_DOMAIN = 232  # beyond it the UDP ports of a domain (DDSI-RTPS 9.6.1.1) would be above 65535
 UNPROTECTED = (
     "ROS_SECURITY_ENABLE is true, but ROS_SECURITY_STRATEGY is not Enforce: where ROS finds no keys, this node goes on "
     "without protection"
 )
+PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # of Jazzy, of Kilted
 # rcl appends where in its sources an error came up, once a layer.
 _SOURCES = re.compile(r",? at \S+\.(?:c|cpp|h|hpp):\d+")
 
@@ -36,7 +39,8 @@ def start_ros(context: Context | None = None) -> None:
     is_enforced = os.environ.get("ROS_SECURITY_STRATEGY") == "Enforce"
     if is_asked_for and is_enforced:
         _check_keystore()
-    with _one_sentence():
+    _check_profile()
+    with one_sentence():
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     if is_asked_for and not is_enforced:
         get_logger("conveyor_sim").warning(UNPROTECTED)
@@ -54,8 +58,10 @@ def running_ros() -> Iterator[None]:
 
 def new_node(name: str, **options: Any) -> Node:
     """rclpy's Node(name, **options). Raises ConveyorError if DDS or ROS refuses it."""
-    with _one_sentence():
-        return Node(name, **options)
+    with one_sentence():
+        node = Node(name, **options)
+    refuse_unknown_types(node)
+    return node
 
 
 def _check_domain() -> None:
@@ -80,10 +86,26 @@ def _check_keystore() -> None:
     )
 
 
+def _check_profile() -> None:
+    """Fast DDS goes on without a profile that it can't read, and whoever it was to keep out comes in."""
+    for name in PROFILES:
+        file = os.environ.get(name, "")
+        try:
+            if file:
+                ElementTree.parse(file)
+        except OSError as error:
+            raise ConveyorError(f"{name}: {file!r} given, which can't be read ({error.strerror})") from error
+        except ElementTree.ParseError as error:
+            raise ConveyorError(f"{name}: {file!r} given, which is no XML ({error}), expected a profile") from error
+
+
 @contextmanager
-def _one_sentence() -> Iterator[None]:
+def one_sentence() -> Iterator[None]:
+    """What rclpy raises becomes a ConveyorError."""
     try:
         yield
+    except ConveyorError:
+        raise
     except Exception as error:  # rclpy's own classes, and RuntimeError for what a library of C++ raises
         text = " ".join(_SOURCES.sub("", str(error)).split())
         if "security libraries" in text:

@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from conveyor_sim.line.line import FAULT
 from conveyor_sim.ros.inbox import size_of
+from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
 
@@ -34,5 +35,8 @@ class FaultService:
                 stepper.reception.inject(stepper.session, name, value, size)
                 response.success = True
 
-        await settled(self._executor, self._stepper.call(between_ticks))
+        try:
+            await settled(self._executor, self._stepper.call(between_ticks))
+        except Refused as error:
+            response.message = str(error)
         return response

@@ -51,6 +51,7 @@ class LockstepRequest:
 class LockstepAnswer:
     """What the simulation was at the target tick."""
 
+    sim_run_id: str
     tick: int
     stamp_ns: int
     signals: npt.NDArray[np.float64]
@@ -58,10 +59,10 @@ class LockstepAnswer:
     outcomes: tuple[CommandOutcome, ...]  # since the last answer
 
     @staticmethod
-    def of(simulation: Simulation, outcomes: tuple[CommandOutcome, ...] = ()) -> LockstepAnswer:
-        """What a simulation is now."""
+    def of(simulation: Simulation, run: str, outcomes: tuple[CommandOutcome, ...] = ()) -> LockstepAnswer:
+        """What a simulation is now, in a run (Line.run_id)."""
         return LockstepAnswer(
-            simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes
+            run, simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes
         )
 
 

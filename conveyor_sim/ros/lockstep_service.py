@@ -95,7 +95,6 @@ class LockstepService:
             response.reason = str(error)
             return self._now(response)
         response.accepted = not response.reason
-        response.sim_run_id = self._stepper.run_id
         self._fill(response, answer)
         return response
 
@@ -106,6 +105,7 @@ class LockstepService:
         return response
 
     def _fill(self, response: Any, answer: LockstepAnswer) -> None:
+        response.sim_run_id = answer.sim_run_id  # not that of now: it may have been reset since
         response.tick = answer.tick
         response.time = to_time(answer.stamp_ns)
         response.signals.header.stamp = response.time

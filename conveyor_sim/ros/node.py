@@ -22,7 +22,7 @@ from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.commands import subscribe_commands
-from conveyor_sim.ros.context import new_node
+from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
 from conveyor_sim.ros.fault_service import FaultService
 from conveyor_sim.ros.graph_watch import GraphWatch
@@ -86,7 +86,8 @@ class SimNode:
         if self._given.record is not None:
             require_recordable(self._given.record)
         topics = {**OUTPUTS, **photo_eye_outputs(self._scene.photo_eyes)}
-        self._sink = RosSink(node, self._distro, {"markers": RateCap(self._given.marker_rate)}, topics)
+        with one_sentence():  # names may have been remapped to one that is taken
+            self._sink = RosSink(node, self._distro, {"markers": RateCap(self._given.marker_rate)}, topics)
         self._compilation = Compilation(self._scene, node.get_logger().info)
         self._reports = node.create_timer(REPORT, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -129,12 +130,13 @@ class SimNode:
             died=self._die,
             log=node.get_logger(),
         )
-        subscribe_commands(node, stepper)
-        self._services.serve(stepper)
-        CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
-        FaultService(node, executor, stepper)
-        LockstepService(node, executor, stepper, given.frame_id)
-        Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
+        with one_sentence():
+            subscribe_commands(node, stepper)
+            self._services.serve(stepper)
+            CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
+            FaultService(node, executor, stepper)
+            LockstepService(node, executor, stepper, given.frame_id)
+            Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
         def on_set(changed: list[Parameter]) -> None:
             for parameter in changed:

@@ -29,6 +29,8 @@ from conveyor_sim.simulation import Simulation
 
 T = TypeVar("T")
 IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens
+MOST_CALLS = 100
+"""Requests of services that may wait for the stepping thread at once; a reset that records takes 0.1 s of it."""
 REST = 1.0  # s of wall time without a tick after which the recording is flushed: no tick will do it
 
 
@@ -99,6 +101,7 @@ class Stepper:
         self._ended = False
         self._last_tick_at: float | None = None  # s of wall time; None once the recording has been flushed since
         self._calls: deque[Callable[[], None]] = deque()
+        self._requests = 0  # of the calls, those of call()
         self._wake = threading.Condition()
         self._quit = False
         self._thread = threading.Thread(target=self._run, name="stepper", daemon=True)
@@ -126,12 +129,24 @@ class Stepper:
             self._wake.notify()
         if self._thread.is_alive():
             self._thread.join()
+        self._close_recording()  # of a run that never began
 
     def call(self, function: Callable[[], T]) -> Future[T]:
-        """Have `function` called between two ticks; calls and commands are taken in the order of their arrival."""
+        """Have `function` called between two ticks; calls and commands are taken in the order of their arrival.
+
+        Refused, in the future, if too many wait already.
+        """
         future: Future[T] = Future()
+        with self._wake:
+            full = self._requests >= MOST_CALLS
+            self._requests += not full
+        if full:
+            future.set_exception(Refused(f"{MOST_CALLS} requests wait for their answers already, expected fewer"))
+            return future
 
         def run() -> None:
+            with self._wake:
+                self._requests -= 1
             try:
                 future.set_result(function())
             except Exception as error:
@@ -160,7 +175,7 @@ class Stepper:
 
     def set_real_time_factor(self, factor: float) -> None:
         """From the next tick on."""
-        self.call(lambda: setattr(self.pacer, "factor", factor))
+        self._enqueue(lambda: setattr(self.pacer, "factor", factor))
 
     def _enqueue(self, function: Callable[[], None]) -> None:
         with self._wake:
@@ -190,7 +205,8 @@ class Stepper:
 
         Raises ConveyorError if the next run can't be opened; there is none to step then, until a reset succeeds.
         """
-        answer = self._leave("the simulation was reset")
+        reason = "the simulation was reset"
+        broken_off = self._leave(reason)
         self._runs += 1
         try:
             self._enter(self._open_session(self._runs, None))
@@ -198,7 +214,7 @@ class Stepper:
             self._fail(error)
             raise
         finally:
-            answer()
+            _refuse(broken_off, reason)
         self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
 
     def save(self, path: Path, folder: Path | None = None) -> None:
@@ -213,10 +229,11 @@ class Stepper:
         """
         session = self._open_session(self._runs + 1, simulation)
         self._runs += 1
-        answer = self._leave("a checkpoint was loaded")
+        reason = "a checkpoint was loaded"
+        broken_off = self._leave(reason)
         self._enter(session)
         self.state = State.PAUSED
-        answer()
+        _refuse(broken_off, reason)
         tick = session.simulation.tick
         self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + _to_bag(session))
         if tick >= session.last_tick:
@@ -258,30 +275,24 @@ class Stepper:
         self.pacer.catch_breath(time.monotonic())
 
         def done() -> None:
-            answer.set_result(LockstepAnswer.of(simulation, self.reception.take_kept(simulation.tick)))
+            outcomes = self.reception.take_kept(simulation.tick)
+            answer.set_result(LockstepAnswer.of(simulation, self.run_id, outcomes))
 
         self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
 
     def present(self) -> LockstepAnswer:
         """What the simulation is now, without outcomes."""
-        return LockstepAnswer.of(self.simulation)
+        return LockstepAnswer.of(self.simulation, self.run_id)
 
-    def _leave(self, reason: str) -> Callable[[], None]:
-        """End this run, whatever is under way in it. Call the result once the next run is there: it answers a request
-        that was broken off, and the answer says by its run id that there is another run.
-        """
-        advance, self._advance = self._advance, None
+    def _leave(self, reason: str) -> _Advance | None:
+        """End this run; what it was asked for is to be refused once the next one is there, which the answer names."""
+        broken_off, self._advance = self._advance, None
         self.lockstep.clear()
         self.reception.forget_kept()
         self._close_recording()
         self.reception.give_up(self.session, reason)
-
-        def answer() -> None:
-            if advance is not None:
-                advance.failed(Refused(reason))
-
-        return answer
+        return broken_off
 
     def _enter(self, session: Session) -> None:
         self.session = session
@@ -328,7 +339,7 @@ class Stepper:
 
     def _loop(self) -> None:
         while not self._quit:
-            while self._calls:
+            while self._calls and not self._quit:
                 self._calls.popleft()()
             now = time.monotonic()
             self._tell_of_arrivals(now)
@@ -413,9 +424,8 @@ class Stepper:
         self._close_recording()
 
     def _abandon(self, reason: str) -> None:
-        if self._advance is not None:
-            advance, self._advance = self._advance, None
-            advance.failed(Refused(reason))
+        advance, self._advance = self._advance, None
+        _refuse(advance, reason)
 
     def _close_recording(self) -> None:
         try:
@@ -423,6 +433,11 @@ class Stepper:
         except ConveyorError as error:
             self.failure = str(error)
             self._log.error(f"the recording may be incomplete: {error}")
+
+
+def _refuse(advance: _Advance | None, reason: str) -> None:
+    if advance is not None:
+        advance.failed(Refused(reason))
 
 
 def _to_bag(session: Session) -> str:

@@ -12,6 +12,7 @@ import pytest
 from ros.conftest import SMALL_LINE
 from ros.recording import record
 
+from conveyor_sim.bag.recover import recover
 from conveyor_sim.ros.context import UNPROTECTED
 
 SIM_NODE = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", "-p", f"scene:={SMALL_LINE}"]
@@ -53,14 +54,23 @@ def said(arguments: list[str], environment: Mapping[str, str]) -> str:
         ([], {"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID: '233' given, expected a whole number from 0 to 232"),
         (["--params-file", "no_such.yaml"], {}, "Couldn't parse params file: '--params-file no_such.yaml'"),
         (["--no-such-option"], {}, "ROS can't start: ['--no-such-option']"),
+        (["-r", "poses:=bottles"], {}, "ROS can't start: Failed to create publisher: "),
+        ([], {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such"}, "'/no/such' given, which can't be read (No such file"),
+        ([], {"FASTRTPS_DEFAULT_PROFILES_FILE": __file__}, "which is no XML (not well-formed"),
     ],
-    ids=["keystore", "no keystore", "domain", "parameters", "option"],
+    ids=["keystore", "no keystore", "domain", "parameters", "option", "names", "no profile", "profile"],
 )
 def test_of_the_simulation(arguments: list[str], environment: Mapping[str, str], sentence: str) -> None:
     text = refused([*SIM_NODE, *arguments], environment)
     assert text.startswith("sim_node: ")
     assert sentence in text
     assert ".c:" not in text
+
+
+def test_of_names_that_clash_where_there_is_a_recording(tmp_path: Path) -> None:
+    text = refused([*SIM_NODE, "-p", f"record:={tmp_path / 'bag'}", "-r", "commands:=line"], {})
+    assert text.startswith("sim_node: ROS can't start: Failed to create subscription: ")
+    assert recover(tmp_path / "bag").healthy
 
 
 def test_of_a_keystore_that_cannot_be_used(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ def request(target: int, run_id: str = "plc", speed: float = 0.1, release: bool 
 
 def answer_to(lockstep: Lockstep, asked: LockstepRequest, tick: int) -> Future[LockstepAnswer]:
     coming = lockstep.accept(asked, RUN, tick, END)
-    coming.set_result(LockstepAnswer(asked.target_tick, 0, np.zeros(0), 0, ()))
+    coming.set_result(LockstepAnswer("run", asked.target_tick, 0, np.zeros(0), 0, ()))
     return coming
 
 

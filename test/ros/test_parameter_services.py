@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters, SetParametersAtomically
 from ros.line_client import LineClient
 
 from conveyor_sim.ros.child import Child
@@ -59,4 +59,17 @@ def test_a_whole_number_becomes_the_double_that_is_described(
 def test_what_is_no_number_is_refused_and_changes_nothing(line: LineClient, value: Any, reason: str) -> None:
     result = put(line, value)
     assert (result.successful, reason in result.reason) == (False, True), result.reason
+    assert told(line).double_value == 0.0
+
+
+@pytest.mark.parametrize("kind", [SetParameters, SetParametersAtomically])
+def test_a_type_that_ros_does_not_have_is_refused(line: LineClient, kind: Any) -> None:
+    """It ended the node."""
+    good = Parameter(name=NAME, value=WHOLE)
+    odd = Parameter(name="x", value=ParameterValue(type=77))
+    service = "set_parameters" + ("_atomically" if kind is SetParametersAtomically else "")
+    response = line.call(kind, f"conveyor_sim/{service}", parameters=[good, odd])
+    results = [response.result] if kind is SetParametersAtomically else response.results
+    expected = "x: type 77 given, expected 0 to 9 (rcl_interfaces/ParameterType)"
+    assert [(result.successful, result.reason) for result in results] == [(False, expected)] * len(results) != []
     assert told(line).double_value == 0.0

@@ -195,7 +195,7 @@ def _arrays(draw: np.random.Generator, good: Base) -> bytes:
             case "swapped":
                 arrays[name], arrays[other] = arrays[other], arrays[name]
                 continue
-            case "value" if array.size:
+            case "value" if array.size and array.dtype.kind in "fiu":
                 values = [math.nan, math.inf, 1e308, -1e300, 0.0] if array.dtype.kind == "f" else _limits(array.dtype)
                 array.reshape(-1)[int(draw.integers(array.size))] = values[int(draw.integers(len(values)))]
             case "kind":
