@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.scene import Scene
@@ -21,7 +23,9 @@ COMMANDS = {
 def record(scene: Scene, folder: Path, ticks: int, ticks_a_chunk: int = 0) -> Simulation:
     """Runs a scene with COMMANDS and records it; after so many ticks a chunk ends (0: as it comes)."""
     simulation = Simulation(scene)
-    with Recorder(folder) as recorder:
+    with pytest.MonkeyPatch.context() as patch, Recorder(folder) as recorder:
+        if ticks_a_chunk:  # a busy machine would take longer than that for some ticks, and end a chunk between
+            patch.setattr("conveyor_sim.bag.recorder.FLUSH_INTERVAL", 1e6)
         outputs = Outputs(simulation, [recorder], run_id="run", frame_id="hall")
         outputs.start()
         while simulation.tick < ticks:
