@@ -100,7 +100,9 @@ def test_a_recording_whose_folder_is_moved_is_complete_but_for_its_metadata(fold
     (tmp_path / "here").rename(tmp_path / "there")
     with pytest.raises(BagError, match="moved or deleted"):
         recorder.close()
-    assert recover(tmp_path / "there").damage == ("metadata.yaml was missing or did not fit",)
+    assert recover(tmp_path / "there").damage == (
+        "metadata.yaml was missing or does not fit any more; it was written anew",
+    )
     assert replay(tmp_path / "there").last_tick == TICKS
 
 
