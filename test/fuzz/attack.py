@@ -24,6 +24,8 @@ TARGETS = tuple(sorted(file.stem for file in (Path(__file__).parent / "targets")
 """Names of the modules in `targets/`."""
 SEEDS = 1_000_000
 """Seeds from the first of a portion to the first of the next."""
+LARGEST = 64 * 2**20
+"""bytes of a file that is kept of a failed case."""
 RENEW = 2.0
 """s from one writing of the figures to the next."""
 
@@ -84,16 +86,22 @@ def main(target: str, number: int, seconds: float, place: Path, known: set[str])
 def _keep(target: str, seed: int, kind: str, folder: Path, beside: Path) -> Path:
     """Keeps the files of a failed case, with the error and the command that plays it again."""
     kept = beside / slug(kind)
-    shutil.copytree(folder, kept, symlinks=True, ignore=_not_regular, dirs_exist_ok=True)
+    shutil.copytree(folder, kept, symlinks=True, ignore=_odd, dirs_exist_ok=True)
     report = kept / "failure.txt"
     again = f'make fuzz ARGS="--again {target}:{seed}"'
     report.write_text(f"{kind}\nagain: {again}\n\n{traceback.format_exc()}", encoding="utf-8")
     return report
 
 
-def _not_regular(folder: str, names: list[str]) -> list[str]:
-    """FIFOs and devices, which would be waited for."""
-    return [name for name in names if not ((path := Path(folder) / name).is_file() or path.is_dir())]
+def _odd(folder: str, names: list[str]) -> list[str]:
+    """What is not copied: FIFOs and devices, which would be waited for, and files of a sparse terabyte."""
+    return [name for name in names if not _is_plain(Path(folder) / name)]
+
+
+def _is_plain(path: Path) -> bool:
+    if path.is_symlink() or path.is_dir():
+        return True
+    return path.is_file() and path.stat().st_size <= LARGEST
 
 
 if __name__ == "__main__":

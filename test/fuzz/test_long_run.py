@@ -17,11 +17,13 @@ from fuzz.report import Figures
 
 @pytest.fixture
 def target(monkeypatch: pytest.MonkeyPatch) -> str:
-    """A target of three outcomes that fails at every tenth seed and leaves a file and a FIFO in its folder."""
+    """A target that fails at every tenth seed, and leaves a file, a FIFO and a sparse terabyte behind."""
 
     def play(seed: int, folder: Path) -> str:
         (folder / "input.txt").write_text(str(seed))
         os.mkfifo(folder / "pipe")
+        (folder / "huge").touch()
+        os.truncate(folder / "huge", 10**12)
         if seed % 10 == 7:
             raise Violation("seven", f"{seed} ends in seven")
         return "odd" if seed % 2 else "even"
@@ -45,6 +47,7 @@ def test_failures_are_counted_and_the_first_of_a_kind_is_kept(target: str, tmp_p
     assert counts["even"] > counts["odd"] > 0
     kept = Path(tally["shrunk"]["sevens: seven"])
     assert "--again sevens:3000007" in kept.read_text()
+    assert {file.name for file in kept.parent.iterdir()} == {"input.txt", "failure.txt"}
     assert (kept.parent / "input.txt").read_text() == "3000007"
     assert not (place / "case").exists()
 
