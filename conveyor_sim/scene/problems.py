@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from conveyor_sim.printable import printable
+
 Path = tuple[str | int, ...]
 
 
@@ -14,8 +16,8 @@ class Problem:
 
 
 def dotted(path: Path) -> str:
-    """A path as users write it: `bottles[3].position`."""
+    """A path as users write it: `bottles[3].position`; names that are too long are cut."""
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+        text += f"[{part}]" if isinstance(part, int) else f".{printable(part)}"
     return text.removeprefix(".")

@@ -152,3 +152,11 @@ def test_a_number_beyond_all_bounds_is_cut_in_its_sentence(number: str) -> None:
     with pytest.raises(SceneError) as error:
         parse_scene(f"seed: {number}", "plant.yaml")
     assert str(error.value) == f"plant.yaml:1: a value that can't be read: {number[:56]} ..."
+
+
+def test_a_name_of_a_field_that_goes_on_and_on_is_cut() -> None:
+    with pytest.raises(SceneError) as error:
+        parse_scene(GOOD + f"? {'x' * 50_000}\n: 1\n", "plant.yaml")
+    (line,) = str(error.value).splitlines()
+    assert f" {'x' * 199}…: " in line
+    assert len(line) < 600
