@@ -283,6 +283,9 @@ class Salvage:
             self.unverified.append("chunks")
         if self._loose:
             self.unverified.append("messages outside of chunks")
+            times = [message.log_time for message in self._loose_messages()]
+            if times != sorted(times):  # without an index nobody can read them in order; the copy has one
+                self.damage.append("messages outside of chunks are not in the order of their times")
         if self._index is not None:
             self._judge_index(self._index, counts)
         elif self._holes:
