@@ -4,7 +4,6 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer
-from ruamel.yaml.constructor import ConstructorError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
@@ -113,7 +112,7 @@ class Document:
                 raise ValueError("beyond every float")
             if isinstance(value, str):
                 value.encode()  # half of a character ("\\ud800") can be neither shown nor recorded
-        except (ConstructorError, ValueError, KeyError):  # KeyError: "!!bool maybe"
+        except Exception:  # ruamel raises what its parts do: KeyError for "!!bool maybe", IndexError for "!!float"
             line = node.start_mark.line + 1
             text = str(node.value).encode(errors="backslashreplace").decode()
             raise self._error(line, f"a value that can't be read: {cut(text)}") from None

@@ -160,3 +160,9 @@ def test_a_name_of_a_field_that_goes_on_and_on_is_cut() -> None:
     (line,) = str(error.value).splitlines()
     assert f" {'x' * 199}…: " in line
     assert len(line) < 600
+
+
+@pytest.mark.parametrize("value", ["!!float", "!!int", "!!bool maybe", "!!timestamp x", "!!binary =", "!!null 1"])
+def test_a_tag_that_does_not_fit_its_value_is_refused(value: str) -> None:
+    with pytest.raises(SceneError, match=r"^plant\.yaml:1: "):
+        parse_scene(f"seed: {value}", "plant.yaml")
