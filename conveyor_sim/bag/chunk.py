@@ -13,7 +13,7 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Channel, McapRecord, Message, Schema
 
-from conveyor_sim.bag.records import LIMIT, RECORD_HEAD, Data, Malformed, parse, records
+from conveyor_sim.bag.records import LIMIT, PRIVATE, RECORD_HEAD, Data, Malformed, parse, records
 
 HEAD = struct.Struct("<QQQII")
 """First time, last time, uncompressed size, CRC, length of the compression's name."""
@@ -22,6 +22,8 @@ READ = 1 << 20
 """Bytes decompressed at a time."""
 CUT_READ = 4096
 """The same in a chunk that was cut: what an error in its middle can cost."""
+HELD = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+"""Records that a chunk may hold, beside a writer's own."""
 BEGINNING = re.compile(rb"\x06[\s\S]{6}\x00\x00")
 """The opcode of a chunk, and a length below 2^48."""
 
@@ -129,11 +131,13 @@ def read_cut(data: Data, chunk: Chunk) -> bytes:
 
 
 def survey(content: bytes) -> Content:
-    """What is in a chunk's content. Raises Malformed if that is not made of whole records."""
+    """What is in a chunk's content. Raises Malformed if that is not made of whole records of the kinds it may hold."""
     schemas: list[Schema] = []
     channels: list[Channel] = []
     places: dict[int, list[tuple[int, int]]] = {}
-    for position, _, record in records(content, 0, len(content)):
+    for position, opcode, record in records(content, 0, len(content)):
+        if opcode not in HELD and opcode < PRIVATE:
+            raise Malformed("a record in it is of a kind that no chunk holds")
         if isinstance(record, Message):
             places.setdefault(record.channel_id, []).append((record.log_time, position))
         elif isinstance(record, Schema):

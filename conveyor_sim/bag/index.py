@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Schema, Statistics
 
-from conveyor_sim.bag.records import MAGIC, Data, Malformed, checksum, records
+from conveyor_sim.bag.records import MAGIC, PRIVATE, Data, Malformed, checksum, records
 
 DATA_END = struct.Struct("<BQI")
 """Opcode, length 4, CRC of all bytes before."""
@@ -16,6 +16,11 @@ DATA_END_HEAD = struct.pack("<BQ", Opcode.DATA_END, 4)
 FOOTER = struct.Struct("<BQQQI")
 """Opcode, length 20, where the summary begins, where its offsets begin, CRC from the summary up to this CRC."""
 CRC_SIZE = 4
+HELD = (
+    Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX, Opcode.STATISTICS,
+    Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET,
+)  # fmt: skip
+"""Records that an index may hold, beside a writer's own."""
 
 
 @dataclass
@@ -71,7 +76,9 @@ def read_index(data: Data) -> Index | None:
 
 
 def _parse(data: Data, index: Index, stop: int) -> Index:
-    for _, _, record in records(data, index.start, stop):
+    for _, opcode, record in records(data, index.start, stop):
+        if opcode not in HELD and opcode < PRIVATE:
+            raise Malformed("a record in it is of a kind that no index holds")
         if isinstance(record, Schema):
             index.schemas[record.id] = record
         elif isinstance(record, Channel):

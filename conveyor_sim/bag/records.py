@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -37,6 +37,9 @@ PIECE = 1 << 20
 """Bytes taken into a checksum at a time."""
 
 Data = mmap.mmap | bytes
+
+PRIVATE = 0x80
+"""Opcodes from here on are a writer's own, to be skipped."""
 
 _READERS = {
     Opcode.HEADER: Header.read,
@@ -87,9 +90,20 @@ def head_at(data: Data, position: int, stop: int) -> tuple[int, int] | None:
     return (opcode, start + length) if start + length <= stop and length <= LIMIT else None
 
 
+class _Whole(ReadDataStream):
+    """A stream that ends with an error: mcap's own gives less than was asked for, and says nothing."""
+
+    def read(self, length: int) -> bytes:
+        """So many bytes. Raises EndOfFile."""
+        data = super().read(length)
+        if len(data) < length:
+            raise EndOfFile
+        return data
+
+
 def parse(opcode: int, body: bytes) -> McapRecord | None:
     """A record of a kind that is needed, else None. Raises Malformed."""
-    stream = ReadDataStream(BytesIO(body))
+    stream = _Whole(BytesIO(body))
     try:
         if opcode == Opcode.MESSAGE:
             message: McapRecord = Message.read(stream, len(body))

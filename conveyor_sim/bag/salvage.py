@@ -12,11 +12,8 @@ from mcap.records import Attachment, Channel, Message, MessageIndex, Metadata, S
 
 from conveyor_sim.bag.chunk import Chunk, Content, chunk_at, inside, next_chunk, read_content, read_cut, survey
 from conveyor_sim.bag.index import CRC_SIZE, DATA_END, DATA_END_HEAD, Index, read_index
-from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, Data, Malformed, checksum, head_at, parse
+from conveyor_sim.bag.records import MAGIC, PRIVATE, RECORD_HEAD, Data, Malformed, checksum, head_at, parse
 from conveyor_sim.errors import BagError
-
-PRIVATE = 0x80
-"""Opcodes from here on are a writer's own, to be skipped."""
 
 
 @dataclass(frozen=True)

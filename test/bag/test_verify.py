@@ -275,6 +275,22 @@ def test_damage_that_no_checksum_covers_is_refused_in_one_sentence(folder: Path,
         assert "recover" in str(caught.value)
 
 
+def test_a_length_in_the_index_that_no_checksum_covers_is_damage(folder: Path, tmp_path: Path) -> None:
+    """Other readers would read beyond the record: mcap and rosbags can't open such a file."""
+    bare = tmp_path / "bare"
+    with open_bag(folder) as bag, StockWriter(bare, version=9, storage_plugin=StoragePlugin.MCAP) as out:
+        topics = {t: out.add_connection(f"/{t}", kind, typestore=typestore()) for t, kind in bag.types.items()}
+        for topic, time, data in bag.raw():
+            out.write(topics[topic], time, data)
+    content = bytearray(file_of(bare).read_bytes())
+    length = content.rfind(b"ros2msg") + len(b"ros2msg")  # of the text of the last schema of the index
+    content[length + 1] ^= 0x20
+    file_of(bare).write_bytes(content)
+    report = recover(bare)
+    assert report.damage and not report.unusable
+    assert validated(file_of(bare)) == len(messages(folder))
+
+
 def drawn(path: Path) -> None:
     with open_bag(path) as bag, bag.sense():
         Recording(bag).frames(None)
