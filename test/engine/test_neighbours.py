@@ -138,9 +138,9 @@ def plant() -> tuple[State, np.ndarray, list[np.ndarray], list[np.ndarray]]:
         start, end = RANDOM.uniform(-1.5, 1.5, (2, 2))
         rails[f"s{n}"] = segment(tuple(start), tuple(end))
         straight.append((start, end))
-    bends = []
+    bends = []  # with mouths wider than a bottle: other arcs become two pieces each
     for n in range(30):
-        centre, shape = tuple(RANDOM.uniform(-1.5, 1.5, 2)), RANDOM.uniform([0.05, -3.0, 0.1], [1.0, 3.0, 6.2])
+        centre, shape = tuple(RANDOM.uniform(-1.5, 1.5, 2)), RANDOM.uniform([0.3, -3.0, 0.1], [1.0, 3.0, 5.0])
         rails[f"a{n}"] = arc(centre, *shape)
         bends.append((centre, *shape))
     points = RANDOM.uniform(-2.0, 2.0, (1000, 2))
