@@ -15,6 +15,8 @@ from conveyor_sim.bag.index import CRC_SIZE, DATA_END, DATA_END_HEAD, Index, rea
 from conveyor_sim.bag.records import MAGIC, PRIVATE, RECORD_HEAD, Data, Malformed, checksum, head_at, parse
 from conveyor_sim.errors import BagError
 
+WRONG = "the checksum over all data is wrong"
+
 
 @dataclass(frozen=True)
 class Loss:
@@ -287,13 +289,15 @@ class Salvage:
             self._judge_index(self._index, counts)
         elif self._holes:
             self._lose_by_neighbours()
+        elif WRONG in self.damage:
+            self.damage.append("whether messages are lost can't be known: the index that counted them is damaged")
 
     def _judge_end(self, end: int) -> None:
         _, _, crc = DATA_END.unpack(self._data[end : end + DATA_END.size])
         if crc == 0:
             self.unverified.append("what is outside of chunks")
         elif checksum(self._data, 0, end) != crc:
-            self._once("the checksum over all data is wrong")
+            self._once(WRONG)
         index = self._index
         if index is None:
             self.damage.append("the index at the end is damaged or missing")

@@ -134,6 +134,19 @@ def test_chunks_that_are_lost_without_an_index_lie_between_their_neighbours(fold
     assert re.search(r"lost: \d+ messages from 0.30 s to 0.41 s", lost)
 
 
+def test_a_chunk_that_is_gone_with_the_index_is_not_passed_over_in_silence(folder: Path) -> None:
+    """No gap is left where it was, and nothing counts the messages any more."""
+    whole = file_of(folder).read_bytes()
+    chunk = summary_of(folder).chunk_indexes[4]
+    start, length = chunk.chunk_start_offset, chunk.chunk_length + chunk.message_index_length
+    damaged = bytearray(whole[:start] + whole[start + length :])
+    damaged[-60] ^= 1  # in the index
+    file_of(folder).write_bytes(damaged)
+    report = recover(folder)
+    assert any("whether messages are lost can't be known" in sentence for sentence in report.damage)
+    assert recover(folder).healthy
+
+
 def test_topics_that_a_lost_chunk_named_are_found_in_the_index(folder: Path) -> None:
     before = messages(folder)
     damage_chunk(folder, 0)  # the line is in it, and every topic's name
