@@ -1,4 +1,4 @@
-"""The parts that integrators are made of: kick (velocities), drift (positions), and what follows every step.
+"""The parts that integrators are made of: kick (velocities), and what follows every step.
 
 Each works on bottles first to end.
 """
@@ -33,39 +33,6 @@ def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: in
     if spin is not None:
         for i in range(uint64(first), uint64(end)):
             spin.omega[i] = settle(spin.omega[i] + dt * (spin.moment[i] * spin.inverse_inertia[i]))
-
-
-@part
-def drift(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
-    """r += dt v and theta += dt omega (paper eq. 6)."""
-    for i in range(uint64(first), uint64(end)):
-        bottles.x[i] += dt * bottles.vx[i]
-        bottles.y[i] += dt * bottles.vy[i]
-    if spin is not None:
-        for i in range(uint64(first), uint64(end)):
-            spin.theta[i] += dt * spin.omega[i]
-
-
-@part
-def store_velocities(stage: Any, bottles: Bottles, spin: Any, first: int, end: int) -> None:
-    """Keep the velocities within a step."""
-    for i in range(first, end):
-        stage.vx[i] = bottles.vx[i]
-        stage.vy[i] = bottles.vy[i]
-    if spin is not None:
-        for i in range(first, end):
-            stage.omega[i] = spin.omega[i]
-
-
-@part
-def recall_velocities(stage: Any, bottles: Bottles, spin: Any, first: int, end: int) -> None:
-    """Take the kept velocities back."""
-    for i in range(first, end):
-        bottles.vx[i] = stage.vx[i]
-        bottles.vy[i] = stage.vy[i]
-    if spin is not None:
-        for i in range(first, end):
-            spin.omega[i] = stage.omega[i]
 
 
 @part

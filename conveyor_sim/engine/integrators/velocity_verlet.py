@@ -7,62 +7,128 @@ touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without,
 (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). One force evaluation a step, one more a tick.
 """
 
-from ..arrays import Member, World
-from ..compile import kernel
+from typing import Any
+
+from numba import uint64
+
+from ..arrays import Bottles, Load, Member, World
+from ..compile import kernel, part
 from ..damage import note_damage
 from ..fewer import for_forces
 from ..forces import bottle_forces, evaluate_forces, pack_all, pair_phase
+from ..integrator_arrays import Stage
 from ..ledger import book_kick
-from ..motion import (
-    accumulate_peaks,
-    drift,
-    kick,
-    lists_hold,
-    note_moved,
-    recall_velocities,
-    store_velocities,
-    watch_rebuilt,
-)
+from ..motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
 from ..moving import pass_step, place_rails
+from ..pairs import pack_row
 from ..team import BLOCK, share
-from .phase import RESUME, START
+from .phase import START
 
 
 @kernel
 def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
-    """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
-    bottles, half = world.bottles, 0.5 * dt
+    """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring).
+
+    A step ends and the next one begins in one pass over the bottles. A call that is broken off has moved them.
+    """
     line = for_forces(world)
-    begin, stop = share(member, bottles.x.size)
+    stage: Any = world.stage
+    damage = _is_there(world.damage)
+    begin, stop = share(member, world.bottles.x.size)
     place_rails(line.moving, member, dt)
+    done = 0
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
         evaluate_forces(line, member, dt)
-    for step in range(steps):
-        if phase != RESUME or step > 0:
-            note_damage(world, member, dt)
-            for first in range(begin, stop, BLOCK):
-                end = min(first + BLOCK, stop)
-                book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)
-                kick(bottles, world.spin, world.load, half, first, end)
-                drift(bottles, world.spin, dt, first, end)
-                note_moved(line, member, first, end)
-            hold = lists_hold(line, member)
-            pass_step(line.moving, member, dt)
-            if not hold:
-                return step
-            watch_rebuilt(line, member)
+        note_damage(world, member, dt)
         for first in range(begin, stop, BLOCK):
-            end = min(first + BLOCK, stop)
-            store_velocities(world.stage, bottles, world.spin, first, end)
-            kick(bottles, world.spin, world.load, half, first, end)
+            _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
+        hold = lists_hold(line, member)
+        pass_step(line.moving, member, dt)
+        if not hold:
+            return 0
+        watch_rebuilt(line, member)
+    else:
         pack_all(line, member)
+    while True:
+        done += 1
         pair_phase(line, member, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             bottle_forces(line, member, dt, dt, first, end)
-            recall_velocities(world.stage, bottles, world.spin, first, end)
-            book_kick(bottles, world.spin, world.load, world.ledger, half, first, end)
-            kick(bottles, world.spin, world.load, half, first, end)
-            accumulate_peaks(world.load, world.peaks, dt, first, end)
-    return steps
+            _end_step(world, stage, dt, first, end)
+            if done < steps and not damage:
+                _begin_step(world, line, stage, member, dt, first, end)
+        if done == steps:
+            return steps
+        if damage:
+            note_damage(world, member, dt)
+            for first in range(begin, stop, BLOCK):
+                _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
+        hold = lists_hold(line, member)
+        pass_step(line.moving, member, dt)
+        if not hold:
+            return done
+        watch_rebuilt(line, member)
+
+
+@part
+def _is_there(group: Any) -> bool:
+    return group is not None
+
+
+@part
+def _begin_step(world: World, line: World, stage: Stage, member: Member, dt: float, first: int, end: int) -> None:
+    """Move bottles first to end, and give them the velocities at which the forces at the end of the step are taken."""
+    bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
+    book_kick(bottles, spin, load, world.ledger, half, first, end)
+    _move(bottles, load, stage, dt, first, end)
+    _turn(spin, stage, dt, first, end)
+    note_moved(line, member, first, end)
+
+
+@part
+def _end_step(world: World, stage: Stage, dt: float, first: int, end: int) -> None:
+    """Give bottles first to end their velocities at the end of the step, from those at its middle."""
+    bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
+    _recall(bottles, spin, stage, first, end)
+    book_kick(bottles, spin, load, world.ledger, half, first, end)
+    kick(bottles, spin, load, half, first, end)
+    accumulate_peaks(load, world.peaks, dt, first, end)
+
+
+@part
+def _move(bottles: Bottles, load: Load, stage: Stage, dt: float, first: int, end: int) -> None:
+    half = 0.5 * dt
+    for i in range(uint64(first), uint64(end)):
+        kick_x = half * (load.fx[i] * bottles.inverse_mass[i])
+        kick_y = half * (load.fy[i] * bottles.inverse_mass[i])
+        vx, vy = settle(bottles.vx[i] + kick_x), settle(bottles.vy[i] + kick_y)
+        x, y = bottles.x[i] + dt * vx, bottles.y[i] + dt * vy
+        stage.vx[i], stage.vy[i] = vx, vy
+        vx, vy = settle(vx + kick_x), settle(vy + kick_y)
+        bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i] = x, y, vx, vy
+        pack_row(bottles.packed, i, x, y, vx, vy)
+
+
+@part
+def _turn(spin: Any, stage: Stage, dt: float, first: int, end: int) -> None:
+    if spin is None:
+        return
+    for i in range(uint64(first), uint64(end)):
+        kick_turn = 0.5 * dt * (spin.moment[i] * spin.inverse_inertia[i])
+        omega = settle(spin.omega[i] + kick_turn)
+        stage.omega[i] = omega
+        spin.theta[i] += dt * omega
+        spin.omega[i] = settle(omega + kick_turn)
+
+
+@part
+def _recall(bottles: Bottles, spin: Any, stage: Stage, first: int, end: int) -> None:
+    """Take the velocities at the middle of the step back."""
+    for i in range(uint64(first), uint64(end)):
+        bottles.vx[i] = stage.vx[i]
+        bottles.vy[i] = stage.vy[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            spin.omega[i] = stage.omega[i]
