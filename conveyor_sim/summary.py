@@ -17,6 +17,7 @@ from rich.table import Table
 from conveyor_sim.achieved import Achieved, achieved
 from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
+from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.errors import ConveyorError, SceneError
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.observe.borne import Borne
@@ -25,7 +26,6 @@ from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.printable import SENTENCE, printable
-from conveyor_sim.scene import parse_overrides, parse_scene
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3
@@ -122,7 +122,7 @@ class Summary:
     setting: str
     """Integrator and time step, and why."""
     predicted: str | None
-    """The errors to expect; None if the scene was recorded by a version that chose another time step."""
+    """The errors to expect; None if this version refuses the recorded scene."""
     achieved: Achieved | None
     """What the peak force says; None if it or the prediction is not known."""
     guard: dict[str, int]
@@ -281,13 +281,11 @@ def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
 
 
 def _model(line: Any) -> Model | None:
-    """The model of a recorded scene; None if this version would simulate it in another way."""
+    """The model of a recorded scene in the steps that it ran with; None if this version refuses the scene."""
     try:
-        model = build_model(parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides)))
+        return build_model(recorded_scene(line, line.scene_name))
     except SceneError:
         return None
-    same = (model.integrator, model.steps_per_tick) == (line.integrator, line.steps_per_tick)
-    return model if same else None
 
 
 def render(summary: Summary) -> Group:

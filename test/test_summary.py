@@ -74,12 +74,23 @@ def test_the_prediction_is_told_with_what_was_reached(bag: Path) -> None:
     assert summary.achieved.expected_force == model.prediction.force
 
 
-def test_a_recording_in_other_steps_than_this_version_chooses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
-    def shorten(topic: str, message: Any) -> None:
+def test_a_recording_is_told_the_errors_of_the_steps_it_ran_with(bag: Path, tmp_path: Path) -> None:
+    def lengthen(topic: str, message: Any) -> None:
         if topic == "line":
-            message.steps_per_tick += 1
+            message.integrator, message.steps_per_tick = "semi_implicit_euler", 20
 
-    summary = summarize(edited(bag, tmp_path / "older", shorten))
+    ran = {"accuracy": {"integrator": "semi_implicit_euler", "per_tick": 20}}
+    summary = summarize(edited(bag, tmp_path / "older", lengthen))
+    assert summary.predicted == build_model(load_scene(SMALL_LINE, ran)).prediction.sentence
+    assert summary.predicted != summarize(bag).predicted
+
+
+def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
+    def wrong(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.integrator = "leapfrog"
+
+    summary = summarize(edited(bag, tmp_path / "foreign", wrong))
     assert summary.predicted is None
     assert summary.achieved is None
     assert summary.peak_force is not None

@@ -11,9 +11,9 @@ from conveyor_sim.bag.compare import COMPARERS, Difference, first_difference, ou
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.outputs import SERIALIZERS, Snapshot
 from conveyor_sim.bag.reader import Bag, Outcome, open_bag, to_outcome
+from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
-from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 
 SENSITIVE = frozenset({"contacts", "ledger", "damage", "rail_wear"})
@@ -180,10 +180,8 @@ class _Replay:
 
 
 def _simulation(bag: Bag) -> Simulation:
-    line = bag.line
-    name = f"{bag.path} (recorded scene)"
     try:
-        return Simulation(parse_scene(line.scene_text, name, parse_overrides(line.overrides)))
+        return Simulation(recorded_scene(bag.line, f"{bag.path} (recorded scene)"))
     except SceneError as error:
         raise SceneError(f"{bag.path}: the recorded scene is refused by this version:\n{error}") from error
 
