@@ -34,12 +34,16 @@ def accuracy_rows(model: Model) -> list[tuple[str, str]]:
     prediction = model.prediction
     force = prediction.reason
     if prediction.value is not None:
-        force = f"{percent(prediction.value)} in contact force: {prediction.reason}"
+        force = f"{percent(prediction.value)} in the peak force of impacts: {prediction.reason}"
+    resting = prediction.resting_reason
+    if prediction.resting is not None:
+        resting = f"{percent(prediction.resting)} in resting load: {prediction.resting_reason}"
     return [
         ("accuracy", model.accuracy),
         ("time step", f"{_time(model.dt)}: {model.dt_reason}"),
         ("integrator", model.integrator),
         ("predicted error", force),
+        ("", resting),
         *(("", f"{percent(term.value)} in {term.quantity}: {term.reason}") for term in prediction.terms),
     ]
 

@@ -1,9 +1,12 @@
-"""The error that a time step is expected to make in contact forces, from the laws of impacts.
+"""The errors that a time step is expected to make in contact forces: of impacts, and at rest.
 
 An impact is a peak of force. Its relative error, RMS over the phases at which first touch may fall into a step, has
 parts that effects contribute (`Share`), each a power of dt: a peak between two steps is missed by (w dt)^2 / 8, that is
 (pi / n)^2 / 8 at n steps a contact; a dashpot that sets in with a jump is missed by up to c dt / m_r. Parts add up as
 the root of the sum of their squares. methods.py has the coefficients of each integrator.
+
+Resting load is the force of contacts that stay closed, as a mean over 1 s: bottles in a queue, or on a turn-table
+along its rim. It is another error, of other causes: a force that lags behind a surface that turns.
 """
 
 import math
@@ -73,9 +76,14 @@ class Prediction:
     """What a time step is expected to get wrong."""
 
     value: float | None
-    """Relative error in contact force, RMS; None where nothing in the scene makes one."""
+    """Relative error in the peak force of impacts, RMS; None where nothing in the scene makes one."""
     reason: str
     """The impact that has it, and why."""
+    resting: float | None
+    """Relative error in resting load: forces of contacts that stay closed, as means over 1 s, RMS; None where nothing
+    presses bottles together."""
+    resting_reason: str
+    """What makes it."""
     terms: tuple[Term, ...]
     """Errors in other quantities."""
     force: float
@@ -85,19 +93,42 @@ class Prediction:
     @property
     def sentence(self) -> str:
         """The numbers, without their reasons."""
-        force = "no contact force" if self.value is None else f"{percent(self.value)} in contact force"
-        return ", ".join([force, *(f"{percent(term.value)} in {term.quantity}" for term in self.terms)])
+        force = "no impacts" if self.value is None else f"{percent(self.value)} in the peak force of impacts"
+        resting = [] if self.resting is None else [f"{percent(self.resting)} in resting load"]
+        return ", ".join([force, *resting, *(f"{percent(term.value)} in {term.quantity}" for term in self.terms)])
 
 
-def predict(impacts: Sequence[Impact], terms: Sequence[Term], pressing: tuple[float, str], dt: float) -> Prediction:
-    """The errors at a time step in s. pressing: a force (N) beside those of impacts, and what presses so."""
+def predict(
+    impacts: Sequence[Impact],
+    resting: Sequence[Term],
+    terms: Sequence[Term],
+    pressing: tuple[float, str],
+    dt: float,
+) -> Prediction:
+    """The errors at a time step in s.
+
+    resting: errors in resting load. pressing: a force (N) beside those of impacts, and what presses so; 0 if nothing
+    does.
+    """
     forces = [(impact.force, f"an impact of {impact.what} {impact.at}") for impact in impacts]
     force, reason = max([pressing, *forces])
     if not impacts:
-        return Prediction(None, "nothing makes contact forces", tuple(terms), force, reason)
+        nothing = "nothing makes contact forces"
+        return Prediction(None, nothing, None, nothing, tuple(terms), force, reason)
     worst = max(impacts, key=lambda impact: impact.error(dt))
-    told = f"impact of {worst.what}, {worst.told(dt)} {worst.at}"
-    return Prediction(worst.error(dt), told, tuple(terms), force, reason)
+    peak_reason = f"impact of {worst.what}, {worst.told(dt)} {worst.at}"
+    rest, rest_reason = _resting(resting, pressing[0])
+    return Prediction(worst.error(dt), peak_reason, rest, rest_reason, tuple(terms), force, reason)
+
+
+def _resting(terms: Sequence[Term], pressing: float) -> tuple[float | None, str]:
+    """The error in resting load, and what makes it: independent parts, added as the root of the sum of squares."""
+    if pressing == 0.0:
+        return None, "nothing presses bottles together"
+    if not terms:
+        return 0.0, "nothing that rests depends on the time step"
+    parts = sorted(terms, key=lambda term: -term.value)
+    return math.hypot(*(term.value for term in parts)), "; ".join(f"{term.quantity}: {term.reason}" for term in parts)
 
 
 def percent(value: float) -> str:

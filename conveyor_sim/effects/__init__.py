@@ -104,9 +104,11 @@ def bounds_of(terms: Terms, expected: Sequence[Impact]) -> tuple[Bound, ...]:
 
 def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Prediction:
     """The errors to expect at a time step in s."""
-    sides = [effect.side(terms, dt) for effect in EFFECTS if effect.side is not None and effect.name in terms.on]
+    on = [effect for effect in EFFECTS if effect.name in terms.on]
+    sides = [term for effect in on if effect.side is not None for term in effect.side(terms, dt)]
+    resting = [term for effect in on if effect.resting is not None for term in effect.resting(terms, dt)]
     pressing = (queue_force(terms), f"a single-file queue of {queue_length(terms.scene)}")
-    return predict(expected, [term for side in sides for term in side], pressing, dt)
+    return predict(expected, resting, sides, pressing, dt)
 
 
 def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:

@@ -33,7 +33,9 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
     if terms.method.explicit:
         reason = f"half of v_lim / (mu g) at mu = {mu:g}"
         bounds.append(Bound("base friction", base_friction_bound(mu, g, limit), reason, stability=True))
-    if (steps := _slip_steps(terms)) > 0.0:
+    # On a belt that turns, what rests is off by one part in these steps: by no more than the tolerance.
+    turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
+    if (steps := max(_slip_steps(terms), turning)) > 0.0:
         reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
         bounds.append(Bound("base slip", slip_time(mu, g, limit) / steps, reason))
     return bounds
@@ -44,7 +46,7 @@ def _slip_steps(terms: Terms) -> float:
     return terms.method.slip_steps(1.0 / terms.steps)
 
 
-def _creep(terms: Terms, dt: float) -> list[Term]:
+def _lag(quantity: str, terms: Terms, dt: float) -> list[Term]:
     """Of a bottle held on its circle by friction: its velocity lags by half a step (test/physics/test_turntable.py)."""
     if terms.laws.base_friction is None or "curved_belts" not in terms.on:
         return []
@@ -52,7 +54,19 @@ def _creep(terms: Terms, dt: float) -> list[Term]:
     steps = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit) / dt
     off = terms.method.creep_off(steps)
     reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
-    return [Term("creep on curved belts", off, reason)] if off > 0.0 else []
+    return [Term(quantity, off, reason)] if off > 0.0 else []
+
+
+def _creep(terms: Terms, dt: float) -> list[Term]:
+    return _lag("creep on curved belts", terms, dt)
+
+
+def _resting(terms: Terms, dt: float) -> list[Term]:
+    """What presses against the rim of a turn-table is what friction does not hold, m Omega^2 r: off by the same part.
+
+    The lag is a slip of Omega^2 r dt / 2 outward, which friction answers with m mu g Omega^2 r dt / v_lim.
+    """
+    return _lag("load on turning belts", terms, dt)
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
@@ -114,10 +128,13 @@ BASE_FRICTION = Effect(
     absent="no friction under the bottles",
     needs="mu by belt and bottle type, velocity of each surface",
     bounds=_friction_bounds,
-    bound="half of v_lim / (mu g); with semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %; with the "
-    "linearly implicit method 4 steps in it, as it is stable in any",
+    bound="half of v_lim / (mu g); with semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %, and "
+    "1 / tolerance where a belt turns, 100 at 1 %; with the linearly implicit method 4 steps in it, as it is stable in "
+    "any",
     shares=_braked,
     share="with semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
+    resting=_resting,
+    rest="on belts that turn, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
     side=_creep,
     beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
 )

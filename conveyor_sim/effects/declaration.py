@@ -45,6 +45,10 @@ class Effect:
     """What it adds to the error in the peak force of an impact; None: nothing."""
     share: str = ""
     """The same in words, without the integrator's coefficient."""
+    resting: Callable[[Terms, float], list[Term]] | None = None
+    """Errors that it makes in resting load, at a time step in s; None: none."""
+    rest: str = ""
+    """The same in words."""
     side: Callable[[Terms, float], list[Term]] | None = None
     """Errors that it makes in something else than contact force, at a time step in s; None: none."""
     beside: str = ""

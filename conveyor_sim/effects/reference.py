@@ -71,6 +71,7 @@ def _section(effect: Effect) -> str:
         ("needs", effect.needs),
         ("bound on dt", effect.bound or "none"),
         ("error in the peak force of an impact", effect.share),
+        ("error in resting load", effect.rest),
         ("error beside", effect.beside),
         ("can be forced", _forcible(effect)),
     ]
