@@ -36,7 +36,7 @@ def accuracy_rows(model: Model) -> list[tuple[str, str]]:
     if prediction.value is not None:
         force = f"{percent(prediction.value)} in the peak force of impacts: {prediction.reason}"
     resting = prediction.resting_reason
-    if prediction.resting is not None:
+    if prediction.resting:
         resting = f"{percent(prediction.resting)} in resting load: {prediction.resting_reason}"
     return [
         ("accuracy", model.accuracy),

@@ -94,7 +94,7 @@ class Prediction:
     def sentence(self) -> str:
         """The numbers, without their reasons."""
         force = "no impacts" if self.value is None else f"{percent(self.value)} in the peak force of impacts"
-        resting = [] if self.resting is None else [f"{percent(self.resting)} in resting load"]
+        resting = [] if not self.resting else [f"{percent(self.resting)} in resting load"]
         return ", ".join([force, *resting, *(f"{percent(term.value)} in {term.quantity}" for term in self.terms)])
 
 
@@ -126,7 +126,7 @@ def _resting(terms: Sequence[Term], pressing: float) -> tuple[float | None, str]
     if pressing == 0.0:
         return None, "nothing presses bottles together"
     if not terms:
-        return 0.0, "nothing that rests depends on the time step"
+        return 0.0, "resting load does not depend on the time step"
     parts = sorted(terms, key=lambda term: -term.value)
     return math.hypot(*(term.value for term in parts)), "; ".join(f"{term.quantity}: {term.reason}" for term in parts)
 

@@ -43,7 +43,7 @@ def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
         "turn_outer",
         "100 steps a tick, given in the scene; 4.7 x beyond the bound of stability by contact friction",
         "accuracy given, 100 steps a tick",
-        "% in contact force: impact of two bottles, ",
+        "% in the peak force of impacts: impact of two bottles, ",
         "% in creep on curved belts: 25.5 steps in v_lim / (mu g)",
         "normal_damping off: no contact with damping law normal",
         "arc_rails on: belts.turn.rails.inner",

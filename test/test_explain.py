@@ -88,10 +88,10 @@ EXPECTED = percent(WHOLE_SCENE * math.hypot(MISSED, BRAKED))
 
 def test_the_errors_to_expect_are_told_with_their_reasons() -> None:
     lines = explained(TEXT.replace("duration: 1.0", "duration: 1.0\naccuracy: {per_tick: 10}"))
-    (force,) = [line for line in lines if line.startswith("predicted error")]
     parts = f"braking by the base {percent(BRAKED)}, peak between steps {percent(MISSED)},"
     impact = f"impact of two bottles, 14 steps a contact, {parts}"
-    assert force.startswith(f"predicted error {EXPECTED} in contact force: {impact}")
+    assert f"predicted error {EXPECTED} in the peak force of impacts: {impact}" in " ".join(lines)
+    assert "resting load does not depend on the time step" in lines
     assert any(line.startswith("0.32 % in tangential speed after an impact: 14 steps an impact") for line in lines)
 
 
@@ -101,7 +101,7 @@ def test_a_setting_in_one_line() -> None:
     assert "\n" not in line
     assert line.startswith("semi_implicit_euler, dt = 1 ms (10 steps a tick, given in the scene; ")
     tangential = "0.32 % in tangential speed after an impact"
-    assert line.endswith(f"; predicted error: {EXPECTED} in contact force, {tangential}")
+    assert line.endswith(f"; predicted error: {EXPECTED} in the peak force of impacts, {tangential}")
 
 
 def test_a_scene_without_bounds() -> None:

@@ -185,7 +185,7 @@ def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
     bottles = f"{summary.fed} fed, {summary.removed} removed, {summary.present} present"
     for words in (
         "small_line",
-        "in contact force",
+        "peak force of impacts",
         "peak force",
         "real-time factor",
         "0.50",
