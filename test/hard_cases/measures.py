@@ -48,6 +48,7 @@ MEASURES = {
     "slip": "m/s, largest at a tick between a bottle and the belt under it",
     "final_spin": "rad/s, largest at the end",
     "momentum": "kg m/s, at the end",
+    "energy_kept": "kinetic energy at the end over that at the start, of the bottle whose ratio is furthest from 1",
     "travel": "m, of the mean of all bottles since `settled`",
     "drift": "m, furthest that a bottle went from where it was at `settled`",
     "rail_force": "N, normal forces of all rails, mean since `settled`",
@@ -146,6 +147,7 @@ class _Watch:
     def __init__(self, simulation: Simulation, settled: float) -> None:
         self._settled = settled
         self._first = simulation.counts.present - simulation.counts.fed
+        self._at_first = simulation.bottles()
         self._most = dict.fromkeys(("overlap", "peak_force", "speed", "slip"), 0.0)
         self._crossed: set[int] = set()
         self._before: BottleColumns | None = None
@@ -195,6 +197,7 @@ class _Watch:
             "final_speed": float(np.max(np.hypot(bottles.vx, bottles.vy), initial=0.0)),
             "final_spin": float(np.max(np.abs(bottles.omega), initial=0.0)),
             "momentum": float(np.hypot(mass @ bottles.vx, mass @ bottles.vy)),
+            "energy_kept": _energy_kept(self._at_first, bottles),
             "travel": math.nan,
             "drift": math.nan,
             "rail_force": float(np.mean(self._rail_forces)) if self._rail_forces else math.nan,
@@ -213,6 +216,15 @@ class _Watch:
                 found["travel"] = float(np.hypot(dx.mean(), dy.mean()))
                 found["drift"] = float(np.hypot(dx, dy).max())
         return found
+
+
+def _energy_kept(first: BottleColumns, last: BottleColumns) -> float:
+    """NaN if no bottle that is left moved at first. Their masses stay, so speeds tell."""
+    _, here, there = np.intersect1d(first.id, last.id, assume_unique=True, return_indices=True)
+    before = first.vx[here] ** 2 + first.vy[here] ** 2
+    after = last.vx[there] ** 2 + last.vy[there] ** 2
+    ratios = after[before > 0.0] / before[before > 0.0]
+    return float(ratios[np.argmax(np.abs(ratios - 1.0))]) if ratios.size else math.nan
 
 
 def slips(simulation: Simulation, bottles: BottleColumns) -> F8:
