@@ -90,6 +90,13 @@ def damping_coefficient(contact: Contact, reduced_mass: float) -> float:
     return solve(e, contact.stiffness or 0.0, reduced_mass)
 
 
+def _mindlin(contact: Contact) -> float:
+    """N/m^1.5: times sqrt(delta) it is stiffness_ratio times dN/d delta, 1.5 k_h sqrt(delta)."""
+    if contact.tangential is None or contact.tangential.stiffness_ratio is None:
+        return 0.0
+    return contact.tangential.stiffness_ratio * 1.5 * (contact.hertz_stiffness or 0.0)
+
+
 def _columns(
     scene: Scene, rows: Sequence[str], columns: Sequence[str], reduced_mass: F8, on: Collection[str]
 ) -> ContactLaw:
@@ -113,6 +120,10 @@ def _columns(
             lambda contact, mass: damping_coefficient(contact, mass) if damping_effect(contact) == effect else 0.0,
         )
 
+    mindlin = column("tangential_spring", lambda contact, _: _mindlin(contact))
+    springs = column(
+        "tangential_spring", lambda contact, _: contact.tangential.stiffness if contact.tangential else 0.0
+    )
     return ContactLaw(
         stiffness=column("linear", lambda contact, _: contact.stiffness),
         hertz=column("hertz", lambda contact, _: contact.hertz_stiffness),
@@ -122,9 +133,8 @@ def _columns(
         damping_tsuji=damping("tsuji_damping"),
         damping_onset=damping("onset_damping"),
         friction=column("contact_friction", lambda contact, _: contact.friction),
-        tangential_stiffness=column(
-            "tangential_spring", lambda contact, _: contact.tangential.stiffness if contact.tangential else 0.0
-        ),
+        tangential_stiffness=np.zeros(len(found)) if springs is None and mindlin is not None else springs,
+        tangential_mindlin=mindlin,
         tangential_damping=column(
             "tangential_spring", lambda contact, _: contact.tangential.damping if contact.tangential else 0.0
         ),

@@ -43,6 +43,10 @@ def test_only_what_a_scene_has_is_there() -> None:
     }  # fmt: skip
     undamped = contact(5e3, friction=0.2, tangential={"stiffness": 4e3})
     assert "tangential_damping" not in given(pair(undamped))
+    mindlin = contact(None, hertz_stiffness=1e9, friction=0.2, tangential={"stiffness_ratio": 0.8})
+    assert given(pair(mindlin)) == {
+        "hertz": [1e9], "friction": [0.2], "tangential_stiffness": [0.0], "tangential_mindlin": [0.8 * 1.5 * 1e9],
+    }  # fmt: skip
 
 
 def test_columns_are_flat_by_type_and_0_where_a_contact_has_another_law() -> None:

@@ -67,7 +67,7 @@ def cases_of(scene: Scene) -> tuple[list[Case], dict[str, str]]:
         e = restitution_of(collision, speed)
         if scene.friction_curve == "atan":
             skipped[f"sliding impact, {collision.name}"] = "with friction_curve atan friction is never full"
-        elif meeting.value(meeting.law.tangential_stiffness) > 0.0:
+        elif meeting.has_spring:
             skipped[f"sliding impact, {collision.name}"] = "a tangential spring is slack at first touch"
         elif isinstance(e, str):
             skipped[f"sliding impact, {collision.name}"] = e

@@ -35,6 +35,7 @@ def _scaled(contact: Contact, factor: float) -> dict[str, Any]:
     elif damping.law in ("paper", "normal"):
         data["damping"]["coefficient"] *= factor ** (0.4 if contact.hertz_stiffness is not None else 0.5)
     if contact.tangential is not None:
-        data["tangential"]["stiffness"] *= factor
+        if contact.tangential.stiffness is not None:
+            data["tangential"]["stiffness"] *= factor
         data["tangential"]["damping"] *= math.sqrt(factor)
     return data

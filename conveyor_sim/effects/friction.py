@@ -8,9 +8,11 @@ from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import (
     Meeting,
     Terms,
+    deepest,
     frequency,
     impact_speed,
     meetings,
+    overlap_at,
     queue_force,
     queue_length,
     tightest,
@@ -71,7 +73,7 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
 
 def _curve_friction(meeting: Meeting) -> float:
     """mu of a contact that has friction by its curve, 0 by a tangential spring."""
-    return meeting.value(meeting.law.friction) if meeting.value(meeting.law.tangential_stiffness) == 0.0 else 0.0
+    return 0.0 if meeting.has_spring else meeting.value(meeting.law.friction)
 
 
 def _chosen(field: str, value: str, scene: Scene, on: Collection[str]) -> Cause | None:
@@ -93,7 +95,9 @@ def _spring(scene: Scene, on: Collection[str]) -> Cause | None:
         return None
     for index, contact in contacts_in_use(scene, on):
         if contact.tangential is not None:
-            return Cause(("contacts", index, "tangential"), f"{contact.tangential.stiffness:g} N/m")
+            stiffness, ratio = contact.tangential.stiffness, contact.tangential.stiffness_ratio
+            said = f"{stiffness:g} N/m" if stiffness is not None else f"{ratio:g} of the normal stiffness"
+            return Cause(("contacts", index, "tangential"), said)
     return None
 
 
@@ -102,10 +106,18 @@ def _rim_mobility(kind: BottleType | None) -> float:
     return 0.0 if kind is None else 1.0 / kind.mass + kind.radius**2 / kind.moment_of_inertia
 
 
+def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
+    """N/m, of the tangential spring; Mindlin's at the deepest overlap of an impact or a queue."""
+    if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
+        pressed = overlap_at(meeting, terms, queue_force(terms))
+        return mindlin * math.sqrt(max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed))
+    return meeting.value(meeting.law.tangential_stiffness)
+
+
 def _spring_bounds(terms: Terms) -> list[Bound]:
     springs, dashpots = [], []
     for meeting in meetings(terms):
-        k, c = (meeting.value(column) for column in (meeting.law.tangential_stiffness, meeting.law.tangential_damping))
+        k, c = _largest_stiffness(meeting, terms), meeting.value(meeting.law.tangential_damping)
         mass = 1.0 / (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
         if k > 0.0:
             reason = f"{terms.steps:.3g} steps in pi sqrt(m_t / k_t) of {meeting.what} at k_t = {k:g} N/m"
@@ -148,12 +160,14 @@ IMPLICIT_FRICTION = Effect(
 )
 TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
-    law="a spring along the contact, drawn out by the slip, its force at most mu N",
-    source="Cundall and Strack 1979",
+    law="a spring along the contact, drawn out by the slip, its force at most mu N; with stiffness_ratio its stiffness "
+    "is that ratio times dN/d delta of a Hertz contact: where it grows the spring keeps its force, where it falls its "
+    "elongation",
+    source="Cundall and Strack 1979; Mindlin 1949, Thornton, Cummins and Cleary 2013",
     called_for=_spring,
     absent="no contact with tangential, or no friction in contacts",
     needs="elongation of each contact, kept through rebuilds; k_t, c_t and mu by pair of materials",
     bounds=_spring_bounds,
-    bound="2 / sqrt(tolerance) steps in pi sqrt(m_t / k_t), 20 at 1 %; m_t / (2 c_t), with 1/m_t the sum of "
-    "1/m + R^2/J of those that touch",
+    bound="2 / sqrt(tolerance) steps in pi sqrt(m_t / k_t), 20 at 1 %, with k_t as in the hardest impact or queue; "
+    "m_t / (2 c_t), with 1/m_t the sum of 1/m + R^2/J of those that touch",
 )

@@ -72,6 +72,11 @@ class Meeting:
         """The coefficient of this meeting, 0 if it has none."""
         return 0.0 if column is None else float(column[self.entry])
 
+    @property
+    def has_spring(self) -> bool:
+        """Whether friction is by a tangential spring in place of the curve."""
+        return self.value(self.law.tangential_stiffness) + self.value(self.law.tangential_mindlin) > 0.0
+
 
 def meetings(terms: Terms) -> Iterator[Meeting]:
     """Every pair of types that can touch, then every type and rail material."""

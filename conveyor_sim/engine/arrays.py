@@ -87,7 +87,9 @@ class ContactLaw(NamedTuple):
     """s/m, lambda in N (1 + lambda v_n); the contact never pulls."""
     friction: F8 | None
     tangential_stiffness: F8 | None
-    """N/m, of the spring with history."""
+    """N/m, of the spring with history; 0, not None, where only Mindlin's springs are."""
+    tangential_mindlin: F8 | None
+    """N/m^1.5, times sqrt(delta): what overlap adds to that stiffness."""
     tangential_damping: F8 | None
     """kg/s, beside that spring."""
 

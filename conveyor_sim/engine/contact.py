@@ -44,10 +44,12 @@ def contact_force(
     tangential = _tangential(
         law.friction,
         law.tangential_stiffness,
+        law.tangential_mindlin,
         law.tangential_damping,
         e,
         slip_limit,
         atan,
+        depth,
         share,
         # Coulomb's law needs a pressing contact: paper damping may pull at the end of a rebound.
         0.0 if normal < 0.0 else normal,
@@ -105,10 +107,12 @@ def _dragged(force: float, coefficient: Any, e: int, depth: float, velocity: flo
 def _tangential(
     friction: Any,
     stiffness: Any,
+    mindlin: Any,
     damping: Any,
     e: int,
     slip_limit: float,
     atan: Any,
+    depth: float,
     share: float,
     pressing: float,
     slip: float,
@@ -122,10 +126,19 @@ def _tangential(
     sliding = -most * _curve_share(most, slip, slip_limit, atan, implicit)
     if spring is None:
         return sliding
-    held = -share * _add_damping(stiffness[e] * spring, damping, e, slip)
+    stiff = _tangential_stiffness(stiffness, mindlin, e, depth)
+    held = -share * _add_damping(stiff * spring, damping, e, slip)
     held = -most if -most > held else held
     held = most if held > most else held
-    return held if stiffness[e] > 0.0 else sliding
+    return held if stiff > 0.0 else sliding
+
+
+@part
+def _tangential_stiffness(stiffness: Any, mindlin: Any, e: int, depth: float) -> float:
+    """N/m, of the tangential spring at an overlap: as given, or 8 G* sqrt(R* delta) (Mindlin 1949)."""
+    if mindlin is None:
+        return stiffness[e]
+    return stiffness[e] + mindlin[e] * math.sqrt(depth)
 
 
 @part
@@ -162,11 +175,35 @@ def drag_force(law: ContactLaw, e: int, overlap: float, velocity: float) -> floa
 
 
 @part
-def spring_energy(law: ContactLaw, e: int, spring: Any) -> float:
-    """What a tangential spring of some elongation (m), or None, has stored, J."""
+def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float:
+    """What a tangential spring of some elongation (m), or None, has stored at an overlap (m), J."""
     if spring is None:
         return 0.0
-    return 0.5 * law.tangential_stiffness[e] * spring * spring  # type: ignore[index]
+    depth = 0.0 if overlap < 0.0 else overlap
+    return 0.5 * _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth) * spring * spring
+
+
+@kernel
+def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float) -> Any:
+    """Elongation (m), or None, of a spring at an overlap (m) that is by so much deeper (m) than where it was kept.
+
+    A spring that has become stiffer keeps its force, for what joins a contact joins it without load; one that has
+    become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by itself.
+    """
+    if spring is None:
+        return None
+    return spring * _carried_share(law.tangential_mindlin, e, 0.0 if overlap < 0.0 else overlap, deeper)
+
+
+@part
+def _carried_share(mindlin: Any, e: int, depth: float, deeper: float) -> float:
+    if mindlin is None:
+        return 1.0
+    before = depth - deeper
+    before = 0.0 if before < 0.0 else before
+    before = depth if before > depth else before
+    share = math.sqrt(before / (depth if depth > 0.0 else 1.0))
+    return share if mindlin[e] > 0.0 else 1.0
 
 
 @part
@@ -178,12 +215,15 @@ def stretched(spring: Any, slip: float, dt: float) -> Any:
 
 
 @kernel
-def spring_after(law: ContactLaw, e: int, spring: float, slip: float, dt: float, normal: float, share: float) -> float:
+def spring_after(
+    law: ContactLaw, e: int, spring: float, overlap: float, slip: float, dt: float, normal: float, share: float
+) -> float:
     """Elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N (Cundall and Strack 1979).
 
-    normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
+    overlap: m. normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
     """
-    stiffness = law.tangential_stiffness[e]  # type: ignore[index]
+    depth = 0.0 if overlap < 0.0 else overlap
+    stiffness = _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth)
     longer = spring + dt * slip
     most = law.friction[e] * (0.0 if normal < 0.0 else normal)  # type: ignore[index]
     # The force is that of the share of a spring, as is N.

@@ -103,7 +103,7 @@ def _rail_contacts(
                     spring = rail_elongation(
                         law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, found.entry[c]
                     )
-                    normal, tangential, _ = rail_contact(
+                    normal, tangential, _, _ = rail_contact(
                         c,
                         i,
                         world.settings,

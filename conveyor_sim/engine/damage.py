@@ -104,7 +104,7 @@ def _list_rails(i: int, world: World, law: Any, damage: Any, member: Member, cou
             spring = rail_elongation(
                 law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, entry
             )
-            normal, tangential, slip = rail_contact(
+            normal, tangential, slip, _ = rail_contact(
                 c,
                 i,
                 world.settings,

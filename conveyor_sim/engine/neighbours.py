@@ -65,6 +65,7 @@ def _fill_laws(pairs: Pairs, columns: ContactLaw, tables: ContactLaw, bottles: B
     _fill(columns.damping_onset, tables.damping_onset, pairs, bottles)
     _fill(columns.friction, tables.friction, pairs, bottles)
     _fill(columns.tangential_stiffness, tables.tangential_stiffness, pairs, bottles)
+    _fill(columns.tangential_mindlin, tables.tangential_mindlin, pairs, bottles)
     _fill(columns.tangential_damping, tables.tangential_damping, pairs, bottles)
 
 

@@ -22,7 +22,7 @@ from numba import uint64
 
 from .arrays import Bottles, Member, Pairs, Settings
 from .compile import part
-from .contact import contact_force, spring_after, stretched
+from .contact import carried, contact_force, spring_after, stretched
 from .team import BLOCK, share
 
 # Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
@@ -160,6 +160,7 @@ def _law(
         overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
         closing = -(dvx * nx + dvy * ny)
         slip = dvx * ny - dvy * nx + _rim_slip(settings, spin, reach, gathered, c, half * overlap)
+        spring = carried(pairs.law, p, elongation(springs, p), overlap, closing * spring_dt)
         normal, tangential = contact_force(
             pairs.law,
             p,
@@ -170,7 +171,7 @@ def _law(
             1.0,
             closing,
             slip,
-            stretched(elongation(springs, p), slip, spring_dt),
+            stretched(spring, slip, spring_dt),
             _ease(implicit, gathered, c),
         )
         fx = -normal * nx - tangential * ny
@@ -188,7 +189,7 @@ def _law(
             normals[q] = normal
         if springs is not None:
             before = springs.elongation[p]
-            after = spring_after(pairs.law, p, before, slip, spring_dt, normal, 1.0)
+            after = spring_after(pairs.law, p, spring, overlap, slip, spring_dt, normal, 1.0)
             springs.elongation[p] = after if spring_dt > 0.0 else before
 
 

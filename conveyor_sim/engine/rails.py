@@ -5,7 +5,7 @@ from typing import Any
 from .arc import arc_contact
 from .arrays import Bottles, ContactLaw, Load, RailContacts, Settings
 from .compile import part
-from .contact import contact_force, spring_after, stretched
+from .contact import carried, contact_force, spring_after, stretched
 from .keep import keep_deepest
 from .ledger_parts import add_rail_parts
 from .moving import clear_rail_power, moves, moving_contacts, surface_velocity
@@ -77,8 +77,8 @@ def rail_contact(
     spring: Any,
     spring_dt: float,
     implicit: Any,
-) -> tuple[float, float, float]:
-    """N and T (N) on bottle i in its contact c with a rail, and its slip (m/s) along it.
+) -> tuple[float, float, float, Any]:
+    """N and T (N) on bottle i in its contact c with a rail, its slip (m/s) along it, and its spring before that slip.
 
     spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: s/kg, or None (see `contact_force`).
     """
@@ -90,6 +90,7 @@ def rail_contact(
     if spin is not None:
         slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
     entry = law_entry(settings, bottles, found, c, i)
+    kept = carried(law, entry, spring, found.overlap[c], closing * spring_dt)
     normal, tangential = contact_force(
         law,
         entry,
@@ -100,10 +101,10 @@ def rail_contact(
         found.share[c],
         closing,
         slip,
-        stretched(spring, slip, spring_dt),
+        stretched(kept, slip, spring_dt),
         implicit,
     )
-    return normal, tangential, slip
+    return normal, tangential, slip, kept
 
 
 @part
@@ -178,7 +179,7 @@ def add_rail_forces(
             if found.share[c] > 0.0:
                 spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, found.entry[c])
                 ease = _ease(implicit, i)
-                normal, tangential, slip = rail_contact(
+                normal, tangential, slip, spring = rail_contact(
                     c, i, settings, settings.atan, bottles, spin, moving, found, law, curves, spring, spring_dt, ease
                 )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
@@ -188,18 +189,20 @@ def add_rail_forces(
                 if spin is not None:
                     spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
                 entry = law_entry(settings, bottles, found, c, i)
-                found.solution[c] = _spring_after(law, entry, spring, slip, spring_dt, normal, found.share[c])
+                found.solution[c] = _spring_after(
+                    law, entry, spring, found.overlap[c], slip, spring_dt, normal, found.share[c]
+                )
         if spring_dt > 0.0:
             _store_springs(law.tangential_stiffness, near_segments, near_arcs, moving, found, count, i)
 
 
 @part
 def _spring_after(
-    law: ContactLaw, entry: int, spring: Any, slip: float, dt: float, normal: float, share: float
+    law: ContactLaw, entry: int, spring: Any, overlap: float, slip: float, dt: float, normal: float, share: float
 ) -> float:
     if spring is None:
         return 0.0
-    return spring_after(law, entry, spring, slip, dt, normal, share)
+    return spring_after(law, entry, spring, overlap, slip, dt, normal, share)
 
 
 @part

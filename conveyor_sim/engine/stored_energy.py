@@ -46,7 +46,7 @@ def _in_pairs(bottles: Any, pairs: Any, curves: Any, energy: F8) -> None:
         overlap, _, _ = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
         if overlap > 0.0:
             energy[ELASTIC] += _elastic(pairs.law, p, curves, overlap)
-            energy[SPRINGS] += spring_energy(pairs.law, p, elongation(pairs.spring, p))
+            energy[SPRINGS] += spring_energy(pairs.law, p, elongation(pairs.spring, p), overlap)
 
 
 @part
@@ -60,7 +60,7 @@ def _at_rails(world: World, law: Any, found: RailContacts, energy: F8) -> None:
             e = law_entry(world.settings, bottles, found, c, i)
             spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, found.entry[c])
             energy[ELASTIC] += found.share[c] * _elastic(law, e, world.curves, found.overlap[c])
-            energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring)
+            energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring, found.overlap[c])
 
 
 @part

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from conveyor_sim.scene.contacts import ELASTIC, Contact
+from conveyor_sim.scene.contacts import ELASTIC, Contact, Tangential
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import MOST
@@ -26,6 +26,8 @@ def contact_problems(scene: Scene) -> Iterator[Problem]:
             yield from _table((*path, "table"), contact.table)
         if contact.tangential is not None and contact.friction == 0.0:
             yield Problem((*path, "tangential"), "given without friction, expected friction greater than 0 beside it")
+        if contact.tangential is not None:
+            yield from _tangential((*path, "tangential"), contact, contact.tangential)
         if contact.tangential is not None and scene.accuracy.integrator != "semi_implicit_euler":
             # Its slip at the middle of the step is not at hand: with that at the end the spring would lose energy.
             yield Problem((*path, "tangential"), f"given, expected none with integrator {scene.accuracy.integrator}")
@@ -78,6 +80,20 @@ def _damping(path: Path, contact: Contact) -> Iterator[Problem]:
         yield Problem(
             (*path, "speed"),
             f'{shown(damping.speed)} given, expected none: the restitution of law "{damping.law}" holds at any speed',
+        )
+
+
+def _tangential(path: Path, contact: Contact, spring: Tangential) -> Iterator[Problem]:
+    given = [field for field in ("stiffness", "stiffness_ratio") if getattr(spring, field) is not None]
+    if len(given) != 1:
+        yield Problem(
+            path, f"{' and '.join(given) or 'no stiffness'} given, expected one of stiffness and stiffness_ratio"
+        )
+    elif spring.stiffness_ratio is not None and contact.hertz_stiffness is None:
+        yield Problem(
+            (*path, "stiffness_ratio"),
+            f"{shown(spring.stiffness_ratio)} given, expected stiffness: "
+            "only with hertz_stiffness does the stiffness grow with the overlap",
         )
 
 

@@ -116,6 +116,12 @@ def test_tangential_spring() -> None:
     assert found["tangential spring"] == pytest.approx(contact_time(4e3, MASS / 4) / 20)
     assert found["tangential damping"] == pytest.approx(damping_bound(2.0, MASS / 4))
     assert "contact friction" not in found
+    ratio = {"hertz_stiffness": 1e8, "friction": 0.3, "tangential": {"stiffness_ratio": 0.8}}
+    # The deepest overlap of an impact at 2 m/s; a queue of two does not press as hard.
+    deepest = (1.25 * REDUCED * 2.0**2 / 1e8) ** 0.4
+    mindlin = bounds(contact(None, **ratio), floor={"friction": 0.4})
+    assert mindlin["tangential spring"] == pytest.approx(contact_time(1.2e8 * deepest**0.5, MASS / 4) / 20)
+    assert "contact friction" not in mindlin
     without = bounds(
         contact(5e3, friction=0.3, **spring), floor={"friction": 0.4}, effects={"tangential_spring": "off"}
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from conveyor_sim.engine.arrays import ContactLaw, Curves
-from conveyor_sim.engine.contact import contact_force, spring_after
+from conveyor_sim.engine.contact import carried, contact_force, spring_after
 
 K, C, MU, LIMIT = 5000.0, 2.0, 0.3, 0.01
 K_HERTZ = 3e6
@@ -148,19 +148,47 @@ def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
 def test_the_spring_goes_with_the_slip_and_no_further_than_it_can_hold() -> None:
     """xi + dt s; cut to mu N/k_t while the contact slides, forgotten without a normal force."""
     spring = law(friction=MU, tangential_stiffness=4000.0)
-    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 10.0, 1.0) == pytest.approx(1e-4 + 0.02 * 1e-3)
+    assert spring_after(spring, 1, 1e-4, 0.002, 0.02, 1e-3, 10.0, 1.0) == pytest.approx(1e-4 + 0.02 * 1e-3)
     for sign in (-1.0, 1.0):
-        assert spring_after(spring, 1, sign * 1e-4, sign * 5.0, 1e-3, 10.0, 1.0) == pytest.approx(
+        assert spring_after(spring, 1, sign * 1e-4, 0.002, sign * 5.0, 1e-3, 10.0, 1.0) == pytest.approx(
             sign * MU * 10.0 / 4000.0
         )
-    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, 0.0, 1.0) == 0.0
-    assert spring_after(spring, 1, 1e-4, 0.02, 1e-3, -3.0, 1.0) == 0.0
-    assert spring_after(law(friction=MU, tangential_stiffness=0.0), 1, 1e-4, 0.02, 1e-3, 10.0, 1.0) == 0.0
+    assert spring_after(spring, 1, 1e-4, 0.002, 0.02, 1e-3, 0.0, 1.0) == 0.0
+    assert spring_after(spring, 1, 1e-4, 0.002, 0.02, 1e-3, -3.0, 1.0) == 0.0
+    assert spring_after(law(friction=MU, tangential_stiffness=0.0), 1, 1e-4, 0.002, 0.02, 1e-3, 10.0, 1.0) == 0.0
+
+
+MINDLIN = {"hertz": K_HERTZ, "friction": MU, "tangential_stiffness": 0.0, "tangential_mindlin": 1.2 * K_HERTZ}
+
+
+def test_mindlins_spring_stiffens_with_the_overlap() -> None:
+    """k_t = 0.8 dN/d delta, for 1.5 x 0.8 = 1.2; a pair of the scene that has none keeps the friction curve."""
+    for overlap in (0.0005, 0.002):
+        normal = K_HERTZ * overlap**1.5
+        assert force(overlap, spring=1e-5, **MINDLIN)[1] == pytest.approx(-0.8 * 1.5 * normal / overlap * 1e-5)
+        assert force(overlap, spring=1.0, **MINDLIN)[1] == pytest.approx(-MU * normal)
+    without = {**MINDLIN, "tangential_mindlin": 0.0}
+    assert force(0.002, slip=0.004, spring=0.1, **without) == force(0.002, slip=0.004, hertz=K_HERTZ, friction=MU)
+
+
+def test_a_spring_that_stiffens_keeps_its_force_and_one_that_softens_its_elongation() -> None:
+    """So it never gains energy by itself, and is slack where a contact begins."""
+    given, xi = law(**MINDLIN), 1e-5
+    depth, before, after = 0.0020, 0.0019, 0.0021
+    stiffer = carried(given, 1, xi, depth, depth - before)
+    assert stiffer * math.sqrt(depth) == pytest.approx(xi * math.sqrt(before))
+    # k_t xi^2, with the force k_t xi as before.
+    assert math.sqrt(depth) * stiffer**2 < math.sqrt(before) * xi**2
+    assert carried(given, 1, xi, depth, depth - after) == xi
+    assert carried(given, 1, xi, depth, 2.0 * depth) == 0.0
+    assert carried(given, 1, xi, depth, 0.0) == xi
+    other = law(**{**MINDLIN, "tangential_stiffness": 4000.0, "tangential_mindlin": 0.0})
+    assert carried(other, 1, xi, depth, 1e-4) == xi
 
 
 EVERYTHING = {
     "stiffness": K, "hertz": K_HERTZ, "damping_paper": C, "damping_normal": C, "damping_tsuji": C, "damping_onset": C,
-    "friction": MU, "tangential_stiffness": 4000.0, "tangential_damping": 6.0,
+    "friction": MU, "tangential_stiffness": 4000.0, "tangential_mindlin": 3e5, "tangential_damping": 6.0,
 }  # fmt: skip
 
 
@@ -185,5 +213,5 @@ def test_a_share_of_a_contact_slides_at_mu_times_what_it_presses_with(share: flo
     """What a long slip leaves of the spring holds mu N of that share, no less."""
     given = {"stiffness": K, "friction": MU, "tangential_stiffness": 4000.0}
     normal = force(0.002, share=share, **given)[0]
-    held = spring_after(law(**given), 1, 0.0, 1.0, 1.0, normal, share)
+    held = spring_after(law(**given), 1, 0.0, 0.002, 1.0, 1.0, normal, share)
     assert force(0.002, share=share, spring=held, **given)[1] == pytest.approx(-MU * normal, rel=1e-12)

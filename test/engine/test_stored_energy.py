@@ -46,6 +46,19 @@ def test_contacts_hold_what_their_laws_take_up() -> None:
     assert (KINETIC, ELASTIC, SPRINGS) == (0, 1, 2)
 
 
+def test_mindlins_spring_holds_by_the_overlap_at_hand() -> None:
+    """k_t xi^2 / 2 with k_t = 1.5 x 0.8 k_h sqrt(d)."""
+    springy = {"friction": 0.3, "tangential": {"stiffness_ratio": 0.8}}
+    laws = scene(
+        contacts=[contact(None, hertz_stiffness=1e6, **springy)],
+        bottles=[bottle(FAR, FAR), bottle(FAR + 1.0, FAR)],
+        **NO_FLOOR,
+    )
+    state = state_of(laws, [(0.0, 0.0), (2.0 * RADIUS - DEEP, 0.0)], kinds=np.array([0, 0]))
+    state.world.pairs.spring.elongation[0] = 2e-5
+    assert stored(state)[SPRINGS] == pytest.approx(0.5 * 1.2e6 * math.sqrt(DEEP) * 2e-5**2, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "course",
     [

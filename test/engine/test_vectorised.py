@@ -104,12 +104,12 @@ def test_tangential_springs() -> None:
     """How they go with the slip."""
 
     @compiled
-    def loop(count: int, law: Any, spring: Any, slip: Any, normal: Any) -> None:
+    def loop(count: int, law: Any, spring: Any, overlap: Any, slip: Any, normal: Any) -> None:
         for c in range(uint64(count)):
-            spring[c] = spring_after(law, c, spring[c], slip[c], 1e-4, normal[c], 1.0)
+            spring[c] = spring_after(law, c, spring[c], overlap[c], slip[c], 1e-4, normal[c], 1.0)
 
-    law = ContactLaw(*[None] * 7, column(), column(), None)
-    loop(COUNT, law, column(), column(), column())
+    law = ContactLaw(*[None] * 7, column(), column(), column(), None)
+    loop(COUNT, law, column(), column(), column(), column())
     assert_vectorised(loop)
 
 
