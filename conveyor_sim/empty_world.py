@@ -121,7 +121,7 @@ def empty_world(model: Model, slots: int) -> World:
         near_segments=empty_near(model, slots, entries) if model.segments is not None else None,
         arcs=model.arcs,
         near_arcs=empty_near(model, slots, entries) if model.arcs is not None else None,
-        moving=_moving(model),
+        moving=_moving(model, slots),
         railed=listed(slots) if model.rail_law is not None else None,
         rail_law=model.rail_law,
         belts=belt_arrays(model.belt_shapes, slots, entries) if model.has("belts") else None,
@@ -133,11 +133,12 @@ def empty_world(model: Model, slots: int) -> World:
     )
 
 
-def _moving(model: Model) -> MovingRails | None:
+def _moving(model: Model, slots: int) -> MovingRails | None:
     if not model.has("moving_rails"):
         return None
     pieces = sum(len(rail.pieces) for rail in model.rails_at_rest)
-    return moving_arrays(model.moving_shapes, model.rail_materials, len(model.rails_at_rest), pieces)
+    rails, ledger = len(model.rails_at_rest), model.has("energy_ledger")
+    return moving_arrays(model.moving_shapes, model.rail_materials, rails, pieces, slots, ledger)
 
 
 def _surface(model: Model) -> Surface | None:

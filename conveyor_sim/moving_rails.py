@@ -4,16 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import Ends
+from conveyor_sim.engine.arrays import F8, Ends
 from conveyor_sim.engine.joint import FREE
-from conveyor_sim.engine.moving_arrays import PHASES, MovingRails
+from conveyor_sim.engine.moving_arrays import OFF_PROFILE, PHASES, UNLIMITED, Actuators, MovingRails
+from conveyor_sim.engine.team import UNIT
 from conveyor_sim.scene.moving import MovingShape
 
 
-def moving_arrays(shapes: Sequence[MovingShape], materials: Sequence[str], rail: int, surface: int) -> MovingRails:
+def moving_arrays(
+    shapes: Sequence[MovingShape], materials: Sequence[str], rail: int, surface: int, slots: int, ledger: bool
+) -> MovingRails:
     """Rails that rest where they are at first, each a surface of its own.
 
-    materials: of all rails, by number. rail, surface: the number of the first one as a rail and as a surface.
+    materials: of all rails, by number. rail, surface: the number of the first one as a rail and as a surface. slots:
+    of bottles. ledger: whether the energy ledger is kept.
     """
     count = len(shapes)
     start = np.array([shape.at(shape.first).p1 for shape in shapes])
@@ -56,12 +60,47 @@ def moving_arrays(shapes: Sequence[MovingShape], materials: Sequence[str], rail:
         sweep=np.array([shape.sweep() for shape in shapes]),
         course=course,
         clock=np.zeros(1),
+        actuators=_actuators(shapes, slots, ledger),
     )
 
 
+def _actuators(shapes: Sequence[MovingShape], slots: int, ledger: bool) -> Actuators | None:
+    if all(shape.limit is None for shape in shapes):
+        return None
+    count = len(shapes)
+    return Actuators(
+        limit=np.array([UNLIMITED if shape.limit is None else shape.limit for shape in shapes]),
+        mass=np.array([shape.mass for shape in shapes]),
+        max_speed=np.array([shape.max_speed for shape in shapes]),
+        max_acceleration=np.array([shape.acceleration for shape in shapes]),
+        stroke=np.array([shape.stroke for shape in shapes]),
+        mode=np.zeros(count, np.int8),
+        left=np.zeros(count, np.int8),
+        acceleration=np.zeros(count),
+        push=pushes(slots, count, 3 if ledger else 1),
+    )
+
+
+def pushes(slots: int, rails: int, columns: int) -> F8:
+    """`Actuators.push` for so many slots of bottles."""
+    return np.zeros((-(-slots // UNIT), rails, columns))
+
+
+def for_slots(moving: MovingRails | None, slots: int) -> MovingRails | None:
+    """The same rails beside more slots of bottles."""
+    if moving is None or moving.actuators is None:
+        return moving
+    _, rails, columns = moving.actuators.push.shape
+    return moving._replace(actuators=moving.actuators._replace(push=pushes(slots, rails, columns)))
+
+
 def fastest_rail(moving: MovingRails | None) -> float:
-    """Speed (m/s) that no point of a moving rail exceeds on its course, 0 if none moves."""
+    """Speed (m/s) that no point of a moving rail exceeds but by what bottles do to it, 0 if none moves."""
     if moving is None:
         return 0.0
     reach = np.where(moving.turning != 0.0, moving.length, 1.0)
-    return float((reach * np.abs(moving.course[:, :, 2]).max(axis=1)).max())
+    speed, actuators = np.abs(moving.course[:, :, 2]).max(axis=1), moving.actuators
+    if actuators is not None:
+        free = np.maximum(np.abs(moving.speed), actuators.max_speed)
+        speed = np.where(actuators.mode == OFF_PROFILE, np.maximum(speed, free), speed)
+    return float((reach * speed).max())

@@ -15,6 +15,7 @@ from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
 from conveyor_sim.model import Model
+from conveyor_sim.moving_rails import for_slots
 from conveyor_sim.scene.geometry import RailShape
 from conveyor_sim.world_arrays import Arrays, with_arrays
 from conveyor_sim.world_checks import require_sound
@@ -84,8 +85,8 @@ class State:
         self._free = np.flatnonzero(bottles.id < 0).tolist()
         self._equip(np.flatnonzero(bottles.id >= 0))
         if self.world.moving is not None and other.world.moving is not None:
-            self.world.moving.course[:] = other.world.moving.course
-            for now, then in zip(present(self.world.moving), present(other.world.moving), strict=True):
+            # Scenes that differ in force limits share what is there without them.
+            for now, then in zip(present(self.world.moving), present(other.world.moving), strict=False):
                 now[:] = then
         self._note_velocities(slice(None))
         self.make_lists()
@@ -184,7 +185,7 @@ class State:
             pairs=old.pairs,
             near_segments=_for_slots(old.near_segments, slots),
             near_arcs=_for_slots(old.near_arcs, slots),
-            moving=old.moving,
+            moving=for_slots(old.moving, slots),
         )
 
     def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from conveyor_sim.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.moving_arrays import HELD, ON_PROFILE
 from conveyor_sim.engine.slots import WIDTH
 from conveyor_sim.model import Model
 from conveyor_sim.world_arrays import Arrays, changing_arrays
@@ -14,6 +15,7 @@ FIXED = (
     *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
     *(f"moving.{name}" for name in ("length", "material", "rail", "surface", "home_", "along_", "turning", "sweep")),
     "moving.ends.joint",
+    *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "stroke")),
     *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
     *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
     "surface.friction",
@@ -33,6 +35,7 @@ SCRATCH = (
     *(f"pairs.{name}" for name in ("reach", "radius_i")),
     *(f"ledger.{name}" for name in ("damping.", "friction.", "base.", "belt_power", "rail_power", "power")),
     *(f"damage.tipping.{name}" for name in ("fx", "fy", "moment")),
+    "moving.actuators.push",
 )
 """Beginnings of the names of arrays that are written before they are read, or are no state. They may hold anything
 finite or not: a tick that failed leaves them so.
@@ -103,6 +106,8 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "belts.uncertain.bottle": (0, slots - 1),
         "belts.uncertain.first": (0, slots),
         "footing.carrier": (0, belts),
+        "moving.actuators.mode": (ON_PROFILE, HELD),
+        "moving.actuators.left": (0, 1),
     }
     if world.belts is not None:
         given["belts.start"] = (0, world.belts.candidate.size)

@@ -1,17 +1,20 @@
 """Rails that move: where they are at every step, what touches them, and how fast they are there.
 
 A rail's course is a closed form of time, constant accelerations one after another, so it moves within a tick, and a
-tick can be done again in shorter steps. A contact knows a rail by an entry of MOVING and more. Few rails move, so that
-every bottle near the box that a rail sweeps tests it, and no list depends on where the rail is.
+tick can be done again in shorter steps. It leaves its course where its drive is held up (`actuators.py`). A contact
+knows a rail by an entry of MOVING and more. Few rails move, so that every bottle near the box that a rail sweeps tests
+it, and no list depends on where the rail is.
 """
 
 import math
 from typing import Any
 
+from .actuators import add_push, add_push_parts, clear_push, drive_rails, is_off_profile
 from .arrays import Bottles, Member, RailContacts
 from .compile import part
 from .keep import keep_deepest
-from .moving_arrays import PHASES, MovingRails
+from .motion_profile import phase_at
+from .moving_arrays import MovingRails
 from .segment import segment_contact
 from .team import UNIT, units, wait_for_all
 
@@ -29,11 +32,12 @@ def place_rails(moving: Any, member: Member, dt: float) -> None:
 
 
 @part
-def pass_step(moving: Any, member: Member, dt: float) -> None:
-    """Move the rails on by a step, right after a `wait_for_all`; all see it on return."""
+def pass_step(moving: Any, ledger: Any, member: Member, dt: float, centred: bool) -> None:
+    """Move the rails on by a step, right after a `wait_for_all`; all see it on return. centred: see `drive_rails`."""
     if moving is None:
         return
     if member.rank == 0:
+        drive_rails(moving.actuators, moving, ledger, moving.clock[0] * dt, dt, centred)
         moving.clock[0] += 1.0
         _place(moving, moving.clock[0] * dt)
     wait_for_all(member)
@@ -42,12 +46,12 @@ def pass_step(moving: Any, member: Member, dt: float) -> None:
 @part
 def _place(moving: MovingRails, time: float) -> None:
     for q in range(moving.x.size):
-        k = 0
-        while k + 1 < PHASES and moving.course[q, k + 1, 0] <= time:
-            k += 1
-        since, acceleration = time - moving.course[q, k, 0], moving.course[q, k, 3]
-        position = moving.course[q, k, 1] + (moving.course[q, k, 2] + 0.5 * acceleration * since) * since
-        speed = moving.course[q, k, 2] + acceleration * since
+        position, speed = moving.position[q], moving.speed[q]
+        if not is_off_profile(moving.actuators, q):
+            k = phase_at(moving.course, q, time)
+            since, acceleration = time - moving.course[q, k, 0], moving.course[q, k, 3]
+            position = moving.course[q, k, 1] + (moving.course[q, k, 2] + 0.5 * acceleration * since) * since
+            speed = moving.course[q, k, 2] + acceleration * since
         cosine, sine = math.cos(moving.turning[q] * position), math.sin(moving.turning[q] * position)
         x = moving.home_x[q] + moving.along_x[q] * position
         y = moving.home_y[q] + moving.along_y[q] * position
@@ -112,6 +116,27 @@ def surface_velocity(moving: Any, found: RailContacts, c: int, bottles: Bottles,
 
 
 @part
+def clear_rail_push(moving: Any, first: int, end: int) -> None:
+    """Forget what bottles first to end exert on moving rails."""
+    if moving is None:
+        return
+    clear_push(moving.actuators, first, end)
+
+
+@part
+def add_rail_push(
+    moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int, normal: float, tangential: float
+) -> None:
+    """Add what contact c of bottle i exerts on its rail, if that moves; N and T on the bottle, N."""
+    if moving is None:
+        return
+    q = found.entry[c] - MOVING
+    if q < 0:
+        return
+    add_push(moving.actuators, moving, found, c, q, bottles, i, normal, tangential)
+
+
+@part
 def clear_rail_power(ledger: Any, moving: Any, first: int, end: int) -> None:
     """Forget the power of the rails on bottles first to end."""
     if ledger is None:
@@ -155,3 +180,4 @@ def add_rail_power(
     ledger.rail_power[unit, q] += tangential * aside - normal * ahead
     ledger.rail_power[unit, rails] += drag * aside - damped * ahead
     ledger.rail_power[unit, rails + 1] += across * aside
+    add_push_parts(moving.actuators, moving, found, c, q, bottles, i, damped, drag, across)

@@ -5,7 +5,7 @@ Shapes: Q moving rails. SI units; columns are float64, (Q,), unless said otherwi
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,39 @@ if TYPE_CHECKING:
 
 F8 = NDArray[np.float64]
 U4 = NDArray[np.uint32]
+I1 = NDArray[np.int8]
 
 PHASES = 4
 """Of a course: speed up or turn round, go on, brake, rest."""
+
+ON_PROFILE, OFF_PROFILE, HELD = 0, 1, 2
+"""Modes of a rail: where its profile has it; a body that its drive pushes; jammed."""
+
+UNLIMITED = 1e300
+"""N or N m: the force of a drive that has no limit, beside others that have."""
+
+
+class Actuators(NamedTuple):
+    """What drives the rails (`actuators.py`); None where no drive has a limit."""
+
+    limit: F8
+    """N or N m."""
+    mass: F8
+    """kg, or kg m^2 about the rail's start."""
+    max_speed: F8
+    """m/s or rad/s."""
+    max_acceleration: F8
+    stroke: F8
+    """m or rad: from the end stop at home, 0, to the other one."""
+    mode: I1
+    left: I1
+    """1: was off its profile, or took another, since the tick began."""
+    acceleration: F8
+    """In the last step off the profile."""
+    push: F8
+    """(units, Q, 1), N or N m, of the bottles of a unit (`team.py`) on a rail in the last evaluation; with the energy
+    ledger (units, Q, 3), beside it what damping and what friction have of it.
+    """
 
 
 class MovingRails(NamedTuple):
@@ -58,9 +88,12 @@ class MovingRails(NamedTuple):
     """(Q, PHASES, 4): when a phase begins, s after the tick did; position, speed and acceleration then."""
     clock: F8
     """(1,), steps since the tick began."""
+    actuators: Actuators | None
 
 
-def present(moving: MovingRails) -> tuple[F8, ...]:
-    """The arrays that tell where the rails are now, and when that is."""
+def present(moving: MovingRails) -> tuple[NDArray[Any], ...]:
+    """The arrays that tell where the rails are now, when that is, and where they are going."""
     where = (moving.x, moving.y, moving.tx, moving.ty, moving.ends.x, moving.ends.y)
-    return (*where, moving.vx, moving.vy, moving.turn, moving.position, moving.speed, moving.clock)
+    now = (*where, moving.vx, moving.vy, moving.turn, moving.position, moving.speed, moving.course, moving.clock)
+    actuators = moving.actuators
+    return now if actuators is None else (*now, actuators.mode, actuators.left, actuators.acceleration)

@@ -8,7 +8,7 @@ from .compile import part
 from .contact import carried, contact_force, spring_after, stretched
 from .keep import keep_deepest
 from .ledger_parts import add_rail_parts
-from .moving import clear_rail_power, moves, moving_contacts, surface_velocity
+from .moving import add_rail_push, clear_rail_power, clear_rail_push, moves, moving_contacts, surface_velocity
 from .segment import segment_contact
 from .shares import share_overlaps
 from .team import units
@@ -170,6 +170,7 @@ def add_rail_forces(
     if railed is None:
         return
     clear_rail_power(ledger, moving, first, end)
+    clear_rail_push(moving, first, end)
     begin, stop = units(first, end)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
@@ -184,6 +185,7 @@ def add_rail_forces(
                 )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
+                add_rail_push(moving, found, c, bottles, i, normal, tangential)
                 _note_normal(load.normal_sum, load.normal_max, i, normal)
                 _note_parts(ledger, settings, bottles, moving, found, c, i, law, curves, normal, tangential, slip)
                 if spin is not None:

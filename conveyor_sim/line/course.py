@@ -3,12 +3,15 @@
 A course is (PHASES, 4): for each phase when it begins (s), and position, speed and acceleration then.
 """
 
-import math
+from typing import Any
 
 import numpy as np
 
 from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.motion_profile import plan_profile
 from conveyor_sim.engine.moving_arrays import PHASES
+
+_plan: Any = plan_profile.py_func  # type: ignore[attr-defined]
 
 
 def resting(position: float) -> F8:
@@ -23,26 +26,16 @@ def course_to(position: float, speed: float, target: float, max_speed: float, ac
 
     All in m and s, or rad and s; times since now.
     """
-    braked = position + 0.5 * speed * abs(speed) / acceleration
-    if speed == 0.0 and target == position:
-        return resting(position)
-    sign = 1.0 if target >= braked else -1.0
-    # Speed up to v and brake from it: (v^2 - speed^2) / 2a + v^2 / 2a is the way, speeds and way along `sign`.
-    way = sign * (target - position)
-    top = min(max_speed, math.sqrt(max(0.0, acceleration * way + 0.5 * speed * speed)))
-    speeding = max(0.0, (top - sign * speed) / acceleration)
-    braking = top / acceleration
-    left = way - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
-    going = max(0.0, left / top) if top > 0.0 else 0.0
-    begin_brake = target - sign * 0.5 * top * braking
-    return np.array(
-        [
-            [0.0, position, speed, sign * acceleration],
-            [speeding, begin_brake - sign * top * going, sign * top, 0.0],
-            [speeding + going, begin_brake, sign * top, -sign * acceleration],
-            [speeding + going + braking, target, 0.0, 0.0],
-        ]
-    )
+    course = np.zeros((1, PHASES, 4))
+    _plan(course, 0, 0.0, position, speed, target, max_speed, acceleration)
+    return np.asarray(course[0])
+
+
+def position_at(course: F8, seconds: float) -> float:
+    """Where a course is so many seconds after it began."""
+    k = max(0, int(np.searchsorted(course[:, 0], seconds, side="right")) - 1)
+    since = seconds - course[k, 0]
+    return float(course[k, 1] + (course[k, 2] + 0.5 * course[k, 3] * since) * since)
 
 
 def later(course: F8, seconds: float) -> F8:

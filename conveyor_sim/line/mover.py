@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.engine.moving_arrays import MovingRails
-from conveyor_sim.line.course import course_to, later, resting
+from conveyor_sim.engine.moving_arrays import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
+from conveyor_sim.line.course import course_to, later, position_at, resting
 from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.model import Model
@@ -17,13 +17,14 @@ WORDS = {
 """By kind: the command, and the end switches at home and at the end of the stroke."""
 
 SWITCHED = 1e-3
-"""Of the stroke: within it of an end that end's switch is on."""
+"""Of the stroke: within it of an end that end's switch is on, within it of its course it is not blocked."""
 
 
 class Mover(Device):
     """One rail that moves: to the end of its stroke while its command is on, home while it is off.
 
-    While it is jammed it stands where it was; it goes on when it is free again.
+    While it is jammed it stands where it was; it goes on when it is free again. Where bottles are too much for its
+    drive, it is held up or goes back, and goes on from where it is.
     """
 
     def __init__(self, number: int, shape: MovingShape) -> None:
@@ -36,6 +37,7 @@ class Mover(Device):
                 Signal(f"{shape.name}/position", "1", "number"),
                 Signal(f"{shape.name}/{home}", "1", "bool"),
                 Signal(f"{shape.name}/{away}", "1", "bool"),
+                Signal(f"{shape.name}/blocked", "1", "bool"),
             ),
             (switch(f"{shape.name}/{order}"),),
             (switch(f"{shape.name}/jammed"),),
@@ -48,6 +50,10 @@ class Mover(Device):
         self.course = resting(shape.first)
         self.since = 0
         """Tick at which the course began."""
+        self.limited = False
+        """Whether its drive could not keep it on its course all through the last tick."""
+        self.blocked = False
+        """Whether its drive can't keep it on its course, and it is away from that."""
 
     def command(self, name: str, value: float, now: Now) -> None:
         """Go to the other end, jam or be free again, from where it is on."""
@@ -65,17 +71,31 @@ class Mover(Device):
 
     def begin(self, now: Now) -> None:
         """Tell the engine where the rail is in the steps of this tick."""
-        self._rails(now).course[self._number] = later(self.course, (now.tick - self.since) * now.length)
+        rails, number = self._rails(now), self._number
+        rails.course[number] = later(self.course, (now.tick - self.since) * now.length)
+        if (actuators := rails.actuators) is not None:
+            actuators.left[number] = 0
+            if self.jammed:
+                actuators.mode[number] = HELD
+            elif actuators.mode[number] == HELD:
+                actuators.mode[number] = ON_PROFILE
 
     def end(self, now: Now) -> None:
-        """See where it is."""
-        rails = self._rails(now)
-        self.position, self.speed = float(rails.position[self._number]), float(rails.speed[self._number])
+        """See where it is, and where it is going if its drive was held up."""
+        rails, number = self._rails(now), self._number
+        self.position, self.speed = float(rails.position[number]), float(rails.speed[number])
+        if (actuators := rails.actuators) is None:
+            return
+        self.limited = bool(actuators.left[number])
+        if self.limited:
+            self.course, self.since = rails.course[number].copy(), now.tick - 1
+        away = abs(self.position - position_at(self.course, (now.tick - self.since) * now.length))
+        self.blocked = bool(actuators.mode[number] == OFF_PROFILE) and away > SWITCHED * self._shape.stroke
 
     def values(self, now: Now) -> Sequence[float]:
-        """Position from 0, at home, to 1, and both end switches."""
+        """Position from 0, at home, to 1, both end switches, and whether it is blocked."""
         share = min(1.0, max(0.0, self.position / self._shape.stroke))
-        return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED)
+        return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED), float(self.blocked)
 
     def _rails(self, now: Now) -> MovingRails:
         moving = now.state.world.moving

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from conveyor_sim.scene.geometry import TOUCH
 from conveyor_sim.scene.movers import Diverter, SwingingGate
-from conveyor_sim.scene.moving import movers_of
+from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.words import shown
@@ -16,7 +16,7 @@ INTEGRATORS = ("semi_implicit_euler", "velocity_verlet")
 
 def mover_problems(scene: Scene) -> list[Problem]:
     """Problems of the rails that move."""
-    return [*_shapes(scene), *_integrator(scene), *_springs(scene)]
+    return [*_shapes(scene), *_drives(scene), *_integrator(scene), *_springs(scene)]
 
 
 def unsound_movers(scene: Scene) -> set[Path]:
@@ -33,6 +33,22 @@ def _shapes(scene: Scene) -> Iterator[Problem]:
                 (*path, "angle"),
                 f"{shown(mover.angle)} given, expected an angle of 1e-6 rad up to a full turn, to either side",
             )
+
+
+def _drives(scene: Scene) -> Iterator[Problem]:
+    unsound = unsound_movers(scene)
+    for path, mover in movers_of(scene):
+        shape = moving_shape(path, mover)
+        if path in unsound or shape.limit is None or shape.acceleration * shape.mass <= shape.limit:
+            continue
+        limit, mass, force, inertia, unit = "force_limit", "moving_mass", "N", "kg", "m/s^2"
+        if shape.turning:
+            limit, mass, force, inertia, unit = "torque_limit", "inertia", "N m", "kg m^2", "rad/s^2"
+        yield Problem(
+            (*path, "acceleration"),
+            f"{shown(shape.acceleration)} given, expected at most {shape.limit / shape.mass:.4g} ({unit}), what a "
+            f"{limit} of {shape.limit:g} {force} gives to its {mass} of {shape.mass:.4g} {inertia}, or {limit}: none",
+        )
 
 
 def _integrator(scene: Scene) -> Iterator[Problem]:

@@ -33,6 +33,10 @@ class MovingShape:
     """m/s^2, or rad/s^2."""
     first: float
     """Position at the beginning of the run."""
+    limit: float | None
+    """N, or N m: the most that its drive can exert; None: whatever it takes."""
+    mass: float
+    """kg, or kg m^2 about its start."""
 
     @property
     def length(self) -> float:
@@ -78,8 +82,11 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
     """The shape of one mover."""
     if isinstance(mover, (SwingingGate, Diverter)):
         along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
+        limit, rod = mover.torque_limit, math.dist(mover.from_, mover.to) ** 2 / 3.0
+        mass = rod if mover.inertia is None else mover.inertia
     else:
         along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
+        limit, mass = mover.force_limit, mover.moving_mass
     starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
     return MovingShape(
         name="/".join(str(part) for part in path),
@@ -92,6 +99,8 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
         max_speed=mover.max_speed,
         acceleration=mover.acceleration,
         first=stroke if starts_open else 0.0,
+        limit=None if limit == "none" else limit,
+        mass=mass,
     )
 
 

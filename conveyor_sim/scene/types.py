@@ -3,7 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import (
@@ -72,6 +72,7 @@ def _not_huge(value: Any) -> Any:
 _small, _sound = AfterValidator(_not_huge), AfterValidator(_sized)
 Number = Annotated[float, Strict(), AllowInfNan(False), Says("a number"), _small]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Says("a number greater than 0"), _sound]
+Limit = Annotated[Positive | Literal["none"], Says('a number greater than 0, or "none"')]
 NotNegative = Annotated[float, Strict(), AllowInfNan(False), Ge(0), Says("a number, 0 or greater"), _sound]
 Restitution = Annotated[
     float, Strict(), AllowInfNan(False), Gt(0), Le(1), Says("a number greater than 0, at most 1"), _sound

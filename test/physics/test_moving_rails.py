@@ -24,7 +24,7 @@ LANE, STOP = 0.08, 3.0
 
 def pusher(material: str, direction: float = 0.0, **more: Any) -> dict[str, Any]:
     return {"from": [0.0, -0.2], "to": [0.0, 0.2], "material": material, "direction": direction, "stroke": 0.3,
-            "max_speed": SPEED, "acceleration": AT_ONCE, **more}  # fmt: skip
+            "max_speed": SPEED, "acceleration": AT_ONCE, "force_limit": "none", **more}  # fmt: skip
 
 
 def plant(*bottles: dict[str, Any], **fields: Any) -> Simulation:
@@ -47,7 +47,7 @@ def plant(*bottles: dict[str, Any], **fields: Any) -> Simulation:
         },
         "pushers": {"p": pusher("ice")},
         "diverters": {"d": {"from": [10.0, 0.0], "to": [10.4, 0.0], "material": "ice", "angle": "60 deg",
-                            "max_speed": 2.0, "acceleration": AT_ONCE}},
+                            "max_speed": 2.0, "acceleration": AT_ONCE, "torque_limit": "none"}},
         "gates": {"g": {"kind": "slide", "from": [STOP, 1.0 - LANE], "to": [STOP, 1.0 + LANE], "material": "steel",
                         "direction": "90 deg", "stroke": 0.2, "max_speed": 0.8, "acceleration": 8.0}},
         "bottles": [*bottles, PARKED],

@@ -42,7 +42,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             accumulate_peaks(world.load, world.peaks, dt, first, end)
             note_moved(line, member, first, end)
         hold = lists_hold(line, member)
-        pass_step(line.moving, member, dt)
+        pass_step(line.moving, line.ledger, member, dt, False)
         if not hold:
             return step + 1
         watch_rebuilt(line, member)

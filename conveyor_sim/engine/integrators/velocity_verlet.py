@@ -44,7 +44,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
         hold = lists_hold(line, member)
-        pass_step(line.moving, member, dt)
+        pass_step(line.moving, line.ledger, member, dt, True)
         if not hold:
             return 0
         watch_rebuilt(line, member)
@@ -66,7 +66,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             for first in range(begin, stop, BLOCK):
                 _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
         hold = lists_hold(line, member)
-        pass_step(line.moving, member, dt)
+        pass_step(line.moving, line.ledger, member, dt, True)
         if not hold:
             return done
         watch_rebuilt(line, member)
