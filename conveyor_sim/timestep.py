@@ -52,6 +52,14 @@ def wedge_bound(stiffness: float, mass: float) -> float:
     return math.sqrt(mass / stiffness / 2.0)
 
 
+def mover_bound(stiffness: float, mass: float, mover: float, bottles: int) -> float:
+    """At most half of the stability limit of bottles (kg) between a rail at rest and one that is a body (kg), in s.
+
+    Two rows of the scaled stiffness, 2 k / m and n k / M, and the largest eigenvalue is not above their sum.
+    """
+    return 1.0 / math.sqrt(stiffness * (2.0 / mass + bottles / mover))
+
+
 def damping_bound(coefficient: float, reduced_mass: float) -> float:
     """Half of m_r / c, the time in which a dashpot alone stops two bottles, s; explicit steps of 2 m_r / c diverge."""
     return 0.5 * reduced_mass / coefficient

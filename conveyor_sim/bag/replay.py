@@ -85,7 +85,8 @@ def replay(path: str | Path, progress: Callable[[float, float], None] | None = N
     Bottles, Contacts, Belts, Signals, Ledgers, Damage, RailWear and CommandOutcomes are compared bit for bit where the
     engine, versions and machine are those of the recording; elsewhere within compare.TOLERANCE, those in SENSITIVE left
     out. Stops at the first difference. progress(done, total) is told simulated times, s.
-    Raises BagError, and SceneError if the recorded scene is refused.
+    Raises BagError, also for a recording from before rails that move had limits; SceneError if the recorded scene is
+    refused.
     """
     with open_bag(path) as bag, bag.sense():
         if bag.line.tick > 0:
@@ -181,9 +182,16 @@ class _Replay:
 
 def _simulation(bag: Bag) -> Simulation:
     try:
-        return Simulation(recorded_scene(bag.line, f"{bag.path} (recorded scene)"))
+        simulation = Simulation(recorded_scene(bag.line, f"{bag.path} (recorded scene)"))
     except SceneError as error:
         raise SceneError(f"{bag.path}: the recorded scene is refused by this version:\n{error}") from error
+    for shape in simulation.model.moving_shapes:
+        if f"{shape.name}/blocked" not in bag.line.signal_names:
+            raise BagError(
+                f"{bag.path}: recorded when {shape.name} pushed with unlimited force, expected a recording with the "
+                f"signal {shape.name}/blocked: by this version it would be another run"
+            )
+    return simulation
 
 
 def _environment(bag: Bag, simulation: Simulation) -> tuple[str, ...]:

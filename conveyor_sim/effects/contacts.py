@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterator
 
 from conveyor_sim.effects.declaration import Cause, Effect
+from conveyor_sim.effects.movers import mover_bounds
 from conveyor_sim.effects.terms import (
     Meeting,
     Terms,
@@ -66,16 +67,18 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
     def bounds(terms: Terms) -> list[Bound]:
         if not terms.method.explicit:
             return []
-        lattices, wedges = [], []
+        lattices, wedges, movers = [], [], []
         for meeting in meetings(terms):
             k, said = stiffness(meeting, terms)
             if k > 0.0 and meeting.second is not None:
                 lattices.append((lattice_bound(k, 2.0 * meeting.reduced_mass), f"a hexagonal packing at {said}"))
             elif k > 0.0:
                 wedges.append((wedge_bound(k, meeting.reduced_mass), f"a bottle between two rails at {said}"))
+                movers += mover_bounds(meeting, k, terms)
         return [
             *tightest(f"{name}lattice stability", lattices, stability=True),
             *tightest(f"{name}rail stability", wedges, stability=True),
+            *tightest(f"{name}mover stability", movers, stability=True),
         ]
 
     return bounds
@@ -132,7 +135,7 @@ LINEAR = Effect(
     needs="k by pair of materials",
     bounds=_stable("", _linear),
     bound="1 / sqrt(6 k / m), half of that at which a hexagonal packing is unstable; 1 / sqrt(2 k / m), half of that "
-    "at which a bottle between two rails is",
+    "at which a bottle between two rails is; 1 / sqrt(k (2 / m + n / M)) with n bottles at a moving rail of mass M",
     shares=_peak(_linear),
     share="(w dt)^2 / 8, with w = sqrt(k / m_r): a peak between two steps",
     can_force_off=False,

@@ -60,12 +60,14 @@ ARC_RAILS = Effect(
 MOVING_RAILS = Effect(
     name="moving_rails",
     law="straight rails that slide or swing, at constant accelerations one after another, in every step; damping and "
-    "friction know the velocity of the rail at the contact",
+    "friction know the velocity of the rail at the contact; where the drive's limit does not do for that, a body, "
+    "M a = F + Q, with F within the limit and Q what bottles exert",
     source="added",
     called_for=_moving,
     absent="no gate, pusher or diverter",
-    needs="the course of each rail and where it is now; a box that it sweeps; a contact for each pair of materials; "
-    "integrators semi_implicit_euler and velocity_verlet",
+    needs="the course of each rail and where it is now; a box that it sweeps; unless no drive has a limit, the sum of "
+    "what bottles exert on each rail; a contact for each pair of materials; integrators semi_implicit_euler and "
+    "velocity_verlet",
     can_force_off=False,
 )
 UNEQUAL_RADII = Effect(

@@ -11,6 +11,7 @@ from conveyor_sim.engine.compile import entry
 from conveyor_sim.engine.stored_energy import find_stored_energy
 from conveyor_sim.engine.watch import look
 from conveyor_sim.guard.memory import Memory
+from conveyor_sim.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.guard.violation import GuardEvent, Violation, Words
 from conveyor_sim.state import State
 
@@ -75,14 +76,14 @@ class Guard:
         deep = float(world.watch.depth[0]), float(world.watch.depth[1])
         self.forget()
         if bad >= 0:
-            return self._put_back().not_finite(bad)
+            return self._words_before().not_finite(bad)
         if fastest < 0:
             return None
         speed = math.sqrt(square)
         if self._something_there and speed * dt > model.settings.skin:
-            return self._put_back().far(fastest, speed, dt)
+            return self._words_before(fastest).far(fastest, speed, dt)
         if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
-            return self._put_back().energy(fastest, *energies, self._work)
+            return self._words_before(fastest).energy(fastest, *energies, self._work)
         depth = max(deep)
         if self.has_put_in and depth > DEEPEST and self._was_deep():
             return None
@@ -91,7 +92,7 @@ class Guard:
         if depth > SOFT >= self.deepest or depth > DEEPEST:
             worst = deep.index(depth)
             bottle, other = int(world.watch.bottle[worst]), int(world.watch.other[worst])
-            words = self._put_back() if depth > DEEPEST else Words(model, world)
+            words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
             found = (words.rail if worst else words.pair)(bottle, other, depth)
             if depth > DEEPEST:
                 return found
@@ -157,8 +158,18 @@ class Guard:
         self._look = entry(look, bottles, spin)
         return self._look(bottles, spin)
 
-    def _put_back(self) -> Words:
-        """Have the state as it was at the beginning of the tick, to find words for."""
+    def _squeeze(self, slot: int) -> Squeeze | None:
+        return squeeze_of(self._model, self._state.world, self._found, slot)
+
+    def _words_before(self, slot: int = -1) -> Words:
+        """Have the state as it was at the beginning of the tick, to find words for; slot: the bottle in question."""
+        after = None if slot < 0 else self._squeeze(slot)
+        self._put_back()
+        # Once an axis has passed a rail, that pushes it on.
+        before = None if slot < 0 else self._squeeze(slot)
+        return Words(self._model, self._state.world, before if before is not None and before.held else after or before)
+
+    def _put_back(self) -> None:
+        """Have the state as it was at the beginning of the tick."""
         self._memory.put_back(self._state)
         self.forget()
-        return Words(self._model, self._state.world)

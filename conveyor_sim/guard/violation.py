@@ -8,6 +8,7 @@ import numpy as np
 from conveyor_sim.elastic import elastic_energy, rail_entries
 from conveyor_sim.engine.arrays import ContactLaw, World
 from conveyor_sim.engine.integrators.dormand_prince import MOST
+from conveyor_sim.guard.squeeze import Squeeze
 from conveyor_sim.model import Model
 
 CAME_FAST = 0.5
@@ -59,8 +60,11 @@ class Violation:
 class Words:
     """Finds words for one state, that at the beginning of a tick."""
 
-    def __init__(self, model: Model, world: World) -> None:
+    def __init__(self, model: Model, world: World, squeeze: Squeeze | None = None) -> None:
+        """squeeze: what moves into the bottle in question, as found where the tick came to."""
         self._model = model
+        self._world = world
+        self._squeeze = squeeze
         self._bottles = world.bottles
 
     def put_in(self, slot: int) -> Violation:
@@ -83,7 +87,8 @@ class Words:
         """A bottle that moves too far in one step. speed: m/s."""
         what = f"bottle {self._id(slot)} moves {1e3 * speed * dt:.3g} mm in one step of {dt:g} s"
         limit = f"more than {1e3 * self._model.settings.skin:.3g} mm could pass through a contact unseen"
-        return self._tunnelling(slot, what, f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy")
+        why = f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy"
+        return self._tunnelling(slot, what, self._forced() or why)
 
     def energy(self, slot: int, before: float, after: float, explained: float) -> Violation:
         """Energy (J) that came from nowhere; slot: of the fastest bottle."""
@@ -91,7 +96,7 @@ class Words:
         what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
         what_works = "belts and rails" if self._model.moving_shapes else "belts"
         why = f"{what_works} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
-        return self._unstable(slot, what, why)
+        return self._unstable(slot, what, self._forced() or why)
 
     def pair(self, slot: int, other: int, depth: float) -> Violation:
         """Two bottles that overlap too deep; depth: over the smaller radius."""
@@ -111,7 +116,8 @@ class Words:
         model, bottles, kind = self._model, self._bottles, int(self._bottles.type[slot])
         shape = model.rail_shapes[rail]
         entry = int(rail_entries(model, np.array([kind]), np.array([rail]))[0])
-        speed = float(np.hypot(bottles.vx[slot], bottles.vy[slot]))
+        ux, uy = self._velocity_of_rail(rail, slot)
+        speed = float(np.hypot(bottles.vx[slot] - ux, bottles.vy[slot] - uy))
         what = f"bottle {self._id(slot)} sinks {depth:.2g} of its radius into rail {shape.name}"
         radius, mass = float(model.type_radius[kind]), float(model.type_mass[kind])
         why = self._too_soft(model.rail_law, entry, radius, mass, speed, depth, f"rail {shape.name}")
@@ -121,12 +127,36 @@ class Words:
         """Id, x and y (m)."""
         return self._id(slot), float(self._bottles.x[slot]), float(self._bottles.y[slot])
 
+    def _velocity_of_rail(self, rail: int, slot: int) -> tuple[float, float]:
+        """m/s, at a bottle's axis."""
+        moving, q = self._world.moving, rail - len(self._model.rails_at_rest)
+        if moving is None or q < 0:
+            return 0.0, 0.0
+        dx, dy = self._bottles.x[slot] - moving.x[q], self._bottles.y[slot] - moving.y[q]
+        return float(moving.vx[q] - moving.turn[q] * dy), float(moving.vy[q] + moving.turn[q] * dx)
+
+    def _forced(self, pressed: bool = False) -> str:
+        """That a rail without a force limit squeezes a bottle, "" if none does; pressed: by a lasting force."""
+        squeeze = self._squeeze
+        if squeeze is None or squeeze.force is not None or not (squeeze.held or pressed):
+            return ""
+        return f"{squeeze.what} with whatever force that takes; give it a {squeeze.field}"
+
     def _too_soft(
-        self, law: ContactLaw | None, entry: int, radius: float, mass: float, speed: float, depth: float, what: str
+        self,
+        law: ContactLaw | None,
+        entry: int,
+        radius: float,
+        mass: float,
+        speed: float,
+        depth: float,
+        what: str,
     ) -> str:
         entries = np.array([entry])
         most = float(elastic_energy(self._model, law, entries, np.array([radius]))[0])
         stopped = float(np.sqrt(2.0 * most / mass))
+        if forced := self._forced(speed <= CAME_FAST * stopped):
+            return forced
         if speed > CAME_FAST * stopped:
             needed = mass * (speed / (REMEDY_DEPTH * radius)) ** 2
             return (
@@ -134,10 +164,12 @@ class Words:
                 f"give it a stiffness of about {needed:.2g} N/m"
             )
         here = float(elastic_energy(self._model, law, entries, np.array([depth * radius]))[0])
-        force = 2.0 * here / (depth * radius)
+        force, cause = 2.0 * here / (depth * radius), "it is pressed"
+        if self._squeeze is not None and self._squeeze.force is not None:
+            force, cause = max(force, self._squeeze.force), self._squeeze.what
         needed = force / (REMEDY_DEPTH * radius)
         return (
-            f"it is pressed with about {force:.3g} N, too much for the contact with {what}; "
+            f"{cause} with about {force:.3g} N, too much for the contact with {what}; "
             f"give it a stiffness of about {needed:.2g} N/m"
         )
 

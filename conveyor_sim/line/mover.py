@@ -53,7 +53,7 @@ class Mover(Device):
         self.limited = False
         """Whether its drive could not keep it on its course all through the last tick."""
         self.blocked = False
-        """Whether its drive can't keep it on its course, and it is away from that."""
+        """From when its drive can't keep it near its course, until it has kept that for a tick."""
 
     def command(self, name: str, value: float, now: Now) -> None:
         """Go to the other end, jam or be free again, from where it is on."""
@@ -90,7 +90,8 @@ class Mover(Device):
         if self.limited:
             self.course, self.since = rails.course[number].copy(), now.tick - 1
         away = abs(self.position - position_at(self.course, (now.tick - self.since) * now.length))
-        self.blocked = bool(actuators.mode[number] == OFF_PROFILE) and away > SWITCHED * self._shape.stroke
+        held_up = bool(actuators.mode[number] == OFF_PROFILE) and away > SWITCHED * self._shape.stroke
+        self.blocked = held_up or (self.blocked and self.limited)
 
     def values(self, now: Now) -> Sequence[float]:
         """Position from 0, at home, to 1, both end switches, and whether it is blocked."""

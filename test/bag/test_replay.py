@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from bag.editing import edited
 from bag.small_line import SMALL_LINE, record
+from physics.test_force_limits import press
 from rosbags.rosbag2 import StoragePlugin, Writer
+from scenes import NO_OUTPUTS
 
+from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, SceneError
@@ -220,3 +224,44 @@ def test_bag_without_states_is_refused(bag: Path, tmp_path: Path) -> None:
         messages = [message for message in opened.raw() if message[0] == "line"]
     with pytest.raises(BagError, match="nothing can be compared"):
         replay(stock(bag, tmp_path / "stock", iter(messages)))
+
+
+def held_up(folder: Path) -> Path:
+    """A recording of a pusher that presses a bottle against a wall, is jammed, and comes home again."""
+    sim = press(damping=5.0, outputs={**NO_OUTPUTS, "signals": 100, "ledger": 100})
+    inputs = {2: "push", 30: "jammed", 45: "jammed", 70: "push"}
+    with Recorder(folder) as recorder:
+        outputs = Outputs(sim, [recorder], run_id="run", frame_id="hall")
+        outputs.start()
+        while sim.tick < 90:
+            name = inputs.get(sim.tick)
+            if name == "push":
+                sim.command(["pushers/p/push"], [float(sim.tick < 50)])
+            elif name is not None:
+                sim.inject("pushers/p/jammed", float(sim.tick < 40))
+            sim.advance()
+            outputs.after_tick()
+    return folder
+
+
+def test_a_pusher_that_is_held_up_replays_bit_for_bit(tmp_path: Path) -> None:
+    """Its place, its signals and its work."""
+    bag = held_up(tmp_path / "pusher")
+    with open_bag(bag) as opened:
+        column = opened.line.signal_names.index("pushers/p/blocked")
+        assert {float(frame.data[column]) for frame in opened.signals()} == {0.0, 1.0}
+    report = replay(bag)
+    assert (report.difference, report.exact) == (None, True)
+    assert report.compared["signals"] == report.compared["ledger"] == 91
+
+    def before(name: str, message: Any) -> None:
+        if name == "line":
+            at = message.signal_names.index("pushers/p/blocked")
+            for column in (message.signal_names, message.signal_units, message.signal_types):
+                del column[at]
+
+    expected = (
+        r"recorded when pushers/p pushed with unlimited force, expected a recording with the signal pushers/p/blocked"
+    )
+    with pytest.raises(BagError, match=expected):
+        replay(edited(bag, tmp_path / "before", before))

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, scene, segment
 
@@ -16,6 +17,7 @@ from conveyor_sim.timestep import (
     damping_bound,
     hertz_contact_time,
     lattice_bound,
+    mover_bound,
     slip_time,
     wedge_bound,
 )
@@ -47,6 +49,23 @@ def test_hertz() -> None:
         "Hertz lattice stability": pytest.approx(lattice_bound(1.5 * k * math.sqrt(deepest), MASS)),
         "Hertz rail stability": pytest.approx(wedge_bound(1.5 * k * math.sqrt(deepest * 2.0**0.4), MASS)),
     }
+
+
+def test_a_light_mover_is_a_body_when_it_is_held_up() -> None:
+    """As many bottles as find room on both sides of it, each against a wall; without a limit it is none."""
+    k, light, length = 1e5, 0.05, 0.4
+    gate = {"kind": "slide", "from": [0.0, 3.0], "to": [length, 3.0], "direction": 0.0, "stroke": 0.1, "max_speed": 0.1,
+            "acceleration": 1.0, "material": "steel", "moving_mass": light}  # fmt: skip
+    found = bounds(contact(1e3), contact(k, "steel"), gates={"g": gate}, rails=RAIL)
+    most = 2 * (1 + int(length / (2 * RADIUS)))
+    assert found["mover stability"] == pytest.approx(mover_bound(k, MASS, light, most))
+    stiffness = np.diag([*[2.0 * k / MASS] * most, most * k / light])
+    stiffness[:-1, -1] = stiffness[-1, :-1] = -k / math.sqrt(MASS * light)
+    limit = 2.0 / math.sqrt(np.linalg.eigvalsh(stiffness).max())
+    assert 0.4 * limit < found["mover stability"] <= 0.5 * limit
+    assert "mover stability" not in bounds(
+        contact(1e3), contact(k, "steel"), gates={"g": {**gate, "force_limit": "none"}}
+    )
 
 
 def test_hertz_in_a_queue() -> None:

@@ -165,16 +165,25 @@ class DeviceWatch:
                 raise Violation("eye", f"{name}: an edge at {rose} or {fell} s, at {self._sim.time} s")
 
     def _movers(self) -> None:
-        """No rail is off its course, or faster than it can."""
-        for shape in self._shapes:
+        """No rail is off its course, or faster than it can, unless its drive is held up; none leaves its end stops."""
+        for n, shape in enumerate(self._shapes):
             before, now = self._place(shape, self._before), self._place(shape, self._now)
-            position = self._now[f"{shape.name}/position"]
+            position, held_up = self._now[f"{shape.name}/position"], self._held_up(n)
             if not 0.0 <= position <= 1.0:
                 raise Violation("off its course", f"{shape.name} at {position} of its stroke")
             most = shape.max_speed * self._scene.tick * (1.0 + 1e-9) + 1e-12 * shape.stroke
-            if abs(now - before) > most:
+            if abs(now - before) > most and not held_up:
                 raise Violation("off its course", f"{shape.name} went {now - before} in a tick, {most} at most")
-            self._still[shape.name] = self._still[shape.name] + 1 if now == before else 0
+            if self._now[f"{shape.name}/blocked"] and not held_up:
+                raise Violation("blocked by nothing", f"{shape.name} at tick {self._sim.tick}")
+            if held_up and shape.limit is None:
+                raise Violation("off its course", f"{shape.name} is held up, and has no limit")
+            self._still[shape.name] = self._still[shape.name] + 1 if now == before and not held_up else 0
+
+    def _held_up(self, n: int) -> bool:
+        """Whether the drive of a moving rail was at its limit in the last tick."""
+        moving = self._sim._state.world.moving
+        return moving is not None and moving.actuators is not None and bool(moving.actuators.left[n])
 
     def _ledger(self) -> None:
         """A rail that stands does no work."""

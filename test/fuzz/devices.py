@@ -63,8 +63,19 @@ def movers(draw: st.DrawFn, frame: Frame, material: str) -> Data:
             rail |= {"direction": draw(between(-math.pi, math.pi)), "stroke": frame.unit * draw(between(0.3, 5.0))}
             rail["max_speed"] = speed
         rail["acceleration"] = rail["max_speed"] / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
+        rail |= draw(_drives(frame, swings, length, rail["acceleration"]))
         found[field][f"mover_{n}"] = rail
     return found
+
+
+@st.composite
+def _drives(draw: st.DrawFn, frame: Frame, swings: bool, length: float, acceleration: float) -> Data:
+    """Limit and mass of a rail that can follow its profile without bottles: with little to spare, much, or no limit."""
+    mass = max(kind["mass"] for kind in frame.types.values()) * draw(scaled(0.3, 30.0))
+    names = ("torque_limit", "inertia") if swings else ("force_limit", "moving_mass")
+    mass *= length**2 / 3.0 if swings else 1.0
+    spare = draw(st.sampled_from([1.01, 3.0, 100.0, 0.0]))
+    return {names[0]: mass * acceleration * spare if spare else "none", names[1]: mass}
 
 
 @st.composite

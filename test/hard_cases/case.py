@@ -52,7 +52,7 @@ class Case:
     settled: float = 0.0
     """From when on drift, travel and means are taken; of the short run where there is one."""
     commands: Sequence[Mapping[str, float]] = ()
-    """`at`, and belts with their speeds (m/s)."""
+    """`at`, and belts with their speeds (m/s), or whole names of commands with their values."""
     ramp: Mapping[str, Any] = field(default_factory=dict)
     """`belt`, `from`, `to` (m/s) and `acceleration` (m/s^2): a command every tick."""
     put: Sequence[Mapping[str, Any]] = ()

@@ -126,8 +126,9 @@ def _act(case: Case, simulation: Simulation, tick: int) -> None:
     scene = simulation.scene
     for command in case.commands:
         if round(command["at"] / scene.tick) == tick:
-            belts = {name: value for name, value in command.items() if name != "at"}
-            simulation.command([f"belts/{name}/cmd_speed" for name in belts], list(belts.values()))
+            given = {name: value for name, value in command.items() if name != "at"}
+            names = [name if "/" in name else f"belts/{name}/cmd_speed" for name in given]
+            simulation.command(names, list(given.values()))
     if case.ramp:
         way = case.ramp["to"] - case.ramp["from"]
         gone = min(abs(way), _rise(case, scene) * (tick + 1))

@@ -24,14 +24,15 @@ def alone(*bottles: dict[str, Any], **more: Any) -> Simulation:
 def seen(sim: Simulation, name: str) -> tuple[float, ...]:
     """Position and both end switches."""
     signals = dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
-    return tuple(value for signal, value in signals.items() if signal.startswith(f"{name}/"))
+    position, home, away, _ = (value for signal, value in signals.items() if signal.startswith(f"{name}/"))
+    return position, home, away
 
 
 def test_the_process_image_has_them() -> None:
     image = alone().process_image
     assert tuple(name for name in image.signal_names if not name.startswith("belts/")) == (
-        "gates/g/position", "gates/g/is_closed", "gates/g/is_open",
-        "pushers/p/position", "pushers/p/retracted", "pushers/p/extended",
+        "gates/g/position", "gates/g/is_closed", "gates/g/is_open", "gates/g/blocked",
+        "pushers/p/position", "pushers/p/retracted", "pushers/p/extended", "pushers/p/blocked",
     )  # fmt: skip
     assert image.commands[1:] == (switch("gates/g/open"), switch("pushers/p/push"))
     assert image.faults == (switch("gates/g/jammed"), switch("pushers/p/jammed"))
