@@ -184,26 +184,28 @@ def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float
 
 
 @kernel
-def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float) -> Any:
+def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, way: float) -> Any:
     """Elongation (m), or None, of a spring at an overlap (m) that is by so much deeper (m) than where it was kept.
 
     A spring that has become stiffer keeps its force, for what joins a contact joins it without load; one that has
     become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by itself.
+    way: m, by which it is to be drawn out from there; one that has become stiffer meets that with its mean stiffness.
     """
     if spring is None:
         return None
-    return spring * _carried_share(law.tangential_mindlin, e, 0.0 if overlap < 0.0 else overlap, deeper)
+    return spring - _loss(law.tangential_mindlin, e, spring + 0.5 * way, 0.0 if overlap < 0.0 else overlap, deeper)
 
 
 @part
-def _carried_share(mindlin: Any, e: int, depth: float, deeper: float) -> float:
+def _loss(mindlin: Any, e: int, middle: float, depth: float, deeper: float) -> float:
+    """Elongation (m) that a spring loses as it stiffens; middle: m, its elongation on the way."""
     if mindlin is None:
-        return 1.0
+        return 0.0
     before = depth - deeper
     before = 0.0 if before < 0.0 else before
     before = depth if before > depth else before
-    share = math.sqrt(before / (depth if depth > 0.0 else 1.0))
-    return share if mindlin[e] > 0.0 else 1.0
+    share = 1.0 - math.sqrt(before / (depth if depth > 0.0 else 1.0))
+    return (share if mindlin[e] > 0.0 else 0.0) * middle
 
 
 @part

@@ -160,7 +160,7 @@ def _law(
         overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
         closing = -(dvx * nx + dvy * ny)
         slip = dvx * ny - dvy * nx + _rim_slip(settings, spin, reach, gathered, c, half * overlap)
-        spring = carried(pairs.law, p, elongation(springs, p), overlap, closing * spring_dt)
+        spring = carried(pairs.law, p, elongation(springs, p), overlap, closing * spring_dt, slip * spring_dt)
         normal, tangential = contact_force(
             pairs.law,
             p,

@@ -90,7 +90,7 @@ def rail_contact(
     if spin is not None:
         slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
     entry = law_entry(settings, bottles, found, c, i)
-    kept = carried(law, entry, spring, found.overlap[c], closing * spring_dt)
+    kept = carried(law, entry, spring, found.overlap[c], closing * spring_dt, slip * spring_dt)
     normal, tangential = contact_force(
         law,
         entry,

@@ -175,15 +175,20 @@ def test_a_spring_that_stiffens_keeps_its_force_and_one_that_softens_its_elongat
     """So it never gains energy by itself, and is slack where a contact begins."""
     given, xi = law(**MINDLIN), 1e-5
     depth, before, after = 0.0020, 0.0019, 0.0021
-    stiffer = carried(given, 1, xi, depth, depth - before)
+    stiffer = carried(given, 1, xi, depth, depth - before, 0.0)
     assert stiffer * math.sqrt(depth) == pytest.approx(xi * math.sqrt(before))
+    # The force goes on by the mean stiffness times the way.
+    way = 3e-6
+    force_after = (carried(given, 1, xi, depth, depth - before, way) + way) * math.sqrt(depth)
+    mean = 0.5 * (math.sqrt(before) + math.sqrt(depth))
+    assert force_after == pytest.approx(xi * math.sqrt(before) + way * mean)
     # k_t xi^2, with the force k_t xi as before.
     assert math.sqrt(depth) * stiffer**2 < math.sqrt(before) * xi**2
-    assert carried(given, 1, xi, depth, depth - after) == xi
-    assert carried(given, 1, xi, depth, 2.0 * depth) == 0.0
-    assert carried(given, 1, xi, depth, 0.0) == xi
+    assert carried(given, 1, xi, depth, depth - after, 1e-5) == xi
+    assert carried(given, 1, xi, depth, 2.0 * depth, 0.0) == 0.0
+    assert carried(given, 1, xi, depth, 0.0, 1e-5) == xi
     other = law(**{**MINDLIN, "tangential_stiffness": 4000.0, "tangential_mindlin": 0.0})
-    assert carried(other, 1, xi, depth, 1e-4) == xi
+    assert carried(other, 1, xi, depth, 1e-4, 1e-5) == xi
 
 
 EVERYTHING = {

@@ -74,7 +74,8 @@ def by_force(inertia: float) -> np.ndarray:
         stiffness, normal = KAPPA * 1.875 * math.sqrt(depth), 1.25 * depth**1.5
         if stiffness < before:
             force *= stiffness / before
-        force = np.clip(force + stiffness * slip * dt, -MU * normal, MU * normal)
+        mean = 0.5 * (min(before, stiffness) + stiffness)
+        force = np.clip(force + mean * slip * dt, -MU * normal, MU * normal)
         before = stiffness
         speed -= dt * normal
         slip = slip - dt * (1.0 + 1.0 / inertia) * force
