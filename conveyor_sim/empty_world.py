@@ -23,6 +23,7 @@ from conveyor_sim.engine.arrays import (
     Ring,
     Slots,
     Spin,
+    StaticFriction,
     Surface,
     Watch,
     World,
@@ -128,6 +129,7 @@ def empty_world(model: Model, slots: int) -> World:
         surface=_surface(model),
         footing=_footing(model, slots),
         ring=Ring(reals()) if model.has("ring_base") else None,
+        static_friction=_static_friction(model, slots),
         ledger=_ledger(slots, model) if model.has("energy_ledger") else None,
         damage=empty_damage(model, slots),
     )
@@ -162,6 +164,20 @@ def _footing(model: Model, slots: int) -> Footing | None:
         uy=np.zeros(slots),
         turn=np.zeros(slots) if model.has("curved_belts") else None,
         pull=np.zeros(slots),
+    )
+
+
+def _static_friction(model: Model, slots: int) -> StaticFriction | None:
+    if model.base_spring is None:
+        return None
+    return StaticFriction(
+        x=np.zeros(slots),
+        y=np.zeros(slots),
+        belt=np.full(slots, -1, dtype=np.int32),
+        stiffness=model.base_spring.stiffness.ravel(),
+        damping=model.base_spring.damping.ravel(),
+        friction=model.base_spring.friction.ravel(),
+        types=len(model.bottle_types),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
-from conveyor_sim.engine.stored_energy import SPRINGS, find_stored_energy
+from conveyor_sim.engine.stored_energy import BASE_SPRINGS, SPRINGS, find_stored_energy
 from conveyor_sim.engine.team import members
 from conveyor_sim.observe.ledger import Ledger, balance
 from conveyor_sim.state import State
@@ -20,7 +20,7 @@ class EnergyAccount:
         """Open the books with the energy of the bottles that are there; the neighbour lists must hold."""
         self._state = state
         self._found = members(1)[0].found
-        self.fed = self.removed = self.springs = 0.0
+        self.fed = self.removed = self.springs = self.base_springs = 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -30,6 +30,8 @@ class EnergyAccount:
         self.fed, self.removed = float(stored.sum()), 0.0
         self.springs = float(stored[SPRINGS])
         """J, in tangential springs that came less those that went with bottles: not dissipated."""
+        self.base_springs = float(stored[BASE_SPRINGS])
+        """J, likewise in springs under the bottles."""
 
     @contextmanager
     def feeding(self) -> Iterator[None]:
@@ -53,27 +55,29 @@ class EnergyAccount:
         surfaces = len(self._state.model.belts) + 1
         # Springs hold a part of what friction took: it is dissipated when they are let go.
         held = float(stored[SPRINGS]) - self.springs
+        held_by_base = float(stored[BASE_SPRINGS]) - self.base_springs
         return balance(
             stored,
             self.fed,
             self.removed,
             work[BELTS : BELTS + surfaces],
             work[BELTS + surfaces :],
-            float(work[BASE_FRICTION]),
+            float(work[BASE_FRICTION]) - held_by_base,
             float(work[CONTACT_FRICTION]) - held,
             float(work[DAMPING]),
         )
 
     def _gained(self, before: F8) -> F8:
         if not self._state.world.neighbourhood.stale[0]:
-            return np.zeros(3)
+            return np.zeros(4)
         self._state.make_lists()
         gained = self._stored() - before
         self.springs += float(gained[SPRINGS])
+        self.base_springs += float(gained[BASE_SPRINGS])
         return gained
 
     def _stored(self) -> F8:
-        energy = np.zeros(3)
+        energy = np.zeros(4)
         find_stored_energy(self._state.world, self._found, energy)
         return energy
 

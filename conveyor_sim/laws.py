@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,16 @@ from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.schema import Floor, Scene
 
 NO_CURVE = -1
+
+
+class BaseSprings(NamedTuple):
+    """Springs between belts and bases, (H + 1, T) each, the floor last; all 0 where friction goes by its curve."""
+
+    stiffness: F8
+    """N/m"""
+    damping: F8
+    """kg/s"""
+    friction: F8
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +35,17 @@ class Laws:
     curves: Curves | None
     """The tables of contacts; None without."""
     base_friction: F8 | None
-    """(H + 1, T), the floor last; None without friction under the bottles."""
+    """(H + 1, T), the floor last, 0 where a spring holds; None without friction by its curve under the bottles."""
+    base_spring: BaseSprings | None
+    """None without springs under the bottles."""
     base_radius: F8 | None
     """(T,), m, of the ring that a type stands on, 0 for a point; None if all stand on points."""
+
+    @property
+    def largest_base_friction(self) -> float:
+        """The largest coefficient of friction under any bottle, by curve or spring; 0 if there is none."""
+        tables = (self.base_friction, None if self.base_spring is None else self.base_spring.friction)
+        return max((float(table.max()) for table in tables if table is not None), default=0.0)
 
 
 def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str]) -> Laws:
@@ -35,12 +54,14 @@ def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str])
     masses = np.array([kind.mass for kind in scene.bottle_types.values()])
     reduced = masses[:, None] * masses / (masses[:, None] + masses)
     against_rails = np.repeat(masses[:, None], len(rail_materials), axis=1)
+    springs = base_springs(scene) if "static_friction" in on else None
     rails = any(effect in on for effect in ("segment_rails", "arc_rails", "moving_rails"))
     return Laws(
         pair=_columns(scene, materials, materials, reduced, on) if "bottle_contact" in on else None,
         rail=_columns(scene, materials, rail_materials, against_rails, on) if rails else None,
         curves=_curves(scene) if "table" in on else None,
-        base_friction=base_friction(scene) if "base_friction" in on else None,
+        base_friction=_by_curve(base_friction(scene), springs) if "base_friction" in on else None,
+        base_spring=springs,
         base_radius=base_radius(scene) if "ring_base" in on else None,
     )
 
@@ -58,6 +79,32 @@ def base_friction(scene: Scene) -> F8:
         elif scene.belts:
             table[-1] = table[0]
     return table
+
+
+def base_springs(scene: Scene) -> BaseSprings | None:
+    """The springs under the bottles; None if no belt or floor of the scene has one."""
+    given = {base.between: base.tangential for base in scene.base}
+    types = list(scene.bottle_types.values())
+    friction = base_friction(scene)
+    stiffness, damping = np.zeros((2, *friction.shape))
+    for row, belt in enumerate(scene.belts.values()):
+        for column, kind in enumerate(types):
+            spring = given[kind.material, belt.material]
+            if spring is not None:
+                stiffness[row, column], damping[row, column] = spring.stiffness, spring.damping
+    if isinstance(scene.floor, Floor) and scene.floor.friction is None:
+        stiffness[-1], damping[-1] = stiffness[0], damping[0]
+    if not stiffness.any():
+        return None
+    return BaseSprings(stiffness, damping, np.where(stiffness > 0.0, friction, 0.0))
+
+
+def _by_curve(friction: F8, springs: BaseSprings | None) -> F8 | None:
+    """Friction where no spring holds; None if springs hold all that there is."""
+    if springs is None:
+        return friction
+    rest = np.where(springs.stiffness > 0.0, 0.0, friction)
+    return rest if rest.any() else None
 
 
 def base_radius(scene: Scene) -> F8:

@@ -12,7 +12,7 @@ from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects,
 from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import SceneError
-from conveyor_sim.laws import build_laws
+from conveyor_sim.laws import BaseSprings, Laws, build_laws
 from conveyor_sim.mouths import cut_at_mouths
 from conveyor_sim.plant import plant_grid, rail_arrays
 from conveyor_sim.prediction import Impact, Prediction
@@ -83,7 +83,11 @@ class Model:
     arcs: Arcs | None
     grid: StaticGrid | None
     base_friction: F8 | None
-    """(H + 1, T), the floor last; None without friction under the bottles."""
+    """(H + 1, T), the floor last, 0 where a spring holds; None without friction under the bottles."""
+    base_spring: BaseSprings | None
+    """None without springs under the bottles."""
+    largest_base_friction: float
+    """Of any bottle on any belt or floor, by curve or spring; 0 without."""
     gravity: float
     engine_hash: str
     versions: tuple[str, ...]
@@ -164,7 +168,9 @@ def build_model(scene: Scene) -> Model:
         segments=segments if "segment_rails" in on else None,
         arcs=arcs if "arc_rails" in on else None,
         grid=plant_grid(rails, belts if "belts" in on else [], float(radius.max()), _largest(laws.base_radius), skin),
-        base_friction=laws.base_friction,
+        base_friction=_friction_table(laws),
+        base_spring=laws.base_spring,
+        largest_base_friction=laws.largest_base_friction,
         gravity=scene.gravity,
         engine_hash=ENGINE_HASH,
         versions=versions_here(),
@@ -188,6 +194,13 @@ def _given_steps(scene: Scene) -> int | None:
 def _given_words(scene: Scene) -> str:
     accuracy = scene.accuracy
     return f"{accuracy.per_tick} steps a tick" if accuracy.dt is None else f"at most {accuracy.dt * 1e6:g} us"
+
+
+def _friction_table(laws: Laws) -> F8 | None:
+    """Friction by its curve, a table of 0 if springs hold all that there is."""
+    if laws.base_friction is None and laws.base_spring is not None:
+        return np.zeros_like(laws.base_spring.friction)
+    return laws.base_friction
 
 
 def _heights(kind: BottleType) -> tuple[float, float]:

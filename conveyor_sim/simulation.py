@@ -219,7 +219,7 @@ class Simulation:
     def take_state_of(self, other: "Simulation") -> None:
         """Take over the bottles, the time and the belts' speeds of another Simulation of the same line.
 
-        The scenes may differ in their effects and steps. Tangential springs start anew.
+        The scenes may differ in their effects and steps. Tangential springs of contacts start anew.
         """
         self.tick = other.tick
         self._line.take_over(other._line)

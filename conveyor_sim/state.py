@@ -47,6 +47,8 @@ class State:
         bottles.id[slot] = self.next_id
         if self.world.spin is not None:
             self.world.spin.theta[slot], self.world.spin.omega[slot] = theta, omega
+        if self.world.static_friction is not None:
+            self.world.static_friction.belt[slot] = -1
         self._equip(slice(slot, slot + 1))
         self._note_velocities(slice(slot, slot + 1))
         self.world.neighbourhood.stale[0] = 1
@@ -63,6 +65,8 @@ class State:
         for column in slot_columns(world.damage) if world.damage is not None else ():
             column[slot] = 0
         world.bottles.id[slot] = -1
+        if world.static_friction is not None:
+            world.static_friction.belt[slot] = -1
         heapq.heappush(self._free, slot)
         if world.pairs is not None and world.pairs.spring is not None:
             drop_springs(world.pairs, world.pairs.spring, slot)
@@ -72,8 +76,9 @@ class State:
         world.neighbourhood.stale[0] = 1
 
     def take(self, other: "State") -> None:
-        """Take over the bottles of a State of the same bottle types, each in its slot; tangential springs
-        start anew.
+        """Take over the bottles of a State of the same line and bottle types, each in its slot.
+
+        What their bases are tied to comes along; tangential springs of contacts start anew.
         """
         slots = other.world.bottles.id.size
         self.world, self.next_id = empty_world(self.model, slots), other.next_id
@@ -84,6 +89,8 @@ class State:
             spin.theta[:], spin.omega[:] = before.theta, before.omega
         self._free = np.flatnonzero(bottles.id < 0).tolist()
         self._equip(np.flatnonzero(bottles.id >= 0))
+        if (static := self.world.static_friction) is not None and (kept := other.world.static_friction) is not None:
+            static.x[:], static.y[:], static.belt[:] = kept.x, kept.y, kept.belt
         if self.world.moving is not None and other.world.moving is not None:
             # Scenes that differ in force limits share what is there without them.
             for now, then in zip(present(self.world.moving), present(other.world.moving), strict=False):
@@ -134,6 +141,10 @@ class State:
                 held = np.flatnonzero(near.springs.elongation[: near.start[-1]])
                 bottle = np.searchsorted(near.start, held, side="right") - 1
                 parts += [bottle, near.piece[held], near.springs.elongation[held]]
+        if (static := world.static_friction) is not None:
+            entry = np.maximum(static.belt, 0) * static.types + world.bottles.type
+            held = np.flatnonzero((static.belt >= 0) & (static.stiffness[entry] > 0.0))
+            parts += [held, static.belt[held], static.x[held], static.y[held]]
         return b"".join(part.tobytes() for part in parts)
 
     def moving_rails(self) -> tuple[RailShape, ...]:
@@ -175,6 +186,9 @@ class State:
                     getattr(new.surface, name)[:] = before
         if old.ledger is not None and new.ledger is not None:
             new.ledger.work[: len(old.ledger.work)] = old.ledger.work
+        if old.static_friction is not None and new.static_friction is not None:
+            for name in ("x", "y", "belt"):
+                getattr(new.static_friction, name)[:used] = getattr(old.static_friction, name)
         if old.damage is not None and new.damage is not None:
             for columns in (slot_columns, bin_columns):
                 for before, after in zip(columns(old.damage), columns(new.damage), strict=True):

@@ -19,6 +19,7 @@ FIXED = (
     *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
     *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
     "surface.friction",
+    *(f"static_friction.{name}" for name in ("stiffness", "damping", "friction")),
 )
 """Beginnings of the names of arrays in changing groups that nothing changes."""
 
@@ -108,6 +109,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "footing.carrier": (0, belts),
         "moving.actuators.mode": (ON_PROFILE, HELD),
         "moving.actuators.left": (0, 1),
+        "static_friction.belt": (-1, belts),
     }
     if world.belts is not None:
         given["belts.start"] = (0, world.belts.candidate.size)

@@ -16,6 +16,7 @@ from conveyor_sim.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS
 from conveyor_sim.effects.impacts import impact_bounds, impacts
 from conveyor_sim.effects.observers import CONTACT_ARRAYS, ENERGY_LEDGER, PEAKS
 from conveyor_sim.effects.rotation import ROTATION
+from conveyor_sim.effects.static_friction import STATIC_FRICTION
 from conveyor_sim.effects.supply import INFEED, OUTFEED
 from conveyor_sim.effects.terms import Terms, most_bottles, queue_force, queue_length
 from conveyor_sim.errors import SceneError
@@ -56,6 +57,7 @@ EFFECTS: tuple[Effect, ...] = (
     ATAN_FRICTION,
     IMPLICIT_FRICTION,
     TANGENTIAL_SPRING,
+    STATIC_FRICTION,
     RING_BASE,
     BELTS,
     CURVED_BELTS,

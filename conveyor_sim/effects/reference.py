@@ -51,7 +51,7 @@ effects: {contact_arrays: off, peaks: off}                          # nobody rea
   accumulation tables, in funnels that may clog ([below](#tangential-springs)). The friction curve, without memory, lets
   them creep.
 - `base_radius`: a bottle that straddles two belts turns, and its base brakes its spin. A type without it stands on a
-  point, the paper's base.
+  point, the paper's base; [base.md](base.md) tells what that changes, and when to give `tangential` in `base`.
 - `effects`: what the scene calls for and nobody needs is off; here, the outputs of contacts and of peaks.
 
 ## Tangential springs

@@ -121,11 +121,11 @@ def queue_length(scene: Scene) -> int:
 
 def queue_force(terms: Terms) -> float:
     """Force with which a single-file queue of all bottles presses, N; 0 without friction under them."""
-    if terms.laws.base_friction is None:
+    if (friction := terms.laws.largest_base_friction) == 0.0:
         return 0.0
     # Which types queue behind which is not known: the heaviest may press on the lightest.
     heaviest = max(kind.mass for kind in terms.types)
-    return queue_length(terms.scene) * float(terms.laws.base_friction.max()) * heaviest * terms.scene.gravity
+    return queue_length(terms.scene) * friction * heaviest * terms.scene.gravity
 
 
 def impact_speed(scene: Scene) -> float:

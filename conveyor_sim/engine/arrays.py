@@ -342,6 +342,24 @@ class Ring(NamedTuple):
     """R_b, m."""
 
 
+class StaticFriction(NamedTuple):
+    """Springs between bases and belts (`static_friction.py`)."""
+
+    x: F8
+    """(S,), m, the point of the belt's surface that a base is tied to."""
+    y: F8
+    belt: I4
+    """(S,), the belt of that point, or H, the floor; -1: none."""
+    stiffness: F8
+    """(H + 1) T, N/m, by belt and bottle type; 0 where friction goes by its curve, as damping and friction are then."""
+    damping: F8
+    """kg/s, likewise."""
+    friction: F8
+    """Likewise."""
+    types: int
+    """T."""
+
+
 class Ledger(NamedTuple):
     """Where the work of forces goes (`ledger.py`); absent when nobody asks."""
 
@@ -457,6 +475,7 @@ class World(NamedTuple):
     surface: Surface | None
     footing: Footing | None
     ring: Ring | None
+    static_friction: StaticFriction | None
     ledger: Ledger | None
     damage: Damage | None
 

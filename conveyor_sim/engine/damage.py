@@ -21,6 +21,7 @@ from .moving import moves, surface_velocity
 from .pairs import normal_and_overlap
 from .rails import find_rail_contacts, rail_contact, rail_elongation
 from .slots import WIDTH
+from .static_friction import add_static_friction
 from .team import BLOCK, UNIT, share, wait_for_all
 
 
@@ -298,12 +299,13 @@ def _find_base(world: World, bottles: Bottles, spin: Any, tipping: Any, dt: floa
         return
     for i in range(first, end):
         tipping.fx[i] = tipping.fy[i] = tipping.moment[i] = 0.0
+    load = Load(tipping.fx, tipping.fy, None, None)
     check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     add_base_friction(
         world.settings,
         bottles,
         _apart(spin, tipping.moment),
-        Load(tipping.fx, tipping.fy, None, None),
+        load,
         world.belts,
         world.surface,
         world.footing,
@@ -314,6 +316,7 @@ def _find_base(world: World, bottles: Bottles, spin: Any, tipping: Any, dt: floa
         first,
         end,
     )
+    add_static_friction(bottles, load, world.footing, world.static_friction, False, first, end)
 
 
 @part

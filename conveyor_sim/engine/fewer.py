@@ -39,6 +39,7 @@ def _for_forces(world: World) -> World:
         surface=world.surface,
         footing=world.footing,
         ring=world.ring,
+        static_friction=world.static_friction,
         ledger=world.ledger,
         damage=None,
     )
@@ -74,6 +75,7 @@ def lists_of(world: World) -> Any:
         surface=world.surface,
         footing=world.footing,
         ring=world.ring,
+        static_friction=None,
         ledger=None,
         damage=None,
     )

@@ -14,6 +14,7 @@ from .ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_
 from .pairs import find_touching, pack, pair_forces
 from .rails import add_rail_forces, count_rail_contacts
 from .slots import sum_pair_forces, sum_slots
+from .static_friction import add_static_friction
 from .team import BLOCK, share, wait_for_all
 
 
@@ -91,6 +92,7 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, fir
         first,
         end,
     )
+    add_static_friction(world.bottles, world.load, world.footing, world.static_friction, True, first, end)
     find_base_parts(
         world.bottles, world.spin, world.load, world.belts, world.footing, world.ring, world.ledger, first, end
     )

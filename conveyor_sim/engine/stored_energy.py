@@ -1,4 +1,4 @@
-"""The energy that a state holds: kinetic, in contacts, in tangential springs."""
+"""The energy that a state holds: kinetic, in contacts, in tangential springs, in springs under the bottles."""
 
 from typing import Any
 
@@ -7,13 +7,14 @@ from .compile import kernel, part
 from .contact import elastic_energy, spring_energy
 from .pairs import elongation, normal_and_overlap
 from .rails import find_rail_contacts, law_entry, rail_elongation
+from .static_friction import anchor_energy
 
-KINETIC, ELASTIC, SPRINGS = 0, 1, 2
+KINETIC, ELASTIC, SPRINGS, BASE_SPRINGS = 0, 1, 2, 3
 
 
 @kernel
 def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
-    """Write the energy (J) of all bottles to energy, (3,). found: scratch. The neighbour lists must hold.
+    """Write the energy (J) of all bottles to energy, (4,). found: scratch. The neighbour lists must hold.
 
     Pieces of a rail's surface that push together hold their share of a contact's: with a linear law that is exactly
     what they give back.
@@ -22,6 +23,7 @@ def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
     _kinetic(world.bottles, world.spin, energy)
     _in_pairs(world.bottles, world.pairs, world.curves, energy)
     _at_rails(world, world.rail_law, found, energy)
+    anchor_energy(world.bottles, world.static_friction, energy, BASE_SPRINGS)
 
 
 @part

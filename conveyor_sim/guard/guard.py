@@ -43,7 +43,7 @@ class Guard:
         self._memory = Memory()
         self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
-        self._friction = 0.0 if self._model.base_friction is None else tick * float(self._model.base_friction.max())
+        self._friction = tick * self._model.largest_base_friction
         # Bottles that move within the slip limit have no energy worth the name.
         self._noise = 0.5 * slip**2 / self._model.gravity if self._model.gravity > 0.0 else 0.0
         self._something_there = self._model.pair_law is not None or self._model.rail_law is not None
@@ -149,7 +149,7 @@ class Guard:
         return deep > DEEPEST
 
     def _energy(self) -> float:
-        energy = np.zeros(3)
+        energy = np.zeros(4)
         find_stored_energy(self._state.world, self._found, energy)
         return float(energy.sum())
 

@@ -73,6 +73,8 @@ def _moving(world: World) -> Iterator[NDArray[np.generic]]:
     for near in (world.near_segments, world.near_arcs):
         if near is not None and near.springs is not None:
             yield from (near.start, near.piece, near.springs.elongation, near.springs.kept_count)
+    if (static := world.static_friction) is not None:
+        yield from (static.x, static.y, static.belt)
     if world.moving is not None:
         yield from present(world.moving)
     if world.ledger is not None:

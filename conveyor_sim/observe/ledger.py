@@ -21,7 +21,7 @@ class Ledger:
     elastic: float
     """In the overlaps of contacts now."""
     springs: float
-    """In tangential springs now."""
+    """In tangential springs now, those under the bottles included."""
     fed: float
     """That bottles brought: those that were there at the start, and those that entered."""
     removed: float
@@ -52,14 +52,17 @@ def balance(
     contact_friction: float,
     damping: float,
 ) -> Ledger:
-    """The ledger of what is stored, (3,): kinetic, elastic, springs; and of what came and went. All in J."""
+    """The ledger of what is stored and of what came and went, in J.
+
+    stored: (4,), kinetic, elastic, in tangential springs of contacts, in springs under the bottles.
+    """
     came = fed + float(belt_work.sum()) + float(rail_work.sum())
     went = removed + base_friction + contact_friction + damping
     dissipated = abs(base_friction) + abs(contact_friction) + abs(damping)
     return Ledger(
         kinetic=float(stored[0]),
         elastic=float(stored[1]),
-        springs=float(stored[2]),
+        springs=float(stored[2] + stored[3]),
         fed=fed,
         removed=removed,
         belt_work=belt_work,

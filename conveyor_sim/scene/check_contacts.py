@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from conveyor_sim.scene.contacts import ELASTIC, Contact, Tangential
+from conveyor_sim.scene.contacts import ELASTIC, Base, Contact, Tangential
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import MOST
@@ -14,6 +14,9 @@ _RESTITUTION = {
     "onset": ELASTIC,
 }
 """Laws of damping, and the elastic laws beside which they have a restitution."""
+
+BASE_SPRINGS = ("semi_implicit_euler", "velocity_verlet")
+"""Integrators with springs under the bottles: one evaluation a step, at places that bottles really come to."""
 
 
 def contact_problems(scene: Scene) -> Iterator[Problem]:
@@ -31,7 +34,16 @@ def contact_problems(scene: Scene) -> Iterator[Problem]:
         if contact.tangential is not None and scene.accuracy.integrator != "semi_implicit_euler":
             # Its slip at the middle of the step is not at hand: with that at the end the spring would lose energy.
             yield Problem((*path, "tangential"), f"given, expected none with integrator {scene.accuracy.integrator}")
+    sprung = {base.between[0]: index for index, base in enumerate(scene.base) if base.tangential is not None}
+    for index in sprung.values():
+        yield from _base_spring(("base", index), scene.base[index], scene.accuracy.integrator)
     for name, kind in scene.bottle_types.items():
+        if kind.base_radius is not None and kind.material in sprung:
+            yield Problem(
+                ("bottle_types", name, "base_radius"),
+                f"{shown(kind.base_radius)} given, expected none beside base[{sprung[kind.material]}].tangential: its "
+                "spring holds a bottle that stands on a point",
+            )
         if kind.base_radius is not None and kind.base_radius > kind.radius:
             yield Problem(
                 ("bottle_types", name, "base_radius"),
@@ -40,6 +52,16 @@ def contact_problems(scene: Scene) -> Iterator[Problem]:
     if scene.friction_solver == "implicit" and scene.accuracy.integrator != "semi_implicit_euler":
         yield Problem(
             ("friction_solver",), f'"implicit" given, expected "explicit" with integrator {scene.accuracy.integrator}'
+        )
+
+
+def _base_spring(path: Path, base: Base, integrator: str) -> Iterator[Problem]:
+    if base.friction == 0.0:
+        yield Problem((*path, "tangential"), "given without friction, expected friction greater than 0 beside it")
+    if integrator not in BASE_SPRINGS:
+        yield Problem(
+            (*path, "tangential"),
+            f"given, expected none with integrator {integrator}, or integrator {listed(list(BASE_SPRINGS))}",
         )
 
 

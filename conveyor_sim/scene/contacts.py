@@ -80,8 +80,22 @@ class Contact(Part):
     )
 
 
+class BaseSpring(Part):
+    """A spring between a base and a point of its belt, which holds a bottle where it stands."""
+
+    stiffness: Positive = quantity("Stiffness k of the spring.", "N/m")
+    damping: NotNegative = quantity(
+        "Damping coefficient beside the spring; 2 sqrt(k m) is critical.", "kg/s", default=0.0
+    )
+
+
 class Base(Part):
     """Friction of bottles that stand on a belt."""
 
     between: Pair = quantity("The bottle's material, then the belt's.")
     friction: NotNegative = quantity("Coefficient of friction of the bottle's base on the belt.", "1")
+    tangential: BaseSpring | None = quantity(
+        "Static friction: a tangential spring with history between base and belt, in place of the friction curve, on "
+        "which bottles creep; needs friction, and bottles that stand on points. Left out: none.",
+        default=None,
+    )

@@ -23,6 +23,7 @@ EffectName = Literal[
     "atan_friction",
     "implicit_friction",
     "tangential_spring",
+    "static_friction",
     "ring_base",
     "belts",
     "curved_belts",

@@ -52,6 +52,7 @@ SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
     ("`damping` of a contact", contacts.Damping),
     ("`tangential` of a contact", contacts.Tangential),
     ("An entry of `base`", contacts.Base),
+    ("`tangential` of an entry of `base`", contacts.BaseSpring),
     ("An entry of `bottle_types`", schema.BottleType),
     ("An entry of `belts`: `kind: straight`", belts.StraightBelt),
     ("An entry of `belts`: `kind: curved`", belts.CurvedBelt),

@@ -75,7 +75,8 @@ class Floor(Part):
 
     friction: NotNegative | None = quantity(
         "Coefficient of friction of a bottle's base on the floor. "
-        "Left out: that of the first listed belt for the bottle's material, 0 if there is no belt.",
+        "Left out: that of the first listed belt for the bottle's material, `tangential` included; "
+        "0 if there is no belt.",
         "1",
         default=None,
     )

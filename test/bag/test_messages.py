@@ -19,7 +19,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
 LEDGER = balance(
-    stored=np.array([3.0, 0.5, 0.25]),
+    stored=np.array([3.0, 0.5, 0.25, 0.0]),
     fed=1.0,
     removed=0.125,
     belt_work=np.array([5.0, -1.5, 0.0]),

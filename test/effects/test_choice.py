@@ -136,6 +136,14 @@ def choices(**fields: Any) -> dict[str, str]:
             {"belts": {"one": belt(0.1)}, "base": base(0.4)},
             {"base_friction": "belts.one: friction 0.4", "belts": "belts.one"},
         ),
+        (
+            {"belts": {"one": belt(0.1)}, "base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]},
+            {
+                "base_friction": "belts.one: friction 0.4",
+                "static_friction": "base[0].tangential: 900 N/m",
+                "belts": "belts.one",
+            },
+        ),
         ({"belts": {"one": belt(0.1)}, "base": base(0.0)}, {}),
         (
             {"belts": {"one": belt(0.1), "bend": CURVED}, "base": base(0.4)},
@@ -183,8 +191,8 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
     off = [choice.name for choice in choose_effects(scene(**line())) if not choice.on]
     assert off == [
         "moving_rails", "hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction",
-        "tangential_spring", "ring_base", "peaks", "contact_arrays", "energy_ledger", "scuffing", "crushing", "impacts",
-        "tipping",
+        "tangential_spring", "static_friction", "ring_base", "peaks", "contact_arrays", "energy_ledger", "scuffing",
+        "crushing", "impacts", "tipping",
     ]  # fmt: skip
 
 

@@ -47,6 +47,10 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "Dormand and Prince": {"accuracy": {"per_tick": 50, "integrator": "dormand_prince", "error": 1e-3}},
     "linearly implicit": {"accuracy": {"per_tick": 20, "integrator": "linearly_implicit"}},
     "implicit friction": {"friction_solver": "implicit"},
+    "static friction": {
+        "base": [{**base(0.4)[0], "tangential": {"stiffness": 2000.0, "damping": 20.0}}],
+        "accuracy": {"per_tick": 100, "integrator": "velocity_verlet"},
+    },
     "springs and rings": {
         "bottle_types": {"bottle": kind(base_radius=0.04), "slim": kind(0.06, 0.15, base_radius=0.03)},
         "contacts": [

@@ -19,6 +19,7 @@ from ..ledger import book_kick
 from ..motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
 from ..moving import pass_step, place_rails
 from ..pairs import pack_row
+from ..static_friction import carry_anchors
 from ..team import BLOCK, share
 
 
@@ -39,6 +40,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
             _move(bottles, world.load, dt, first, end)
             _turn(world.spin, dt, first, end)
+            carry_anchors(world.footing, world.static_friction, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
             note_moved(line, member, first, end)
         hold = lists_hold(line, member)

@@ -21,6 +21,7 @@ from ..ledger import book_kick
 from ..motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
 from ..moving import pass_step, place_rails
 from ..pairs import pack_row
+from ..static_friction import carry_anchors
 from ..team import BLOCK, share
 from .phase import START
 
@@ -84,6 +85,7 @@ def _begin_step(world: World, line: World, stage: Stage, member: Member, dt: flo
     book_kick(bottles, spin, load, world.ledger, half, first, end)
     _move(bottles, load, stage, dt, first, end)
     _turn(spin, stage, dt, first, end)
+    carry_anchors(world.footing, world.static_friction, dt, first, end)
     note_moved(line, member, first, end)
 
 
