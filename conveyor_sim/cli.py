@@ -325,7 +325,7 @@ def _supply(entry: Infeed | Source | Spill) -> str:
 
 def _account(scene: Scene, model: Model) -> Table:
     """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
-    from conveyor_sim.explain import accuracy_rows
+    from conveyor_sim.explain import accuracy_rows, note_rows
     from conveyor_sim.scene import initial_bottles
 
     table = Table.grid(padding=(0, 2))
@@ -335,7 +335,7 @@ def _account(scene: Scene, model: Model) -> Table:
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    for name, text in accuracy_rows(model):
+    for name, text in [*accuracy_rows(model), *note_rows(scene, model)]:
         table.add_row(name, text)
     for index, bound in enumerate(model.bounds):
         table.add_row("" if index else "bounds", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")

@@ -10,6 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 
 from conveyor_sim.effects import EFFECTS
+from conveyor_sim.effects.notes import notes
 from conveyor_sim.model import Model
 from conveyor_sim.prediction import percent
 from conveyor_sim.scene import Scene
@@ -26,7 +27,14 @@ def explanation(scene: Scene, model: Model) -> Group:
     steps.add_row("scene", f"{model.name} ({scene.source_name})")
     for name, text in accuracy_rows(model):
         steps.add_row(name, text)
+    for name, text in note_rows(scene, model):
+        steps.add_row(name, text)
     return Group(_effects(scene, model), _bounds(scene, model), steps)
+
+
+def note_rows(scene: Scene, model: Model) -> list[tuple[str, str]]:
+    """What to know of how the scene was set up, each with its name; none where there is nothing to say."""
+    return [("note", text) for text in notes(scene, {choice.name for choice in model.effects if choice.on})]
 
 
 def accuracy_rows(model: Model) -> list[tuple[str, str]]:
