@@ -149,7 +149,7 @@ class RestingLoad:
 
 
 def fine_setting(scene: Scene) -> Setting:
-    """Steps of the preset `standard` with velocity Verlet, which is of second order; many more where it is forbidden."""
+    """Steps of the preset `standard` with velocity Verlet, which is of second order; more of them where it can't run."""
     steps = standard_steps(scene)
     if "velocity_verlet" in forbidden(scene):
         return Setting("semi_implicit_euler", FIRST_ORDER * steps)
@@ -161,7 +161,7 @@ class Loads:
     """Time means of the normal forces of contacts, each closed at every tick of the time."""
 
     contact: NDArray[np.int64]
-    """(C, 3), ascending: 0 and the ids of two bottles, the lesser first, or 1, the bottle's id and the rail's number."""
+    """(C, 3), ascending: 0 and the ids of two bottles, the lesser first; or 1, a bottle's id and a rail's number."""
     force: F8
     """(C,), N."""
 
