@@ -95,7 +95,7 @@ class RestingLoad:
             now = mean_loads(fine)
             work += max(1, fine.counts.present) * fine.model.steps_per_tick * WINDOW / self.scene.tick
             change = None if before is None else difference(now, before)
-            rested = rested or change is not None
+            rested = rested or now.force.size > 0
             steady = steady + 1 if change is not None and change <= SETTLED else 0
             before = now
             if steady == IN_A_ROW:
@@ -104,9 +104,9 @@ class RestingLoad:
         progress(limit, limit)
         if self.state is None:
             self.reason = (
-                f"the forces of resting contacts were still changing at {fine.time:g} s"
+                f"the forces that last were still changing at {fine.time:g} s"
                 if rested
-                else f"no contact stayed closed for long in {fine.time:g} s"
+                else f"no contact stayed closed for {WINDOW:g} s in {fine.time:g} s"
             )
 
     def make_reference(self, progress: Progress) -> None:
@@ -149,7 +149,7 @@ class RestingLoad:
 
 
 def fine_setting(scene: Scene) -> Setting:
-    """Steps of the preset `standard` with velocity Verlet, which is of second order; more of them where it can't run."""
+    """Steps of the preset `standard` with velocity Verlet, which is of second order; more where it can't run."""
     steps = standard_steps(scene)
     if "velocity_verlet" in forbidden(scene):
         return Setting("semi_implicit_euler", FIRST_ORDER * steps)
