@@ -142,11 +142,11 @@ def test_a_scene_that_never_settles_says_so() -> None:
     empty.settle(silent)
     assert not empty.settled
     assert empty.reason == "no contact stayed closed for 1 s in 4 s"
-    feed = {"bottle": "bottle", "position": [-2.0, 0.0], "direction": 0.0, "speed": 1.0, "rate": 2.0}
-    growing = RestingLoad(queue(bottles=[], infeeds={"more": feed}, belts={"belt": belt(1.0)}, duration=2.5))
+    feed = {"bottle": "bottle", "position": [-2.0, 0.0], "direction": 0.0, "speed": 1.0, "rate": 0.6}
+    growing = RestingLoad(queue(bottles=[], infeeds={"more": feed}, belts={"belt": belt(1.0)}))
     growing.settle(silent)
     assert not growing.settled
-    assert growing.reason == "the forces that last were still changing at 5 s"
+    assert growing.reason == "the forces that last were still changing at 8 s"
     with pytest.raises(ValueError, match="no settled state"):
         growing.make_reference(silent)
 
