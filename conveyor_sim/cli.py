@@ -172,15 +172,25 @@ def run(
 @click.argument("scene")
 @click.option("--tolerance", type=float, default=0.01, help="Relative error to stay below (default: 0.01).")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder (default: runs/accuracy_<scene>_<hash>).")
-@click.option("--thorough", is_flag=True, help="Many more long runs: up to an hour.")
+@click.option("--thorough", is_flag=True, help="Many more long runs: up to an hour on two free processors.")
+@click.option("--details", is_flag=True, help="Print all tables behind the answer, too.")
 @click.option("--apply", "write", is_flag=True, help="Write the answer into a copy of the scene, in the folder.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, write: bool, outside_tables: bool) -> None:
-    """Tell what accuracy costs in time on SCENE, and the cheapest setting that can be trusted.
+def accuracy(
+    scene: str,
+    tolerance: float,
+    out: Path | None,
+    thorough: bool,
+    details: bool,
+    write: bool,
+    outside_tables: bool,
+) -> None:
+    """Compare settings by error and run time on SCENE, and recommend the cheapest that meets the tolerance.
 
     A study that was interrupted goes on where it was when the command is given again.
     """
     from conveyor_sim.accuracy.apply import apply
+    from conveyor_sim.accuracy.lines import summary
     from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
     from conveyor_sim.accuracy.tables import terminal
     from conveyor_sim.report import plot_function
@@ -192,15 +202,14 @@ def accuracy(scene: str, tolerance: float, out: Path | None, thorough: bool, wri
     path = scene_path(scene)
     loaded = load_scene(path, outside_tables=outside_tables)
     folder = out or study_folder(loaded)
-    click.echo(f"study of {loaded.name} in {folder}; Ctrl-C interrupts it, the same command goes on with it", err=True)
-    study = run_study(
-        loaded,
-        folder,
-        tolerance,
-        THOROUGH if thorough else DEFAULT,
-        lambda what, counted: ProgressBar(what, 0.0, counted=counted),
-    )
-    _print(terminal(study))
+    effort = THOROUGH if thorough else DEFAULT
+    _say(f"study of {loaded.name} in {folder}; Ctrl-C interrupts it, the same command goes on with it")
+    _say(f"it takes up to {effort.budget / 60.0:.0f} min of processor time, and compiling before")
+    study = run_study(loaded, folder, tolerance, effort, lambda what, counted: ProgressBar(what, 0.0, counted=counted))
+    for line in summary(study):
+        click.echo(line)
+    if details:
+        _print(terminal(study))
     plot_accuracy = plot_function("plot_accuracy")
     if plot_accuracy is not None:
         for picture in plot_accuracy(study, folder):

@@ -1,29 +1,47 @@
-"""The answer: the cheapest setting that a scene can be trusted with, and what an exacter one would cost."""
+"""The answer: the cheapest setting that a scene can be trusted with, and what an exacter one would cost.
+
+A setting is recommended only if it did not fail, keeps the tolerance in impacts and in resting load, is within every
+bound of stability, and no long runs found it different; among those, settings come first whose measured errors are
+within what is predicted of them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from conveyor_sim.accuracy.results import Answer, Comparison, Point, Reference
+from conveyor_sim.accuracy.results import Answer, Comparison, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.words import digits, duration, percent
 
 EXACTER = 10.0
 """How many times exacter the setting is whose cost is told beside."""
 
-
 NEAR = 1.05
 """Costs within this factor are taken as one: of such settings the most exact is chosen."""
 
+SAFE = 2.0
+"""Times the measured error that a prediction may be, to be called right."""
+
+NOTHING = 1e-6
+"""Relative error from which on a prediction is held against it: below is rounding, and nobody's concern."""
+
 
 def eligible(points: Sequence[Point], tolerance: float) -> list[Point]:
-    """Settings of the scene's own stiffness that did not fail and keep the tolerance in peak force, cheapest first."""
+    """Settings that may be relied on for forces, cheapest first.
+
+    They have the scene's own stiffness, did not fail, keep the tolerance in impacts and in resting load, and are within
+    every bound of stability.
+    """
     kept = [point for point in points if point.setting.stiffness == 1.0 and _trusted(point, tolerance)]
     return sorted(kept, key=lambda point: (_cost(point), point.setting.key))
 
 
 def find_answer(
-    points: Sequence[Point], reference: Reference, comparisons: Sequence[Comparison], tolerance: float
+    points: Sequence[Point],
+    reference: Reference,
+    comparisons: Sequence[Comparison],
+    tolerance: float,
+    rest: Rest | None = None,
 ) -> Answer | None:
     """The cheapest eligible setting that no comparison of long runs finds different; None if none is eligible."""
     refuted = {row.setting for row in comparisons if row.verdict == "different"}
@@ -31,8 +49,11 @@ def find_answer(
     if not kept:
         return None
     trusted = [point for point in kept if point.setting not in refuted] or kept[-1:]
-    chosen = min((point for point in trusted if _cost(point) <= NEAR * _cost(trusted[0])), key=_error)
-    exacter = next(iter(eligible(points, _error(chosen) / EXACTER)), None)
+    trusted = [point for point in trusted if not _exceeded(point, reference, rest)] or trusted
+    chosen = min(
+        (point for point in trusted if _cost(point) <= NEAR * _cost(trusted[0])), key=lambda point: point.worst
+    )
+    exacter = next(iter(eligible(points, chosen.worst / EXACTER)), None)
     of_chosen = [row for row in comparisons if row.setting == chosen.setting]
     return Answer(
         setting=chosen.setting,
@@ -40,11 +61,44 @@ def find_answer(
         error=_error(chosen),
         speed=1.0 / _cost(chosen),
         exacter=None if exacter is None else exacter.setting,
-        exacter_error=None if exacter is None else _error(exacter),
+        exacter_error=None if exacter is None else exacter.worst,
         exacter_cost=None if exacter is None else _cost(exacter) / _cost(chosen),
         sentence=_sentence(chosen, exacter),
         accepted=bool(of_chosen) and all(row.verdict == "equivalent" for row in of_chosen),
-        doubts=tuple(_doubts(chosen, reference, of_chosen, refuted)),
+        doubts=tuple(_doubts(chosen, reference, rest, of_chosen, refuted)),
+        resting=chosen.resting,
+    )
+
+
+def foretelling(point: Point) -> str:
+    """Predicted beside measured errors in one sentence, and whether measured <= predicted <= 2 x measured."""
+    rows = [("impacts", point.predicted, _error(point)), ("resting load", point.predicted_resting, point.resting)]
+    told = [
+        f"{percent(predicted)} in {what} where {percent(measured)} was measured ({_judged(predicted, measured)})"
+        for what, predicted, measured in rows
+        if predicted is not None and measured is not None
+    ]
+    return f"Predicted: {'; '.join(told)}." if told else ""
+
+
+def _judged(predicted: float, measured: float) -> str:
+    if measured > predicted:
+        return "too little"
+    if predicted <= SAFE * measured:
+        return "within a factor of 2"
+    return f"on the safe side, {digits(predicted / measured)} x" if measured > NOTHING else "on the safe side"
+
+
+def _exceeded(point: Point, reference: Reference, rest: Rest | None) -> bool:
+    """Whether a measured error is above its prediction, by more than the reference's own doubt."""
+    resting_doubt = 0.0 if rest is None or rest.doubt is None else rest.doubt
+    rows = [
+        (point.predicted, _error(point), reference.doubt.peak_force),
+        (point.predicted_resting, point.resting, resting_doubt),
+    ]
+    return any(
+        predicted is not None and measured is not None and measured > max(NOTHING, predicted + doubt)
+        for predicted, measured, doubt in rows
     )
 
 
@@ -52,9 +106,10 @@ def _sentence(chosen: Point, exacter: Point | None) -> str:
     price = "no setting tried is ten times exacter"
     if exacter is not None:
         price = f"ten times exacter costs {digits(_cost(exacter) / _cost(chosen))} x ({_named(exacter)})"
+    resting = "" if chosen.resting is None else f" and {percent(chosen.resting)} in resting load"
     return (
-        f"{_named(chosen)}: {percent(_error(chosen))} in peak force, {digits(1.0 / _cost(chosen))} x real time on this "
-        f"machine; {price}."
+        f"{_named(chosen)}: {percent(_error(chosen))} in impacts{resting}, {digits(1.0 / _cost(chosen))} x real time "
+        f"on this machine; {price}."
     )
 
 
@@ -64,12 +119,26 @@ def _named(point: Point) -> str:
     return f"Δt = {duration(point.dt)}, {setting.integrator}{error}"
 
 
-def _doubts(chosen: Point, reference: Reference, comparisons: Sequence[Comparison], refuted: set[Setting]) -> list[str]:
+def _doubts(
+    chosen: Point,
+    reference: Reference,
+    rest: Rest | None,
+    comparisons: Sequence[Comparison],
+    refuted: set[Setting],
+) -> list[str]:
     doubts = []
     if chosen.setting in refuted:
         doubts.append("Long runs tell every setting that keeps the tolerance from the reference; this is the dearest.")
+    if _exceeded(chosen, reference, rest):
+        doubts.append(
+            "It is off by more than is predicted of it, as is every setting that keeps the tolerance: "
+            "rely on what was measured."
+        )
     if reference.doubt.peak_force > 0.1 * _error(chosen):
-        doubts.append(f"The reference itself is only sure to {percent(reference.doubt.peak_force)} in peak force.")
+        doubts.append(f"The reference itself is only sure to {percent(reference.doubt.peak_force)} in impacts.")
+    unsure = None if rest is None or chosen.resting is None else rest.doubt
+    if unsure is not None and unsure > max(NOTHING, 0.1 * (chosen.resting or 0.0)):
+        doubts.append(f"The reference itself is only sure to {percent(unsure)} in resting load.")
     undecided = [row for row in comparisons if row.verdict == "undecided"]
     if comparisons and max(row.runs for row in comparisons) < 2:
         doubts.append("The budget allowed one long run of each, which compares nothing; --thorough makes more.")
@@ -82,7 +151,8 @@ def _doubts(chosen: Point, reference: Reference, comparisons: Sequence[Compariso
 
 
 def _trusted(point: Point, tolerance: float) -> bool:
-    return not point.failure and point.cost is not None and _error(point) <= tolerance
+    stable = point.beyond is None or point.beyond <= 1.0 + 1e-12
+    return not point.failure and point.cost is not None and stable and point.worst <= tolerance
 
 
 def _error(point: Point) -> float:

@@ -30,14 +30,15 @@ def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
         raise ConveyorError(f"{source}: is written in braces, expected one field a line to write a setting into")
     lines = scene.source_text.splitlines(keepends=True)
     _take_tables_along(lines, data, source.parent, copy)
-    _put(lines, data, _line(setting))
+    _put(lines, data, f"{line(setting)}\n")
     _write(copy, "".join(lines))
     return load_scene(copy)
 
 
-def _line(setting: Setting) -> str:
+def line(setting: Setting) -> str:
+    """A setting as a scene file has it."""
     error = "" if setting.error is None else f", error: {setting.error!r}"
-    return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}}}\n"
+    return f"accuracy: {{integrator: {setting.integrator}, per_tick: {setting.per_tick}{error}}}"
 
 
 def _put(lines: list[str], data: Any, line: str) -> None:

@@ -121,12 +121,11 @@ class Ensemble(AbstractContextManager["Ensemble"]):
 
     def _alone(self, run: Run) -> Sample:
         """A run whose process, or another beside it, has died: once more by itself, which tells."""
-        began = time.perf_counter()
         try:
             return self._workers().submit(_run, self._work(run[0]), run[1]).result()
         except BrokenProcessPool:
             self._close_pool(at_once=True)
-            return Sample(*run, values={}, wall=time.perf_counter() - began, failure=DIED)
+            return Sample(*run, values={}, cpu=0.0, failure=DIED)
 
     def _work(self, setting: Setting) -> _Work:
         return _Work(self._scene.source_text, self._scene.source_name, self._scene.overrides_text, setting)
@@ -137,13 +136,13 @@ class Ensemble(AbstractContextManager["Ensemble"]):
 
     def _tell(self, wanted: Sequence[Run], progress: Progress) -> None:
         finished = [self._samples[run] for run in wanted if run in self._samples]
-        per_step = [sample.wall / sample.setting.per_tick for sample in finished]
-        walls: dict[Setting, list[float]] = {}
+        per_step = [sample.cpu / sample.setting.per_tick for sample in finished]
+        costs: dict[Setting, list[float]] = {}
         for sample in finished:
-            walls.setdefault(sample.setting, []).append(sample.wall)
+            costs.setdefault(sample.setting, []).append(sample.cpu)
         left = 0.0
         for setting, _ in (run for run in wanted if run not in self._samples):
-            known = walls.get(setting)
+            known = costs.get(setting)
             left += fmean(known) if known else fmean(per_step) * setting.per_tick if per_step else 0.0
         progress(len(finished), len(wanted), left / self.processes if finished else None)
 
@@ -190,9 +189,9 @@ def _rehearse(work: _Work) -> None:
 
 
 def _run(work: _Work, seed: int) -> Sample:
-    """One long run; its time is without compiling."""
+    """One long run; its processor time is without compiling."""
     _rehearse(work)
-    began = time.perf_counter()
+    began = time.process_time()
     values: dict[str, float] = {}
     failure = ""
     try:
@@ -201,4 +200,4 @@ def _run(work: _Work, seed: int) -> Sample:
         values = observe(simulation)
     except ConveyorError as error:
         failure = " ".join(str(error).split())
-    return Sample(work.setting, seed, values, time.perf_counter() - began, failure)
+    return Sample(work.setting, seed, values, time.process_time() - began, failure)

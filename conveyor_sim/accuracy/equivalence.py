@@ -104,12 +104,12 @@ def run_until_decided(
     progress: Progress,
     processes: int | None = None,
 ) -> tuple[list[Sample], list[Comparison]]:
-    """Make long runs until every observable of every setting is decided, or the budget (s, of wall time) is spent.
+    """Make long runs until every observable of every setting is decided, or the budget (s of processor time) is spent.
 
     The first run of each setting is made in any case and tells what it costs. Then the runs of one look after another
     are made, of the reference and of the settings that are still open; the last look is cut to the runs that the budget
-    allows. Time spent is that of the runs, as recorded, over the number of processes: a study that was interrupted is
-    taken up from its folder, and comes to what it would have come to. Settings with a run that fails get no more.
+    allows. Time spent is the processor time of the runs, as recorded: other work on the machine does not shorten the
+    study, and one that was interrupted is taken up from its folder. Settings with a run that fails get no more.
 
     Raises ConveyorError if the reference fails, or the folder has runs of another scene or version.
     """
@@ -121,9 +121,9 @@ def run_until_decided(
         for look in (1, *LOOKS):
             more = look - seeds
             if seeds and active:
-                walls = [_mean_wall(samples, setting) for setting in active]
-                left = budget - sum(sample.wall for sample in samples) / ensemble.processes
-                more = min(more, math.floor(left / (sum(walls) / ensemble.processes)))
+                costs = [_mean_cost(samples, setting) for setting in active]
+                left = budget - sum(sample.cpu for sample in samples)
+                more = min(more, math.floor(left / sum(costs)))
             if not active or more < 1:
                 break
             seeds += more
@@ -142,8 +142,8 @@ def _added(samples: Sequence[Sample], made: set[Run]) -> list[Sample]:
     return [sample for sample in samples if (sample.setting, sample.seed) not in made]
 
 
-def _mean_wall(samples: Sequence[Sample], setting: Setting) -> float:
-    return float(np.mean([sample.wall for sample in samples if sample.setting == setting]))
+def _mean_cost(samples: Sequence[Sample], setting: Setting) -> float:
+    return float(np.mean([sample.cpu for sample in samples if sample.setting == setting]))
 
 
 def _judged(samples: Sequence[Sample]) -> list[str]:

@@ -74,6 +74,9 @@ def _tables(study: Study) -> dict[str, Table]:
                 **_setting(point.setting),
                 "dt_s": point.dt,
                 "predicted_error": point.predicted,
+                "predicted_resting_error": point.predicted_resting,
+                "resting_error": point.resting,
+                "step_over_bound_of_stability": point.beyond,
                 "position_rms_error_m": point.errors and point.errors.position_rms,
                 "position_max_error_m": point.errors and point.errors.position_max,
                 "peak_force_error": point.errors and point.errors.peak_force,
@@ -103,6 +106,18 @@ def _tables(study: Study) -> dict[str, Table]:
             for order in study.orders
             for steps, error in zip(order.steps, order.errors, strict=True)
         ],
+        "resting": [
+            {
+                "reason": study.rest.reason,
+                **({} if study.rest.setting is None else _setting(study.rest.setting)),
+                "doubt": study.rest.doubt,
+                "window_s": study.rest.window,
+                "contacts": study.rest.contacts,
+                "force_N": study.rest.force,
+            }
+        ]
+        if study.rest is not None
+        else [],
         "horizons": [
             {
                 "start_s": horizon.start,

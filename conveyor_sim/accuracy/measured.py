@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from conveyor_sim.accuracy.candidates import candidates, forbidden
 from conveyor_sim.accuracy.closed_forms import orders
+from conveyor_sim.accuracy.cpu import Meter
 from conveyor_sim.accuracy.plain import Unlike, plain, typed
 from conveyor_sim.accuracy.precision import WorkPrecision
-from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference
+from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.sample_file import check_origin
 from conveyor_sim.accuracy.setting import with_setting
 from conveyor_sim.engine.integrators import INTEGRATORS
@@ -37,6 +38,12 @@ class Measured:
     reference: Reference
     points: tuple[Point, ...]
     skipped: tuple[str, ...]
+    rest: Rest
+    moving: str
+    cpu: float
+    """s of processor time that all this took, compiling left out."""
+    compiling: float
+    """s of processor time that compiling took."""
 
 
 def measured_once(scene: Scene, folder: Path, bars: Bars) -> Measured:
@@ -48,7 +55,9 @@ def measured_once(scene: Scene, folder: Path, bars: Bars) -> Measured:
     file = folder / MEASURED
     if file.exists():
         return _read(file)
-    measured = _measure(scene, bars)
+    with Meter() as meter:
+        measured = _measure(scene, bars)
+    measured = replace(measured, cpu=meter.cpu, compiling=meter.compiling)
     part = file.with_suffix(".part")
     try:
         part.write_text(json.dumps(plain(measured), indent=1, allow_nan=False) + "\n", encoding="utf-8")
@@ -70,17 +79,39 @@ def _measure(scene: Scene, bars: Bars) -> Measured:
         precision.find_horizons(bar.update)
     with bars(f"{scene.name}: reference", "runs") as bar:
         reference = precision.make_reference(bar.update)
+    with bars(f"{scene.name}: resting load", "s") as bar:
+        rest = precision.find_rest(bar.update)
     with bars(f"{scene.name}: settings", "runs") as bar:
         points = precision.measure(candidates(scene), bar.update)
     skipped = [f"{name}: {reason}" for name, reason in {**without, **banned}.items()]
-    points = [replace(point, predicted=_predicted(scene, point)) for point in points]
-    return Measured(machine(), tuple(found), tuple(precision.horizons), reference, tuple(points), tuple(skipped))
+    return Measured(
+        machine=machine(),
+        orders=tuple(found),
+        horizons=tuple(precision.horizons),
+        reference=reference,
+        points=tuple(foretold(scene, point) for point in points),
+        skipped=tuple(skipped),
+        rest=rest,
+        moving=precision.moving,
+        cpu=0.0,
+        compiling=0.0,
+    )
 
 
-def _predicted(scene: Scene, point: Point) -> float | None:
-    """Error in contact force by the bounds that choose presets; they know no other stiffness to compare with."""
-    setting = point.setting
-    return build_model(with_setting(scene, setting)).prediction.value if setting.stiffness == 1.0 else None
+def foretold(scene: Scene, point: Point) -> Point:
+    """The point with what is known without measuring: predicted errors, and how far its step is from stability.
+
+    Predictions know no other stiffness to compare with.
+    """
+    model = build_model(with_setting(scene, point.setting))
+    bounds = [bound.dt for bound in model.bounds if bound.stability]
+    own = point.setting.stiffness == 1.0
+    return replace(
+        point,
+        predicted=model.prediction.value if own else None,
+        predicted_resting=model.prediction.resting if own else None,
+        beyond=model.dt / min(bounds) if bounds else None,
+    )
 
 
 def _read(file: Path) -> Measured:

@@ -11,8 +11,8 @@ from conveyor_sim.accuracy.results import Point
 def front(points: Iterable[Point], softened: bool = True) -> list[Point]:
     """The points that none is as cheap and as exact as and better in one of the two, the cheapest first.
 
-    Cost is the median wall time, error that in peak contact force; failures are left out, and so are settings of
-    another stiffness than the scene's if `softened` is false.
+    Cost is the median processor time, error the larger of those in impacts and in resting load. Failures are left out,
+    and so are settings of another stiffness than the scene's if `softened` is false.
     """
     placed = [(place, p) for p in points if (softened or p.setting.stiffness == 1.0) and (place := place_of(p))]
     chosen: list[tuple[tuple[float, float], Point]] = []
@@ -23,8 +23,8 @@ def front(points: Iterable[Point], softened: bool = True) -> list[Point]:
 
 
 def place_of(point: Point) -> tuple[float, float] | None:
-    """Cost (s per simulated second) and relative error in peak force; None of a setting that has no place there."""
+    """Cost (s per simulated second) and the larger relative error; None of a setting that has no place there."""
     if point.failure or point.cost is None or point.errors is None:
         return None
-    place = point.cost.median, point.errors.peak_force
+    place = point.cost.median, point.worst
     return place if all(math.isfinite(value) for value in place) else None

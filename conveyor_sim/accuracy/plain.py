@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -47,10 +47,12 @@ def typed(kind: Any, data: Any, where: str = "") -> Any:
     if isinstance(kind, type) and is_dataclass(kind):
         kinds = get_type_hints(kind)
         _expect(isinstance(data, dict), where, data, f"the fields {', '.join(kinds)}")
-        for name in kinds.keys() ^ data.keys():
+        # What has a default may be left out: a file of a version that did not have the field yet.
+        optional = {field.name for field in fields(kind) if field.default is not MISSING}
+        for name in (kinds.keys() ^ data.keys()) - (optional - data.keys()):
             found = f"the field {name}" if name in data else f"no field {name}"
             raise Unlike(where, found, f"the fields {', '.join(kinds)}")
-        return kind(**{name: typed(k, data[name], f"{where}.{name}") for name, k in kinds.items()})
+        return kind(**{name: typed(k, data[name], f"{where}.{name}") for name, k in kinds.items() if name in data})
     if kind is float and (type(data) is int or data in ("inf", "-inf", "nan")):
         return float(data)
     _expect(type(data) is kind, where, data, _EXPECTED[kind])

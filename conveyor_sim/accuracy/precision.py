@@ -8,7 +8,8 @@ from conveyor_sim.accuracy.deviation import errors_of
 from conveyor_sim.accuracy.failures import failure_of
 from conveyor_sim.accuracy.horizon import HorizonFinder
 from conveyor_sim.accuracy.reference import reference_setting, reference_simulation
-from conveyor_sim.accuracy.results import Cost, Errors, Horizon, Point, Reference
+from conveyor_sim.accuracy.resting import RestingLoad
+from conveyor_sim.accuracy.results import Errors, Horizon, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.starts import Start, find_starts
 from conveyor_sim.accuracy.timing import costs_of
@@ -33,20 +34,41 @@ Progress = Callable[[float, float], None]
 class WorkPrecision:
     """Compares settings on a scene, which must run at the preset `standard`.
 
-    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, then `measure`, as often as there are
-    settings; each tells its progress. SceneError or SimulationError if the scene does not run.
+    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, `find_rest`, then `measure`, as often
+    as there are settings; each tells its progress. SceneError or SimulationError if the scene does not run.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.starts: list[Start] = []
+        self.moving = ""
+        """A sentence on what moving rails did; empty where there are none."""
+        self.resting = RestingLoad(scene)
         self.horizons: list[Horizon] = []
         self.reference: Reference | None = None
         self._true: list[Trajectory] = []
 
     def find_starts(self, progress: Progress) -> None:
         """Run the scene and keep states of it."""
-        self.starts = find_starts(self.scene, progress)
+        found = find_starts(self.scene, progress)
+        self.starts, self.moving = found.starts, found.moving
+
+    def find_rest(self, progress: Progress) -> Rest:
+        """What errors in resting load are measured from; progress in simulated s, then in runs."""
+        resting = self.resting
+        resting.settle(progress)
+        if not resting.settled:
+            return Rest(resting.reason, None, None, resting.window, 0, 0.0)
+        resting.make_reference(progress)
+        assert resting.reference is not None
+        return Rest(
+            resting.reason,
+            resting.reference_setting,
+            resting.doubt,
+            resting.window,
+            resting.reference.force.size,
+            resting.reference.rms,
+        )
 
     def find_horizons(self, progress: Progress) -> None:
         """How far trajectories from each start can be compared; progress in starts."""
@@ -90,12 +112,18 @@ class WorkPrecision:
         errors: dict[Setting, Errors] = {}
         failures: dict[Setting, str] = {}
         running: dict[Setting, Simulation] = {}
+        resting: dict[Setting, float | None] = {}
         for done, setting in enumerate(settings):
             progress(done, 2 * len(settings))
             simulation = variant(self.scene, setting)
             runs, failure = self._runs(simulation, setting)
             if failure:
                 failures[setting] = failure
+                continue
+            try:
+                resting[setting] = self._resting(simulation, setting)
+            except SimulationError as error:
+                failures[setting] = f"{error.kind}: {error}"
             else:
                 errors[setting], running[setting] = errors_of(runs), simulation
         costs = costs_of(
@@ -105,7 +133,18 @@ class WorkPrecision:
             lambda done, whole: progress(len(settings) * (1.0 + done / whole), 2 * len(settings)),
         )
         progress(2 * len(settings), 2 * len(settings))
-        return [self._point(setting, errors, costs, failures) for setting in settings]
+        return [
+            Point(
+                setting=setting,
+                dt=setting.dt(self.scene),
+                predicted=None,
+                errors=errors.get(setting),
+                cost=costs.get(setting),
+                failure=failures.get(setting, ""),
+                resting=resting.get(setting),
+            )
+            for setting in settings
+        ]
 
     def _follow(self, simulation: Simulation, index: int, start: Start) -> Trajectory:
         """From a start over its horizon and a tick, which `errors_of` wants besides."""
@@ -125,14 +164,8 @@ class WorkPrecision:
             runs.append((run, true))
         return runs, ""
 
-    def _point(
-        self, setting: Setting, errors: dict[Setting, Errors], costs: dict[Setting, Cost], failures: dict[Setting, str]
-    ) -> Point:
-        return Point(
-            setting=setting,
-            dt=setting.dt(self.scene),
-            predicted=None,
-            errors=errors.get(setting),
-            cost=costs.get(setting),
-            failure=failures.get(setting, ""),
-        )
+    def _resting(self, simulation: Simulation, setting: Setting) -> float | None:
+        """Error in resting load; None where nothing rests, and of other stiffness, whose settled state is another."""
+        if setting.stiffness != 1.0 or self.resting.reference is None:
+            return None
+        return self.resting.error_of(simulation)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from conveyor_sim.accuracy.setting import Setting
@@ -31,6 +32,24 @@ class Order:
 
 
 @dataclass(frozen=True)
+class Rest:
+    """What errors in resting load are measured from, or why there are none."""
+
+    reason: str
+    """When the scene settled, or why no settled state was found."""
+    setting: Setting | None
+    """Of the reference; None without a settled state."""
+    doubt: float | None
+    """Relative difference of the reference from that of twice the step; None where no contact stayed closed."""
+    window: float
+    """s, over which forces are averaged."""
+    contacts: int
+    """That stayed closed in the reference."""
+    force: float
+    """N, their mean forces' RMS."""
+
+
+@dataclass(frozen=True)
 class Horizon:
     """How long trajectories from one state can be compared: until a nudge has grown tenfold."""
 
@@ -57,7 +76,7 @@ class Errors:
     position_max: float
     """m"""
     peak_force: float
-    """Relative: RMS over bottles of the error in the largest force, over the RMS of the largest forces."""
+    """Relative: RMS over bottles of the error in the largest force, over the RMS of the largest forces: impacts."""
     impulse: float
     """Relative, likewise, of the impulse of all normal forces."""
     energy: float
@@ -66,7 +85,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Cost:
-    """Wall time, s per simulated second: median, least and greatest of interleaved repeats."""
+    """Processor time, s per simulated second: median, least and greatest of interleaved repeats."""
 
     median: float
     least: float
@@ -81,13 +100,24 @@ class Point:
     dt: float
     """s"""
     predicted: float | None
-    """Relative error in contact force by the bounds that choose presets; None: they say nothing of this method."""
+    """Relative error in impacts by the bounds that choose presets; None: they say nothing of this method."""
     errors: Errors | None
     """None where it failed."""
     cost: Cost | None
     """None where it failed."""
     failure: str
     """One sentence: unstable, chattering or tunnelling, where and when; empty if it did not fail."""
+    predicted_resting: float | None = None
+    """Relative error in resting load, predicted likewise; None where nothing rests."""
+    resting: float | None = None
+    """Relative error in resting load; None where it was not measured."""
+    beyond: float | None = None
+    """dt over the tightest bound of stability, above 1 it may chatter or blow up; None: nothing bounds it."""
+
+    @property
+    def worst(self) -> float:
+        """The larger of its errors in impacts and in resting load, relative; inf where it failed."""
+        return math.inf if self.errors is None else max(self.errors.peak_force, self.resting or 0.0)
 
 
 @dataclass(frozen=True)
@@ -107,8 +137,8 @@ class Sample:
     seed: int
     values: dict[str, float]
     """By observable; those that the scene has."""
-    wall: float
-    """s"""
+    cpu: float
+    """s of processor time that it took."""
     failure: str
     """One sentence if the run ended early, its values are then empty; else empty."""
 
@@ -153,7 +183,7 @@ class StiffnessRow:
     observables: dict[str, tuple[float, float]]
     """By name: mean and standard error over seeds."""
     cost_ratio: float | None
-    """Wall time over that of factor 1; None where it is not known."""
+    """Processor time over that of factor 1; None where it is not known."""
 
     @property
     def deep(self) -> bool:
@@ -169,21 +199,23 @@ class Answer:
     dt: float
     """s"""
     error: float
-    """Relative, in peak contact force."""
+    """Relative, in impacts: in peak contact force."""
     speed: float
-    """Simulated over wall time."""
+    """Simulated over processor time."""
     exacter: Setting | None
     """The cheapest of a tenth of its error; None if no setting is so exact, the next two are then None, too."""
     exacter_error: float | None
-    """Relative, in peak contact force."""
+    """Relative, in impacts or in resting load, whichever is larger."""
     exacter_cost: float | None
-    """Wall time over that of `setting`."""
+    """Processor time over that of `setting`."""
     sentence: str
     """All of this in words."""
     accepted: bool
     """Whether the ensembles found it equivalent to the reference in every observable."""
     doubts: tuple[str, ...]
     """Sentences: what is not certain."""
+    resting: float | None = None
+    """Relative, in resting load; None where it was not measured."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +231,7 @@ class Study:
     tick: float
     """s"""
     tolerance: float
-    """Relative: in peak contact force on the short horizon, in every observable on the long one."""
+    """Relative: in impacts, in resting load, and in every observable of long runs."""
     own: Setting
     """The scene's own, as it would run without a study."""
     orders: tuple[Order, ...]
@@ -215,3 +247,11 @@ class Study:
     """Sentences: what was left out, and why."""
     answer: Answer | None
     """None: no setting that was tried keeps the tolerance."""
+    rest: Rest | None = None
+    """None in a study of a version that did not look at resting load."""
+    moving: str = ""
+    """A sentence on what moving rails did; empty where there are none."""
+    cpu: float | None = None
+    """s of processor time that the study took, compiling left out; None where it was not kept."""
+    compiling: float | None = None
+    """s of processor time that compiling took."""

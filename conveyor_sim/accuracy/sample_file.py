@@ -26,7 +26,7 @@ ORIGIN = "origin.json"
 """What a folder's results are of: hashes that a study must share to go on with them."""
 
 _OF_SETTING = ("integrator", "per_tick", "stiffness", "error")
-_COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "wall", "failure")
+_COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "cpu", "failure")
 
 
 class SampleFile:
@@ -57,7 +57,7 @@ class SampleFile:
         values = [repr(sample.values[item.name]) if item.name in sample.values else "" for item in OBSERVABLES]
         self._write(
             (way.integrator, way.per_tick, repr(way.stiffness), error, sample.seed, *values,
-             repr(sample.wall), sample.failure)
+             repr(sample.cpu), sample.failure)
         )  # fmt: skip
 
     def close(self) -> None:
@@ -151,6 +151,6 @@ def _sample(row: dict[str, str]) -> Sample:
         ),
         seed=int(row["seed"]),
         values={item.name: float(row[item.name]) for item in OBSERVABLES if row[item.name]},
-        wall=float(row["wall"]),
+        cpu=float(row["cpu"]),
         failure=row["failure"],
     )

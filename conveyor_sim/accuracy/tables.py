@@ -9,7 +9,9 @@ from typing import TypeVar
 
 from rich.console import Group
 
+from conveyor_sim.accuracy.answer import foretelling
 from conveyor_sim.accuracy.block import Block, Column
+from conveyor_sim.accuracy.lines import three_lines
 from conveyor_sim.accuracy.pareto import front, place_of
 from conveyor_sim.accuracy.results import (
     DEEP,
@@ -32,7 +34,7 @@ Quantity = tuple[str, Callable[[StiffnessRow], str]]
 
 
 def terminal(study: Study) -> Group:
-    """The study for a rich console of 80 columns or more, the answer last."""
+    """All tables of the study for a rich console of 80 columns or more, the answer last."""
     return Group(*blocks(study))
 
 
@@ -108,9 +110,10 @@ def _work(study: Study) -> list[Block]:
         return placed[0].setting == recommended
 
     notes = [
-        f"Costs on {study.machine}. Errors in peak contact force, predicted by the bounds that choose presets. "
+        f"Costs, in processor time, on {study.machine}. Impacts: error in peak contact force. "
         "k x: factor on every stiffness. Front: nothing else tried is both as cheap and as exact."
     ]
+    resting = [_rested(study)] if study.rest is not None else []
     if any(point.setting.error is not None for point in study.points):
         notes.append(
             "A method that chooses its own steps has its largest error of a step beside it; dt is its longest."
@@ -128,9 +131,16 @@ def _work(study: Study) -> list[Block]:
     work = [
         Column[Placed]("cost\nms/s", lambda row: digits(1e3 * row[2].median)),
         Column("x real\ntime", lambda row: digits(1.0 / row[2].median)),
-        Column("error, %\npredicted", lambda row: _hundredths(row[0].predicted)),
-        Column("error, %\nmeasured", lambda row: _hundredths(row[1].peak_force)),
+        Column("impacts\n%", lambda row: _hundredths(row[1].peak_force)),
+        Column("resting\nload, %", lambda row: _hundredths(row[0].resting)),
         Column("", marks, left=True),
+    ]
+    foretold = [
+        Column[Placed]("impacts, %\npredicted", lambda row: _hundredths(row[0].predicted)),
+        Column("impacts, %\nmeasured", lambda row: _hundredths(row[1].peak_force)),
+        Column("resting, %\npredicted", lambda row: _hundredths(row[0].predicted_resting)),
+        Column("resting, %\nmeasured", lambda row: _hundredths(row[0].resting)),
+        Column("dt, x bound\nof stability", lambda row: digits(row[0].beyond)),
     ]
     other = [
         Column[Placed]("position\nRMS, um", lambda row: _millionths(row[1].position_rms)),
@@ -140,8 +150,27 @@ def _work(study: Study) -> list[Block]:
     ]
     return [
         Block.of("Work and precision, the cheapest first", [*setting, *work], rows, notes, is_recommended),
+        Block.of(
+            "Impacts and resting load: predicted by the bounds that choose presets, and measured",
+            [setting[0], setting[1], *foretold],
+            {"": [row for row in rows[""] if row[0].setting.stiffness == 1.0]},
+            resting,
+            is_recommended,
+        ),
         Block.of("The same settings: other errors", [*setting, *other], rows, strong=is_recommended),
     ]
+
+
+def _rested(study: Study) -> str:
+    """What errors in resting load were measured from."""
+    rest = study.rest
+    if rest is None or rest.setting is None or rest.contacts == 0:
+        return f"Resting load: {'not looked at' if rest is None else rest.reason}."
+    return (
+        f"Resting load: time means over {digits(rest.window)} s of the normal forces in contacts that stay closed, "
+        f"from one settled state; the scene {rest.reason}. Reference: {setting_name(rest.setting, study.tick)}; at "
+        f"twice the step it is another by {percent(rest.doubt)}."
+    )
 
 
 def _failures(points: Sequence[Point]) -> Block:
@@ -226,16 +255,22 @@ def _factor(row: StiffnessRow) -> Column[Quantity]:
 
 def _answer(study: Study) -> Block:
     answer = study.answer
+    moving = [study.moving] if study.moving else []
     if answer is None:
-        sentence = f"No setting that was tried keeps {percent(study.tolerance)} in peak force."
-        return Block.of("Answer", (), {}, [sentence])
+        sentence = (
+            f"No setting that was tried keeps {percent(study.tolerance)} in impacts and in resting load within every "
+            "bound of stability."
+        )
+        return Block.of("Answer", (), {}, [*three_lines(study), sentence, *moving])
     if not study.comparisons:
         verdict = []
     elif answer.accepted:
         verdict = ["Long runs accept it: equivalent to the reference in all that was observed."]
     else:
         verdict = ["Long runs have not accepted it."]
-    return Block.of("Answer", (), {}, [answer.sentence, *verdict, *answer.doubts])
+    chosen = [foretelling(point) for point in study.points if point.setting == answer.setting]
+    notes = [*three_lines(study), answer.sentence, *filter(None, chosen), *moving, *verdict, *answer.doubts]
+    return Block.of("Answer", (), {}, notes)
 
 
 def _integrator(setting: Setting) -> str:

@@ -1,4 +1,4 @@
-"""What settings cost: wall time per simulated second, from repeats that take turns."""
+"""What settings cost: processor time per simulated second, from repeats that take turns."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -26,8 +26,8 @@ def costs_of(
 ) -> dict[Setting, Cost]:
     """Cost of each setting from a state of the scene on; a budget in s, overrun where the fewest rounds take longer.
 
-    In each round every setting is measured once, every second round in reverse: what slows the machine down for a while
-    slows all of them. A setting of which a tick takes longer than CHUNK is measured over that tick.
+    In each round every setting is measured once, every second round in reverse: what makes the processor slower for a
+    while does so for all of them. A setting of which a tick takes longer than CHUNK is measured over that tick.
     """
     plans = {setting: _plan(simulation, state) for setting, simulation in simulations.items()}
     a_round = sum(max(CHUNK, spent) for _, _, spent in plans.values())
@@ -53,11 +53,11 @@ def _plan(simulation: Simulation, state: Simulation) -> tuple[int, int, float]:
 
 
 def _run(simulation: Simulation, state: Simulation, ticks: int, repeats: int) -> float:
-    """Wall time (s) of some ticks from a state on, several times over; what it takes to go back is not counted."""
+    """Processor time (s) of some ticks from a state on, several times over; what it takes to go back is not counted."""
     spent = 0.0
     for _ in range(repeats):
         simulation.take_state_of(state)
-        start = time.perf_counter()
+        start = time.process_time()
         simulation.advance(ticks)
-        spent += time.perf_counter() - start
+        spent += time.process_time() - start
     return spent

@@ -25,6 +25,8 @@ from conveyor_sim.plot.integrators import dark, look_of, order_of, setting_text,
 from conveyor_sim.plot.logarithmic import logarithmic_x, logarithmic_y, plain_ticks
 from conveyor_sim.plot.notes import Note, place_notes
 
+_LEAST_RESTING: Final = 1e-6  # relative; what is below it stands at the lower edge
+
 _MOST_FAILURES: Final = 14
 _SOFT_MARKER: Final = "*"
 _FRONT: Final = "#c3ccd5"
@@ -33,16 +35,16 @@ _BEST: Final = "#9b2226"
 
 
 def pareto_figure(study: Study) -> Figure:
-    """Relative error in peak contact force (%) against wall time per simulated second, both logarithmic."""
+    """Relative errors in impacts and in resting load (%) against processor time per simulated second, logarithmic."""
     figure = style.new_figure(12.0, 7.2)
     ax, side = figure.subplots(1, 2, width_ratios=(3.3, 1.0))
     side.axis("off")
     placed = [point for point in study.points if place_of(point) is not None]
     heading(figure, f"What accuracy costs: {study.scene}")
     ax.set_title(_subtitle(study), fontsize=9.5, fontweight="normal", pad=10.0)
-    ax.set_xlabel("cost: wall time per simulated second (s/s)")
+    ax.set_xlabel("cost: processor time per simulated second (s/s)")
     figure.supxlabel(f"Costs on {study.machine}", x=0.01, ha="left", fontsize=8.0, color=style.MUTED, wrap=True)
-    ax.set_ylabel("error in peak contact force (% of it)")
+    ax.set_ylabel("error in contact force (%): impacts filled, resting load open")
     _failures(side, study)
     if not placed:
         ax.text(0.5, 0.5, "no setting could be measured", transform=ax.transAxes, ha="center", color=style.MUTED)
@@ -52,8 +54,9 @@ def pareto_figure(study: Study) -> Figure:
     _legend(side, placed)
     _limits(ax, study, placed)
     lines = [_front(ax, placed), *_points(ax, placed), *_marks(ax, study)]
+    resting = _resting(ax, placed)
     _rings(ax, study, placed)
-    place_notes(ax, _notes(study, placed), np.array([_xy(point, ax) for point in placed]), lines)
+    place_notes(ax, _notes(study, placed), np.array([*(_xy(point, ax) for point in placed), *resting]), lines)
     return figure
 
 
@@ -66,6 +69,7 @@ def _subtitle(study: Study) -> str:
 def _limits(ax: Axes, study: Study, placed: Sequence[Point]) -> None:
     costs = [point.cost.median for point in placed if point.cost]
     errors = [100.0 * point.errors.peak_force for point in placed if point.errors and point.errors.peak_force > 0.0]
+    errors += [100.0 * point.resting for point in placed if point.resting and point.resting > _LEAST_RESTING]
     errors.append(100.0 * study.tolerance)
     low, high = _decade(min(costs) / 1.6, max(costs) * 1.6)
     high = 1.2 if 0.4 < high < 1.2 else high
@@ -94,12 +98,16 @@ def _inverse(values: ArrayLike) -> Floats:
 def _xy(point: Point, ax: Axes) -> tuple[float, float]:
     """Where it stands: at the lower edge, if its error is too small to be shown."""
     assert point.cost is not None and point.errors is not None
-    return point.cost.median, max(100.0 * point.errors.peak_force, ax.get_ylim()[0] * 1.1)
+    return _shown(point.cost.median, point.errors.peak_force, ax)
+
+
+def _shown(cost: float, error: float, ax: Axes) -> tuple[float, float]:
+    return cost, max(100.0 * error, ax.get_ylim()[0] * 1.1)
 
 
 def _front(ax: Axes, placed: Sequence[Point]) -> Floats:
     """The least error to be had at a cost, as a broad line behind the points."""
-    corners = np.array([_xy(point, ax) for point in front(placed)])
+    corners = np.array([_shown(*place, ax) for point in front(placed) if (place := place_of(point))])
     ax.plot(*corners.T, color=_FRONT, linewidth=7.0, solid_capstyle="round", zorder=1.8, gid="front")
     return corners
 
@@ -134,6 +142,32 @@ def _points(ax: Axes, placed: Sequence[Point]) -> list[Floats]:
             ends = np.array([(point.cost.least, point.cost.greatest) for point in own if point.cost])
             lines += [np.array([(low, y), (high, y)]) for (low, high), y in zip(ends, at[:, 1], strict=True)]
     return lines
+
+
+def _resting(ax: Axes, placed: Sequence[Point]) -> list[tuple[float, float]]:
+    """Open markers at the errors in resting load, where they were measured."""
+    drawn = []
+    for integrator in dict.fromkeys(point.setting.integrator for point in placed):
+        look = look_of(integrator)
+        at = [
+            _shown(point.cost.median, point.resting, ax)
+            for point in placed
+            if point.setting.integrator == integrator and point.cost is not None and point.resting is not None
+        ]
+        if at:
+            ax.plot(
+                *np.array(at).T,
+                linestyle="none",
+                marker=look.marker,
+                markersize=6.0,
+                markerfacecolor="none",
+                markeredgecolor=look.colour,
+                markeredgewidth=1.0,
+                zorder=3.5,
+                gid=f"{integrator} resting",
+            )
+        drawn += at
+    return drawn
 
 
 def _marks(ax: Axes, study: Study) -> list[Floats]:
@@ -232,7 +266,7 @@ def _legend(side: Axes, placed: Sequence[Point]) -> None:
         soft.set_label("softer contacts,\nk x factor beside")
         handles.append(soft)
     handles += [
-        Line2D([], [], color=_FRONT, linewidth=7.0, label="front: nothing tried is\ncheaper and as exact"),
+        Line2D([], [], color=_FRONT, linewidth=7.0, label="front: nothing tried is\ncheaper and as exact in both"),
         Line2D([], [], color=style.MUTED, marker="|", label="bar: least to greatest\ncost of repeats"),
     ]
     legend = side.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), fontsize=9.0, borderaxespad=0.0)

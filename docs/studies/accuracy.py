@@ -2,7 +2,7 @@
 
     make accuracy                                   # all scenes, about half an hour on a machine that does nothing else
     make accuracy ARGS="funnel two_bottles"         # some of them
-    make accuracy ARGS=--tables                     # nothing is measured: the tables again, from docs/accuracy/
+    make accuracy ARGS=--tables                     # measures nothing: tables and pictures anew, from docs/accuracy/
 
 Each scene's study, CSV files and pictures are kept in docs/accuracy/<scene>/.
 """
@@ -21,13 +21,16 @@ with while_importing():
     import click
     from page_parts import with_parts
 
+    from conveyor_sim.accuracy.answer import find_answer
+    from conveyor_sim.accuracy.apply import line
     from conveyor_sim.accuracy.candidates import preset_setting
     from conveyor_sim.accuracy.files import STUDY, read_study
+    from conveyor_sim.accuracy.lines import three_lines
+    from conveyor_sim.accuracy.measured import foretold
     from conveyor_sim.accuracy.results import Point, Study
-    from conveyor_sim.accuracy.setting import with_setting
     from conveyor_sim.accuracy.tables import markdown
     from conveyor_sim.accuracy.words import duration, percent
-    from conveyor_sim.model import build_model
+    from conveyor_sim.plot import plot_accuracy
     from conveyor_sim.presets import PRESETS, table
     from conveyor_sim.scene import Scene, load_scene
 
@@ -59,6 +62,17 @@ def make(name: str) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     command = str(Path(sys.executable).with_name("conveyor-sim"))
     subprocess.run([command, "accuracy", str(scene_file(name)), "--out", str(folder)], cwd=ROOT, check=True)
+    keep_only_what_the_page_shows(folder)
+
+
+def draw(name: str) -> None:
+    """Draw a study's pictures again, with what is predicted now."""
+    folder = FOLDER / name
+    plot_accuracy(of_today(name), folder)
+    keep_only_what_the_page_shows(folder)
+
+
+def keep_only_what_the_page_shows(folder: Path) -> None:
     for file in folder.iterdir():
         if not any(file.match(pattern) for pattern in KEPT):
             file.unlink()
@@ -66,10 +80,7 @@ def make(name: str) -> None:
 
 def page(text: str) -> str:
     """The page with its tables made anew from the studies in docs/accuracy/; ValueError without a marker."""
-    found = [name for name in SCENES if (FOLDER / name / STUDY).exists()]
-    studies = {
-        name: predicted(read_study(FOLDER / name / STUDY), load_scene(ROOT / scene_file(name))) for name in found
-    }
+    studies = {name: of_today(name) for name in studied()}
     parts = {"presets": table(), "answers": answers(studies), "promises": promises(studies)}
     parts |= {name: section(name, study) for name, study in studies.items()}
     return with_parts(PAGE, text, parts)
@@ -81,41 +92,43 @@ def section(name: str, study: Study) -> str:
     return f"{picture}\n\n<details><summary>All tables of this study</summary>\n\n{markdown(study)}\n</details>"
 
 
-def predicted(study: Study, scene: Scene) -> Study:
-    """The study with the errors that are predicted now: they are computed, not measured."""
-    points = [
-        replace(point, predicted=build_model(with_setting(scene, point.setting)).prediction.value)
-        if point.setting.stiffness == 1.0
-        else point
-        for point in study.points
-    ]
-    return replace(study, points=tuple(points))
+def studied() -> list[str]:
+    """The scenes whose studies are there."""
+    return [name for name in SCENES if (FOLDER / name / STUDY).exists()]
+
+
+def of_today(name: str) -> Study:
+    """A study with the errors that are predicted now, and the answer that follows: they are computed, not measured."""
+    study, scene = read_study(FOLDER / name / STUDY), load_scene(ROOT / scene_file(name))
+    points = tuple(foretold(scene, point) for point in study.points)
+    answer = find_answer(points, study.reference, study.comparisons, study.tolerance, study.rest)
+    return replace(study, points=points, answer=answer)
 
 
 def answers(studies: dict[str, Study]) -> str:
-    """One line a scene: its answer."""
-    lines = ["| scene | answer |", "| --- | --- |"]
-    lines += [
-        f"| {name} | {'no setting keeps the tolerance' if study.answer is None else study.answer.sentence} |"
-        for name, study in studies.items()
-    ]
+    """The first three lines of each scene's answer, and the setting."""
+    parts = []
+    for name, study in studies.items():
+        setting = "none" if study.answer is None else f"`{line(study.answer.setting)}`"
+        parts.append("\n".join([f"**{name}**", "", *(f"- {text}" for text in (*three_lines(study), setting))]))
     machines = sorted({study.machine for study in studies.values()})
-    return "\n".join([*lines, "", f"Measured on {'; '.join(machines)}."])
+    return "\n\n".join([*parts, f"Measured on {'; '.join(machines)}."])
 
 
 def promises(studies: dict[str, Study]) -> str:
-    """Predicted and measured error of every preset on every scene."""
-    lines = ["| scene | preset | Δt | promised | predicted | measured | |"]
-    lines.append("| --- | --- | ---: | ---: | ---: | ---: | --- |")
+    """What every preset promises, what is predicted of it and what was measured, in impacts and in resting load."""
+    lines = ["| scene | preset | Δt | promised | impacts: predicted | measured | resting: predicted | measured | |"]
+    lines.append("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |")
     for name, study in studies.items():
         scene = load_scene(ROOT / scene_file(name))
         for preset, tolerance in PRESETS.items():
             point = preset_point(study, scene, preset)
             if point is None or point.errors is None:
                 continue
-            kept = "kept" if point.errors.peak_force <= tolerance else "**not kept**"
+            kept = "kept" if max(point.errors.peak_force, point.resting or 0.0) <= tolerance else "**not kept**"
+            resting = (percent(point.predicted_resting), percent(point.resting))
             cells = [name, preset, duration(point.dt), percent(tolerance), percent(point.predicted)]
-            lines.append(f"| {' | '.join(cells)} | {percent(point.errors.peak_force)} | {kept} |")
+            lines.append(f"| {' | '.join([*cells, percent(point.errors.peak_force), *resting])} | {kept} |")
     return "\n".join(lines)
 
 
@@ -138,6 +151,8 @@ def main(scenes: tuple[str, ...], only_tables: bool) -> None:
     """Study SCENES (default: all) and renew docs/accuracy.md."""
     for name in () if only_tables else scenes or SCENES:
         make(name)
+    for name in studied() if only_tables else ():
+        draw(name)
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from conveyor_sim.accuracy.answer import eligible, find_answer
-from conveyor_sim.accuracy.results import Comparison, Cost, Errors, Point, Reference
+from conveyor_sim.accuracy.answer import eligible, find_answer, foretelling
+from conveyor_sim.accuracy.results import Comparison, Cost, Errors, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
 
 TICK = 0.01
@@ -47,7 +48,7 @@ def test_the_cheapest_that_keeps_the_tolerance() -> None:
     assert (answer.exacter, answer.exacter_error) == (VERLET.setting, 0.0006)
     assert answer.exacter_cost == pytest.approx(3.2)
     assert answer.sentence == (
-        "Δt = 500 us, semi_implicit_euler: 0.8 % in peak force, 50 x real time on this machine; "
+        "Δt = 500 us, semi_implicit_euler: 0.8 % in impacts, 50 x real time on this machine; "
         "ten times exacter costs 3.2 x (Δt = 100 us, velocity_verlet)."
     )
 
@@ -76,11 +77,57 @@ def test_what_is_not_certain_is_said() -> None:
     answer = find_answer(ALL, unsure, [compared(MIDDLE.setting, "undecided", -0.016, 0.012)], 0.01)
     assert answer is not None
     assert not answer.accepted
-    assert "only sure to 0.2 % in peak force" in answer.doubts[0]
+    assert "only sure to 0.2 % in impacts" in answer.doubts[0]
     assert "throughput to 1.6 % (8 runs)" in answer.doubts[1]
     bare = find_answer(ALL, SURE, [], 0.01)
     assert bare is not None
     assert "No long runs" in bare.doubts[0]
+
+
+def test_resting_load_counts_beside_impacts() -> None:
+    """Each error has to keep the tolerance; where nothing rests, impacts alone do."""
+    crept = [replace(MIDDLE, resting=0.059), replace(VERLET, resting=0.0003), replace(FINE, resting=0.0015)]
+    assert [p.setting for p in eligible(crept, 0.01)] == [VERLET.setting, FINE.setting]
+    answer = find_answer(crept, SURE, [], 0.01)
+    assert answer is not None
+    assert (answer.setting, answer.error, answer.resting) == (VERLET.setting, 0.0006, 0.0003)
+    assert "0.06 % in impacts and 0.03 % in resting load" in answer.sentence
+
+
+def test_a_step_beyond_stability_is_never_recommended() -> None:
+    """However exact it was found, and even if nothing else is left."""
+    shaky = replace(MIDDLE, beyond=1.99)
+    assert [p.setting for p in eligible([shaky, FINE], 0.01)] == [FINE.setting]
+    assert find_answer([shaky], SURE, [], 0.01) is None
+    assert eligible([replace(MIDDLE, beyond=1.0)], 0.01) == [replace(MIDDLE, beyond=1.0)]
+
+
+def test_what_is_off_by_more_than_predicted_comes_last() -> None:
+    """Measured must be within predicted, in impacts and in resting load, but for the reference's own doubt."""
+    wrong = replace(MIDDLE, predicted=0.004)
+    right = replace(VERLET, predicted=0.0006, predicted_resting=0.0004, resting=0.0003)
+    answer = find_answer([wrong, right], SURE, [], 0.01)
+    assert answer is not None and answer.setting == VERLET.setting
+    creeps = replace(MIDDLE, predicted=0.009, predicted_resting=0.001, resting=0.002)
+    answer = find_answer([creeps, right], SURE, [], 0.01)
+    assert answer is not None and answer.setting == VERLET.setting
+    rest = Rest("settled at 2 s", VERLET.setting, 0.002, 1.0, 3, 0.2)
+    answer = find_answer([creeps, right], SURE, [], 0.01, rest)
+    assert answer is not None and answer.setting == MIDDLE.setting
+    answer = find_answer([wrong], SURE, [], 0.01)
+    assert answer is not None
+    assert "off by more than is predicted" in answer.doubts[0]
+
+
+def test_predictions_are_judged_beside_what_was_measured() -> None:
+    """Right is from the measured error to twice it."""
+    given = replace(MIDDLE, predicted=0.012, predicted_resting=0.05, resting=0.002)
+    assert foretelling(given) == (
+        "Predicted: 1.2 % in impacts where 0.8 % was measured (within a factor of 2); "
+        "5 % in resting load where 0.2 % was measured (on the safe side, 25 x)."
+    )
+    assert "(too little)" in foretelling(replace(MIDDLE, predicted=0.0079))
+    assert foretelling(MIDDLE) == ""
 
 
 def test_no_setting_keeps_the_tolerance() -> None:

@@ -75,7 +75,7 @@ def runs_of(*settings: Setting, seeds: int) -> list[tuple[Setting, int]]:
 
 def timeless(samples: list[Sample]) -> list[Sample]:
     """All but what a run took."""
-    return [replace(sample, wall=0.0) for sample in samples]
+    return [replace(sample, cpu=0.0) for sample in samples]
 
 
 def alone(it: Scene, setting: Setting, seed: int) -> dict[str, float]:
@@ -149,7 +149,7 @@ def test_samples_are_those_of_runs_made_one_by_one(tmp_path: Path) -> None:
     assert [(sample.setting, sample.seed) for sample in made[0]] == wanted
     for sample in made[0]:
         assert sample.values == alone(it, sample.setting, sample.seed)
-        assert (sample.failure, sample.wall > 0.0) == ("", True)
+        assert (sample.failure, sample.cpu > 0.0) == ("", True)
     forces = [sample.values["mean queue force"] for sample in made[0]]
     assert len(set(forces)) == len(forces)
     assert told[0] == (0, 6, None)
@@ -256,7 +256,7 @@ def test_a_study_ends_with_its_budget_and_goes_on_with_a_larger_one(tmp_path: Pa
     pilot, undecided = made(1e-6, 0.0)
     assert [(sample.setting, sample.seed) for sample in pilot] == runs_of(FINE, COARSE, seeds=1)
     assert {row.verdict for row in undecided} == {"undecided"}
-    cost = sum(sample.wall for sample in pilot)
+    cost = sum(sample.cpu for sample in pilot)
     cut, _ = made(1e-6, 4.5 * cost)
     assert [(sample.setting, sample.seed) for sample in cut] == runs_of(FINE, COARSE, seeds=4)
     assert cut[:2] == pilot

@@ -34,6 +34,7 @@ def bare() -> Study:
         stiffness=(),
         skipped=(),
         answer=None,
+        rest=None,
     )
 
 
@@ -83,6 +84,7 @@ def test_equal_studies_give_equal_bytes_and_no_other_files(tmp_path: Path) -> No
         "points.csv",
         "orders.csv",
         "horizons.csv",
+        "resting.csv",
         "comparisons.csv",
         "stiffness.csv",
     }

@@ -14,12 +14,12 @@ from conveyor_sim.accuracy.results import Cost, Point
 
 
 def at(cost: float, error: float, stiffness: float = 1.0) -> Point:
-    return replace(point("rk4", 100, stiffness), cost=Cost(cost, cost, cost), errors=errors(error))
+    return replace(point("rk4", 100, stiffness), cost=Cost(cost, cost, cost), errors=errors(error), resting=None)
 
 
 def place(of: Point) -> tuple[float, float]:
     assert of.cost is not None and of.errors is not None
-    return of.cost.median, of.errors.peak_force
+    return of.cost.median, of.worst
 
 
 def beats(one: tuple[float, float], other: tuple[float, float]) -> bool:
@@ -33,6 +33,12 @@ def test_the_front_is_what_no_other_beats(seed: int) -> None:
     cloud = [at(rng.randint(1, 8), rng.randint(1, 8) / 100.0) for _ in range(30)]
     places = sorted(place(p) for p in cloud if not any(beats(place(other), place(p)) for other in cloud))
     assert [place(p) for p in front(cloud)] == places
+
+
+def test_the_larger_error_counts() -> None:
+    """What is exact in impacts alone is beaten by what is exact in both."""
+    creeps, both = replace(at(1.0, 0.001), resting=0.06), replace(at(2.0, 0.002), resting=0.001)
+    assert front([creeps, both, replace(at(3.0, 0.001), resting=0.05)]) == [creeps, both]
 
 
 def test_failures_are_left_out() -> None:

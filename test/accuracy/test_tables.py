@@ -11,6 +11,7 @@ from accuracy.studies import BLOWN, CHOSEN, OWN, REFERENCE, failed, study
 from rich.console import Console
 
 from conveyor_sim.accuracy.block import Block, Column
+from conveyor_sim.accuracy.lines import three_lines
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.tables import blocks, markdown, terminal
@@ -145,12 +146,32 @@ def test_the_settings_that_matter_are_marked() -> None:
     (point,) = [point for point in of.points if point.setting == CHOSEN]
     assert point.cost is not None and point.errors is not None
     assert column(work, "x real\ntime")[rows.index(chosen)] == digits(1.0 / point.cost.median)
-    assert column(work, "error, %\nmeasured")[rows.index(chosen)] == digits(100.0 * point.errors.peak_force)
+    assert column(work, "impacts\n%")[rows.index(chosen)] == digits(100.0 * point.errors.peak_force)
+    assert point.resting is not None
+    assert column(work, "resting\nload, %")[rows.index(chosen)] == digits(100.0 * point.resting)
+
+
+def test_both_errors_stand_beside_their_predictions() -> None:
+    of = study()
+    both = block(of, "Impacts and resting load")
+    (chosen,) = both.strong
+    (point,) = [point for point in of.points if point.setting == CHOSEN]
+    assert point.errors is not None and point.resting is not None
+    assert point.predicted is not None and point.predicted_resting is not None
+    numbers = (point.predicted, point.errors.peak_force, point.predicted_resting, point.resting)
+    assert chosen[2:] == (*(digits(100.0 * number) for number in numbers), digits(point.beyond))
+    assert "settled at 22 s" in both.notes[0]
+    assert "at twice the step it is another by 9e-5 %" in both.notes[0]
+    assert of.rest is not None
+    moving = replace(of, rest=replace(of.rest, setting=None, reason="the forces that last were still changing at 9 s"))
+    assert block(moving, "Impacts and resting load").notes == (
+        "Resting load: the forces that last were still changing at 9 s.",
+    )
 
 
 def test_a_method_without_a_prediction_has_a_dash() -> None:
-    work = block(study(), "Work and precision")
-    for integrator, predicted in zip(column(work, "integrator"), column(work, "error, %\npredicted"), strict=True):
+    work = block(study(), "Impacts and resting load")
+    for integrator, predicted in zip(column(work, "integrator"), column(work, "impacts, %\npredicted"), strict=True):
         assert (predicted == "-") == integrator.startswith(("linearly_implicit", "dormand_prince"))
 
 
@@ -209,7 +230,7 @@ def test_the_answer_is_last_with_its_doubts() -> None:
     of = study()
     assert of.answer is not None
     last = blocks(of)[-1]
-    assert (last.title, last.notes[0]) == ("Answer", of.answer.sentence)
+    assert (last.title, last.notes[:4]) == ("Answer", (*three_lines(of), of.answer.sentence))
     assert last.notes[-len(of.answer.doubts) :] == of.answer.doubts
     assert "Long runs have not accepted it." in last.notes
     accepted = replace(of, answer=replace(of.answer, accepted=True))
@@ -218,7 +239,9 @@ def test_the_answer_is_last_with_its_doubts() -> None:
 
 def test_a_study_that_found_nothing_has_an_answer_alone() -> None:
     assert [block.title for block in blocks(nothing())] == ["Answer"]
-    assert blocks(nothing())[0].notes == ("No setting that was tried keeps 1 % in peak force.",)
+    assert blocks(nothing())[0].notes[-1] == (
+        "No setting that was tried keeps 1 % in impacts and in resting load within every bound of stability."
+    )
     assert "### Answer" in markdown(nothing())
 
 

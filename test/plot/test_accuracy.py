@@ -132,6 +132,20 @@ def test_every_setting_that_did_not_fail_is_a_point_at_its_cost_and_error(figure
     assert softened == {place(p) for p in of.points if not p.failure and p.setting.stiffness != 1.0}
 
 
+def test_resting_load_is_an_open_marker_at_its_error(figures: dict[str, Figure]) -> None:
+    for name in RULES:
+        drawn = line(figures["pareto"], f"{name} resting")
+        assert drawn.get_markerfacecolor() == "none"
+        low = figures["pareto"].axes[0].get_ylim()[0]
+        expected = {
+            (p.cost.median, 100.0 * p.resting)
+            for p in study().points
+            if p.setting.integrator == name and p.cost is not None and p.resting is not None
+        }
+        assert {at for at in points_of(drawn) if at[1] > 1.2 * low} == {at for at in expected if at[1] > 1.2 * low}
+        assert len(points_of(drawn)) == len(expected)
+
+
 def test_points_of_an_integrator_are_joined_along_the_time_step(figures: dict[str, Figure]) -> None:
     of = study()
     along = sorted((p for p in of.points if p.setting.integrator == "rk4" and not p.failure), key=lambda p: p.dt)
@@ -141,7 +155,8 @@ def test_points_of_an_integrator_are_joined_along_the_time_step(figures: dict[st
 def test_front_recommended_own_and_tolerance_are_drawn(figures: dict[str, Figure]) -> None:
     of = study()
     figure = figures["pareto"]
-    assert points_of(line(figure, "front")) == [place(p) for p in front(of.points)]
+    corners = [(p.cost.median, 100.0 * p.worst) for p in front(of.points) if p.cost is not None]
+    assert points_of(line(figure, "front")) == corners
     by_setting = {p.setting: p for p in of.points}
     assert points_of(line(figure, "recommended")) == [place(by_setting[CHOSEN])]
     assert points_of(line(figure, "own")) == [place(by_setting[OWN])]

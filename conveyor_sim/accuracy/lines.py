@@ -1,0 +1,95 @@
+"""The answer in three lines, for somebody who has never heard of integrators: forces, throughput, cost."""
+
+from __future__ import annotations
+
+import math
+
+from conveyor_sim.accuracy.answer import eligible
+from conveyor_sim.accuracy.apply import line
+from conveyor_sim.accuracy.results import Answer, Comparison, Study
+from conveyor_sim.accuracy.words import digits, duration, percent
+
+FEW = 2
+"""Runs of a setting, fewer of which compare nothing."""
+
+
+def three_lines(study: Study) -> tuple[str, str, str]:
+    """How good forces are, how good throughput is, what it costs to be better; of the recommended setting."""
+    if study.answer is None:
+        return (
+            f"Forces: no setting that was tried is good to {percent(study.tolerance)}{_best(study)}.",
+            "Throughput: not looked at, for there is no setting to rely on.",
+            "Cost: none is known; try a larger --tolerance, or see why settings were left out (--details).",
+        )
+    return _forces(study, study.answer), _throughput(study, study.answer), _cost(study.answer)
+
+
+def summary(study: Study) -> list[str]:
+    """What the command prints: the three lines, the setting, what moving rails did, and what the study took."""
+    lines = list(three_lines(study))
+    if study.answer is not None:
+        lines.append(f"Setting: {line(study.answer.setting)} (--apply writes it into a copy of the scene)")
+    lines += [study.moving] if study.moving else []
+    if study.cpu is not None and study.compiling is not None:
+        lines.append(
+            f"The study took {duration(study.cpu)} of processor time, and {duration(study.compiling)} of compiling; "
+            "--details prints its tables."
+        )
+    return lines
+
+
+def _forces(study: Study, answer: Answer) -> str:
+    impacts = f"Forces: good to {percent(answer.error)} when bottles hit something"
+    if answer.resting is not None:
+        return f"{impacts}, and to {percent(answer.resting)} where they press for long (asked: {_asked(study)})."
+    why = "was not looked at" if study.rest is None else f"could not be compared: {study.rest.reason}"
+    return f"{impacts} (asked: {_asked(study)}); what presses for long {why}."
+
+
+def _asked(study: Study) -> str:
+    return percent(study.tolerance)
+
+
+def _throughput(study: Study, answer: Answer) -> str:
+    rows = [row for row in study.comparisons if row.setting == answer.setting]
+    runs = min((row.runs for row in rows), default=0)
+    only = "rely on this setting for impacts and resting forces only"
+    if runs < FEW:
+        return f"Throughput: not known, too few long runs were made; {only} (--thorough makes more)."
+    if answer.accepted:
+        what = _listed([row.observable for row in rows])
+        return f"Throughput: good to {percent(study.tolerance)}; {runs} long runs agree in {what}."
+    flow = next((row for row in rows if row.observable == "throughput"), None)
+    others = [row for row in rows if row.verdict != "equivalent" and row is not flow]
+    known = "nothing leaves or comes round in this scene" if flow is None else _known(flow)
+    rest = f"; {_listed([f'{row.observable} {_bounds(row)}' for row in others])}" if others else ""
+    return f"Throughput: {known}{rest}; {only} ({runs} long runs)."
+
+
+def _known(row: Comparison) -> str:
+    if row.verdict == "equivalent":
+        return f"good to {percent(row.tolerance)}"
+    if row.verdict == "different":
+        return f"off by {_bounds(row)}"
+    return f"not known better than {_bounds(row)}" if math.isfinite(row.resolution) else "not known"
+
+
+def _bounds(row: Comparison) -> str:
+    return f"+- {percent(row.resolution)}" if math.isfinite(row.resolution) else "not known"
+
+
+def _cost(answer: Answer) -> str:
+    speed = f"Cost: a second of the line takes {digits(1.0 / answer.speed)} s of one processor"
+    if answer.exacter_cost is None:
+        return f"{speed}; nothing tried is ten times better."
+    return f"{speed}; ten times better takes {digits(answer.exacter_cost)} times as long."
+
+
+def _best(study: Study) -> str:
+    """The least error of what ran within the bounds of stability, if anything did."""
+    found = min((point.worst for point in eligible(study.points, math.inf)), default=math.inf)
+    return f"; the best is good to {percent(found)}" if math.isfinite(found) else ""
+
+
+def _listed(texts: list[str]) -> str:
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
