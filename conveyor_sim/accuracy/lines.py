@@ -56,14 +56,14 @@ def _throughput(study: Study, answer: Answer) -> str:
     only = "rely on this setting for impacts and resting forces only"
     if runs < FEW:
         return f"Throughput: not known, too few long runs were made; {only} (--thorough makes more)."
-    if answer.accepted:
-        what = _listed([row.observable for row in rows])
-        return f"Throughput: good to {percent(study.tolerance)}; {runs} long runs agree in {what}."
     flow = next((row for row in rows if row.observable == "throughput"), None)
-    others = [row for row in rows if row.verdict != "equivalent" and row is not flow]
     known = "nothing leaves or comes round in this scene" if flow is None else _known(flow)
-    rest = f"; {_listed([f'{row.observable} {_bounds(row)}' for row in others])}" if others else ""
-    return f"Throughput: {known}{rest}; {only} ({runs} long runs)."
+    if answer.accepted:
+        what = "; ".join(row.observable for row in rows if row is not flow)
+        agreed = f"; to {_asked(study)} {runs} long runs agree in {what}" if what else f" in {runs} long runs"
+        return f"Throughput: {known}{agreed}."
+    others = [f"{row.observable} {_bounds(row)}" for row in rows if row.verdict != "equivalent" and row is not flow]
+    return f"Throughput: {'; '.join([known, *others])}; {only} ({runs} long runs)."
 
 
 def _known(row: Comparison) -> str:
@@ -89,7 +89,3 @@ def _best(study: Study) -> str:
     """The least error of what ran within the bounds of stability, if anything did."""
     found = min((point.worst for point in eligible(study.points, math.inf)), default=math.inf)
     return f"; the best is good to {percent(found)}" if math.isfinite(found) else ""
-
-
-def _listed(texts: list[str]) -> str:
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"

@@ -80,7 +80,9 @@ def _measure(scene: Scene, bars: Bars) -> Measured:
     with bars(f"{scene.name}: reference", "runs") as bar:
         reference = precision.make_reference(bar.update)
     with bars(f"{scene.name}: resting load", "s") as bar:
-        rest = precision.find_rest(bar.update)
+        precision.find_rest(bar.update)
+    with bars(f"{scene.name}: resting load, reference", "runs") as bar:
+        rest = precision.make_resting_reference(bar.update)
     with bars(f"{scene.name}: settings", "runs") as bar:
         points = precision.measure(candidates(scene), bar.update)
     skipped = [f"{name}: {reason}" for name, reason in {**without, **banned}.items()]

@@ -34,8 +34,9 @@ Progress = Callable[[float, float], None]
 class WorkPrecision:
     """Compares settings on a scene, which must run at the preset `standard`.
 
-    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, `find_rest`, then `measure`, as often
-    as there are settings; each tells its progress. SceneError or SimulationError if the scene does not run.
+    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, then `measure`, as often as there are
+    settings, and before it `find_rest` and `make_resting_reference` if resting load is to be looked at; each tells its
+    progress. SceneError or SimulationError if the scene does not run.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -53,10 +54,13 @@ class WorkPrecision:
         found = find_starts(self.scene, progress)
         self.starts, self.moving = found.starts, found.moving
 
-    def find_rest(self, progress: Progress) -> Rest:
-        """What errors in resting load are measured from; progress in simulated s, then in runs."""
+    def find_rest(self, progress: Progress) -> None:
+        """Look for a settled state, from which errors in resting load are measured; progress in simulated s."""
+        self.resting.settle(progress)
+
+    def make_resting_reference(self, progress: Progress) -> Rest:
+        """The resting forces that errors are measured against; progress in runs."""
         resting = self.resting
-        resting.settle(progress)
         if not resting.settled:
             return Rest(resting.reason, None, None, resting.window, 0, 0.0)
         resting.make_reference(progress)

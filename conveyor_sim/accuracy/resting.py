@@ -85,7 +85,8 @@ class RestingLoad:
     def settle(self, progress: Progress) -> None:
         """Run the scene in fine steps until the means of resting contacts stop changing; progress in simulated s.
 
-        Raises SimulationError if the run stops.
+        The last settled state of the scene's duration is kept, when the line is fullest; where there is none in it, the
+        first one after it. Raises SimulationError if the run stops.
         """
         fine = variant(self.scene, fine_setting(self.scene))
         limit, work, steady, rested = LONGER * self.scene.duration, 0.0, 0, False
@@ -98,8 +99,9 @@ class RestingLoad:
             rested = rested or now.force.size > 0
             steady = steady + 1 if change is not None and change <= SETTLED else 0
             before = now
-            if steady == IN_A_ROW:
+            if steady >= IN_A_ROW:
                 self._keep(fine, now)
+            if self.settled and fine.time + WINDOW > self.scene.duration:
                 break
         progress(limit, limit)
         if self.state is None:

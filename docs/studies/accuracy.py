@@ -1,6 +1,6 @@
 """The numbers behind docs/accuracy.md: runs the real command on the scenes below and renews the page's tables.
 
-    make accuracy                                   # all scenes, about half an hour on a machine that does nothing else
+    make accuracy                                   # all scenes, up to 10 min of two processors each
     make accuracy ARGS="funnel two_bottles"         # some of them
     make accuracy ARGS=--tables                     # measures nothing: tables and pictures anew, from docs/accuracy/
 

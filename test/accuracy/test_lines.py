@@ -46,7 +46,12 @@ def test_they_are_free_of_jargon(accepted: bool) -> None:
 
 def test_what_long_runs_accept_is_good_to_the_tolerance() -> None:
     of = with_runs(row("throughput", "equivalent", 0.004), row("spacing", "equivalent", 0.002), accepted=True)
-    assert three_lines(of)[1] == "Throughput: good to 1 %; 8 long runs agree in throughput and spacing."
+    queue = with_runs(row("mean queue force", "equivalent", 0.004), row("spacing", "equivalent", 0.002), accepted=True)
+    assert three_lines(queue)[1] == (
+        "Throughput: nothing leaves or comes round in this scene; "
+        "to 1 % 8 long runs agree in mean queue force; spacing."
+    )
+    assert three_lines(of)[1] == "Throughput: good to 1 %; to 1 % 8 long runs agree in spacing."
 
 
 def test_what_is_undecided_is_for_forces_only() -> None:
