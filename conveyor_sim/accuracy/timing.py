@@ -32,15 +32,15 @@ def costs_of(
     plans = {setting: _plan(simulation, state) for setting, simulation in simulations.items()}
     a_round = sum(max(CHUNK, spent) for _, _, spent in plans.values())
     rounds = min(ROUNDS[1], max(ROUNDS[0], int(budget / a_round))) if plans else 0
-    walls: dict[Setting, list[float]] = {setting: [] for setting in plans}
+    spent_by: dict[Setting, list[float]] = {setting: [] for setting in plans}
     for count in range(rounds):
         settings = list(plans)
         for index, setting in enumerate(settings if count % 2 == 0 else reversed(settings)):
             ticks, repeats, _ = plans[setting]
             spent = _run(simulations[setting], state, ticks, repeats)
-            walls[setting].append(spent / (repeats * ticks * simulations[setting].scene.tick))
+            spent_by[setting].append(spent / (repeats * ticks * simulations[setting].scene.tick))
             progress(count * len(settings) + index + 1, rounds * len(settings))
-    return {setting: Cost(median(found), min(found), max(found)) for setting, found in walls.items()}
+    return {setting: Cost(median(found), min(found), max(found)) for setting, found in spent_by.items()}
 
 
 def _plan(simulation: Simulation, state: Simulation) -> tuple[int, int, float]:

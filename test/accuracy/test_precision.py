@@ -71,7 +71,7 @@ def test_starts_of_a_line_that_goes_on() -> None:
         rails={"stop": segment((1.0, -1.0), (1.0, 1.0))},
         bottles=[bottle(0.0, 0.0), bottle(-0.2, 0.0)],
     )
-    starts = find_starts(again, silent)
+    starts = find_starts(again, silent).starts
     assert [start.untouched for start in starts] == [True] + [False] * (len(starts) - 1)
     assert len(starts) >= 3
     ticks = [start.simulation.tick for start in starts]
