@@ -29,8 +29,8 @@ NOTHING = 1e-6
 def eligible(points: Sequence[Point], tolerance: float) -> list[Point]:
     """Settings that may be relied on for forces, cheapest first.
 
-    They have the scene's own stiffness, did not fail, keep the tolerance in impacts and in resting load, and are within
-    every bound of stability.
+    They have the scene's own stiffness, did not fail, keep the tolerance in impacts and in resting load (as predicted,
+    where it could not be measured), and are within every bound of stability.
     """
     kept = [point for point in points if point.setting.stiffness == 1.0 and _trusted(point, tolerance)]
     return sorted(kept, key=lambda point: (_cost(point), point.setting.key))
@@ -50,10 +50,8 @@ def find_answer(
         return None
     trusted = [point for point in kept if point.setting not in refuted] or kept[-1:]
     trusted = [point for point in trusted if not _exceeded(point, reference, rest)] or trusted
-    chosen = min(
-        (point for point in trusted if _cost(point) <= NEAR * _cost(trusted[0])), key=lambda point: point.worst
-    )
-    exacter = next(iter(eligible(points, chosen.worst / EXACTER)), None)
+    chosen = min((point for point in trusted if _cost(point) <= NEAR * _cost(trusted[0])), key=largest_error)
+    exacter = next(iter(eligible(points, largest_error(chosen) / EXACTER)), None)
     of_chosen = [row for row in comparisons if row.setting == chosen.setting]
     return Answer(
         setting=chosen.setting,
@@ -61,13 +59,19 @@ def find_answer(
         error=_error(chosen),
         speed=1.0 / _cost(chosen),
         exacter=None if exacter is None else exacter.setting,
-        exacter_error=None if exacter is None else exacter.worst,
+        exacter_error=None if exacter is None else largest_error(exacter),
         exacter_cost=None if exacter is None else _cost(exacter) / _cost(chosen),
         sentence=_sentence(chosen, exacter),
         accepted=bool(of_chosen) and all(row.verdict == "equivalent" for row in of_chosen),
         doubts=tuple(_doubts(chosen, reference, rest, of_chosen, refuted)),
         resting=chosen.resting,
     )
+
+
+def largest_error(point: Point) -> float:
+    """In impacts and in resting load; where that could not be measured, what is predicted of it."""
+    resting = point.predicted_resting if point.resting is None else point.resting
+    return max(_error(point), resting or 0.0)
 
 
 def foretelling(point: Point) -> str:
@@ -152,7 +156,7 @@ def _doubts(
 
 def _trusted(point: Point, tolerance: float) -> bool:
     stable = point.beyond is None or point.beyond <= 1.0 + 1e-12
-    return not point.failure and point.cost is not None and stable and point.worst <= tolerance
+    return not point.failure and point.cost is not None and stable and largest_error(point) <= tolerance
 
 
 def _error(point: Point) -> float:

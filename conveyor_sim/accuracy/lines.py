@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from conveyor_sim.accuracy.answer import eligible
+from conveyor_sim.accuracy.answer import eligible, largest_error
 from conveyor_sim.accuracy.apply import line
 from conveyor_sim.accuracy.results import Answer, Comparison, Study
 from conveyor_sim.accuracy.words import digits, duration, percent
@@ -42,8 +42,10 @@ def _forces(study: Study, answer: Answer) -> str:
     impacts = f"Forces: good to {percent(answer.error)} when bottles hit something"
     if answer.resting is not None:
         return f"{impacts}, and to {percent(answer.resting)} where they press for long (asked: {_asked(study)})."
-    why = "was not looked at" if study.rest is None else f"could not be compared: {study.rest.reason}"
-    return f"{impacts} (asked: {_asked(study)}); what presses for long {why}."
+    why = "was not looked at" if study.rest is None else f"could not be compared ({study.rest.reason})"
+    foretold = next((point.predicted_resting for point in study.points if point.setting == answer.setting), None)
+    likely = "" if foretold is None else f", and is predicted to be good to {percent(foretold)}"
+    return f"{impacts} (asked: {_asked(study)}); what presses for long {why}{likely}."
 
 
 def _asked(study: Study) -> str:
@@ -87,5 +89,5 @@ def _cost(answer: Answer) -> str:
 
 def _best(study: Study) -> str:
     """The least error of what ran within the bounds of stability, if anything did."""
-    found = min((point.worst for point in eligible(study.points, math.inf)), default=math.inf)
+    found = min((largest_error(point) for point in eligible(study.points, math.inf)), default=math.inf)
     return f"; the best is good to {percent(found)}" if math.isfinite(found) else ""

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Protocol
 
-from conveyor_sim.accuracy.answer import eligible, find_answer
+from conveyor_sim.accuracy.answer import eligible, find_answer, largest_error
 from conveyor_sim.accuracy.candidates import own_setting, softer
 from conveyor_sim.accuracy.equivalence import run_until_decided
 from conveyor_sim.accuracy.files import write_study
@@ -135,7 +135,7 @@ def _long_reference(points: Sequence[Point], found: Answer) -> Setting | None:
     error = max(found.error, found.resting or 0.0)
     exact = eligible(points, EXACT * error)
     exacter = [point for point in eligible(points, error) if point.setting != found.setting]
-    by_error = sorted(exacter, key=lambda point: point.worst)
+    by_error = sorted(exacter, key=largest_error)
     return next((point.setting for point in [*exact, *by_error]), None)
 
 

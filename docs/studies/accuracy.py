@@ -40,7 +40,15 @@ FOLDER = ROOT / "docs" / "accuracy"
 
 TRUE, SOFTER = "stiffness: 100000000 ", "stiffness: 10000000  "
 
-SCENES = ("paper_plant", "accumulation_table", "glass_line", "glass_line_1e7", "funnel", "two_bottles")
+SCENES = (
+    "paper_plant",
+    "accumulation_table",
+    "turntable",
+    "glass_line",
+    "glass_line_1e7",
+    "funnel",
+    "two_bottles",
+)
 KEPT = ("*.csv", "study.json", "pareto.png", "stiffness.png", "scene.yaml")
 
 

@@ -94,6 +94,12 @@ def test_resting_load_counts_beside_impacts() -> None:
     assert "0.06 % in impacts and 0.03 % in resting load" in answer.sentence
 
 
+def test_where_nothing_settles_the_prediction_of_resting_load_counts() -> None:
+    creeping = [replace(MIDDLE, predicted_resting=0.025), replace(VERLET, predicted_resting=0.0)]
+    assert [p.setting for p in eligible(creeping, 0.01)] == [VERLET.setting]
+    assert eligible([replace(creeping[0], resting=0.009)], 0.01) != []
+
+
 def test_a_step_beyond_stability_is_never_recommended() -> None:
     """However exact it was found, and even if nothing else is left."""
     shaky = replace(MIDDLE, beyond=1.99)

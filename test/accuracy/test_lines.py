@@ -81,7 +81,8 @@ def test_a_scene_that_never_settles_says_so() -> None:
     rest = replace(of.rest, setting=None, reason="the forces that last were still changing at 9 s")
     never = replace(of, rest=rest, answer=replace(of.answer, resting=None))
     assert three_lines(never)[0].endswith(
-        "(asked: 1 %); what presses for long could not be compared: the forces that last were still changing at 9 s."
+        "(asked: 1 %); what presses for long could not be compared (the forces that last were still changing at 9 s), "
+        "and is predicted to be good to 0.042 %."
     )
 
 
