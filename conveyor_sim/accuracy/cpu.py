@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import time
 from contextlib import AbstractContextManager
-from types import TracebackType
 
-from numba.core import event
+from conveyor_sim.engine.compile_time import CompileTime
 
 
 def cpu_time() -> float:
@@ -16,38 +15,27 @@ def cpu_time() -> float:
     return time.process_time() + times.children_user + times.children_system
 
 
-class Meter(AbstractContextManager["Meter"], event.Listener):
-    """What this process takes between entering and leaving."""
+class Meter(AbstractContextManager["Meter"]):
+    """What this process takes from entering to leaving."""
 
     def __init__(self) -> None:
-        self.compiling = 0.0
+        self._compile_time = CompileTime(cpu_time)
+        self._began = cpu_time()
+
+    @property
+    def compiling(self) -> float:
         """s of processor time so far in which numba compiled."""
-        self._depth = 0
-        self._began = self._compile_began = 0.0
+        return self._compile_time.spent
 
     @property
     def cpu(self) -> float:
         """s of processor time so far, compiling left out."""
         return cpu_time() - self._began - self.compiling
 
-    def on_start(self, _event: event.Event) -> None:
-        """Numba begins to compile something, perhaps inside of something else."""
-        if self._depth == 0:
-            self._compile_began = cpu_time()
-        self._depth += 1
-
-    def on_end(self, _event: event.Event) -> None:
-        """It is done with it."""
-        self._depth -= 1
-        if self._depth == 0:
-            self.compiling += cpu_time() - self._compile_began
-
     def __enter__(self) -> Meter:
         self._began = cpu_time()
-        event.register("numba:compile", self)  # type: ignore[no-untyped-call]
+        self._compile_time.begin()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        event.unregister("numba:compile", self)  # type: ignore[no-untyped-call]
+    def __exit__(self, *_: object) -> None:
+        self._compile_time.end()

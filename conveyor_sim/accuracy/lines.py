@@ -54,7 +54,7 @@ def _asked(study: Study) -> str:
 
 def _throughput(study: Study, answer: Answer) -> str:
     rows = [row for row in study.comparisons if row.setting == answer.setting]
-    runs = min((row.runs for row in rows), default=0)
+    runs = max((row.runs for row in rows), default=0)
     only = "rely on this setting for impacts and resting forces only"
     if runs < FEW:
         return f"Throughput: not known, too few long runs were made; {only} (--thorough makes more)."

@@ -1,15 +1,11 @@
-"""Moving rails move in a study, and processor time is told apart from compiling."""
+"""Moving rails move in a study."""
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
-import numba
-import pytest
 from scenes import base, bottle, contact, scene
 
-from conveyor_sim.accuracy.cpu import Meter
 from conveyor_sim.accuracy.exercise import Exercise
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.starts import STROKED, find_starts
@@ -82,15 +78,3 @@ def test_a_scene_without_moving_rails_has_no_exercise() -> None:
     run = variant(it, Setting("semi_implicit_euler", 10))
     Exercise(it).command(run)
     assert list(run.waiting) == []
-
-
-def test_to_wait_costs_nothing_and_to_compile_is_told_apart() -> None:
-    with Meter() as meter:
-        time.sleep(0.5)
-        waited = meter.cpu
-        began = time.process_time()
-        numba.njit(lambda x: x + 1)(1)
-        compiled = time.process_time() - began
-    assert waited < 0.25
-    assert meter.compiling == pytest.approx(compiled, rel=0.5)
-    assert meter.cpu < waited + 0.5 * compiled
