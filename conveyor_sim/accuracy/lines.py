@@ -25,10 +25,11 @@ def three_lines(study: Study) -> tuple[str, str, str]:
 
 
 def summary(study: Study) -> list[str]:
-    """What the command prints: the three lines, the setting, what moving rails did, and what the study took."""
+    """What the command prints: the three lines, the setting, the scene's own, moving rails, what the study took."""
     lines = list(three_lines(study))
     if study.answer is not None:
         lines.append(f"Setting: {line(study.answer.setting)} (--apply writes it into a copy of the scene)")
+    lines += [own] if (own := _own(study)) else []
     lines += [study.moving] if study.moving else []
     if study.cpu is not None and study.compiling is not None:
         lines.append(
@@ -36,6 +37,19 @@ def summary(study: Study) -> list[str]:
             "--details prints its tables."
         )
     return lines
+
+
+def _own(study: Study) -> str:
+    """What the scene's own setting is worth, where another is recommended."""
+    point = next((point for point in study.points if point.setting == study.own), None)
+    if point is None or (study.answer is not None and study.answer.setting == study.own):
+        return ""
+    if point.errors is None:
+        return f"The scene's own setting fails: {point.failure}."
+    resting = "" if point.resting is None else f" and {percent(point.resting)} in resting load"
+    beyond = point.beyond is not None and point.beyond > 1.0
+    shaky = f", and its step is {digits(point.beyond)} x beyond a bound of stability" if beyond else ""
+    return f"The scene's own setting is off by {percent(point.errors.peak_force)} in impacts{resting}{shaky}."
 
 
 def _forces(study: Study, answer: Answer) -> str:

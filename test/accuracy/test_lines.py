@@ -97,5 +97,9 @@ def test_below_them_the_setting_and_what_the_study_took() -> None:
     lines = summary(of)
     assert tuple(lines[:3]) == three_lines(of)
     assert "accuracy: {integrator: velocity_verlet, per_tick: 100}" in lines[3]
-    assert lines[4] == of.moving
-    assert "412 s of processor time, and 75 s of compiling" in lines[5]
+    assert lines[4].startswith("The scene's own setting is off by 0.")
+    assert lines[4].endswith(" % in impacts and 2.4 % in resting load.")
+    assert lines[5] == of.moving
+    assert "412 s of processor time, and 75 s of compiling" in lines[6]
+    shaky = tuple(replace(point, beyond=1.99) if point.setting == of.own else point for point in of.points)
+    assert summary(replace(of, points=shaky))[4].endswith(", and its step is 1.99 x beyond a bound of stability.")
