@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, impact_speed, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
 from conveyor_sim.laws import base_friction
 from conveyor_sim.methods import Share
 from conveyor_sim.prediction import Term
@@ -32,7 +32,9 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
     bounds = []
     if terms.method.explicit:
         reason = f"half of v_lim / (mu g) at mu = {mu:g}"
-        bounds.append(Bound("base friction", base_friction_bound(mu, g, limit), reason, stability=True))
+        bounds.append(
+            Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
+        )
     # On a belt that turns, what rests is off by one part in these steps: by no more than the tolerance.
     turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
     if (steps := max(_slip_steps(terms), turning)) > 0.0:
@@ -103,7 +105,7 @@ def _ring_bounds(terms: Terms) -> list[Bound]:
             spin = time * kind.moment_of_inertia / (kind.mass * kind.base_radius**2)
             reason = f"v_lim J / (mu g m R_b^2) at mu = {mu:g}, R_b = {kind.base_radius:g} m"
             if terms.method.explicit:
-                stable.append((0.5 * spin, f"half of {reason}"))
+                stable.append(drag_bound(terms, 0.5 * spin, f"half of {reason}"))
             if steps > 0.0:
                 exact.append((spin / steps, f"{steps:.3g} steps in {reason}"))
     return [*tightest("spin on the base", stable, stability=True), *tightest("base spin", exact)]

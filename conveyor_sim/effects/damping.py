@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 
 from conveyor_sim.effects.contacts import contacts_in_use
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, deepest, frequency, impact_speed, meetings, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, impact_speed, meetings, tightest
 from conveyor_sim.laws import damping_effect
 from conveyor_sim.methods import Share
 from conveyor_sim.scene.schema import Scene
@@ -31,7 +31,9 @@ def _bounds(name: str, dashpot: Callable[[Meeting, Terms], tuple[float, str]]) -
         if not terms.method.explicit:
             return []
         found = [(*dashpot(meeting, terms), meeting.reduced_mass) for meeting in meetings(terms)]
-        return tightest(name, [(damping_bound(c, reduced), said) for c, said, reduced in found if c > 0.0], True)
+        return tightest(
+            name, [drag_bound(terms, damping_bound(c, reduced), said) for c, said, reduced in found if c > 0.0], True
+        )
 
     return bounds
 

@@ -9,6 +9,7 @@ from conveyor_sim.effects.terms import (
     Meeting,
     Terms,
     deepest,
+    drag_bound,
     frequency,
     impact_speed,
     meetings,
@@ -42,7 +43,7 @@ def _contact_friction_bounds(terms: Terms) -> list[Bound]:
                 mu, force, kind.mass, kind.moment_of_inertia, kind.radius, terms.scene.slip_limit
             )
             at = f"at mu = {mu:g} and N = {force:.3g} N, a single-file queue of {queue}"
-            candidates.append((dt, f"v_lim / [2 mu (1/m + R^2/J) N] {at}"))
+            candidates.append(drag_bound(terms, dt, f"v_lim / [2 mu (1/m + R^2/J) N] {at}"))
     return tightest("contact friction", candidates, stability=True)
 
 
@@ -123,7 +124,7 @@ def _spring_bounds(terms: Terms) -> list[Bound]:
             reason = f"{terms.steps:.3g} steps in pi sqrt(m_t / k_t) of {meeting.what} at k_t = {k:g} N/m"
             springs.append((contact_time(k, mass) / terms.steps, reason))
         if c > 0.0:
-            dashpots.append((damping_bound(c, mass), f"m_t / (2 c_t) at c_t = {c:g} kg/s"))
+            dashpots.append(drag_bound(terms, damping_bound(c, mass), f"m_t / (2 c_t) at c_t = {c:g} kg/s"))
     return [*tightest("tangential spring", springs), *tightest("tangential damping", dashpots, stability=True)]
 
 

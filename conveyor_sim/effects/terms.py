@@ -103,6 +103,12 @@ def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool
     return [Bound(name, dt, reason, stability)]
 
 
+def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
+    """Semi-implicit Euler's bound (s) on a drag, a dashpot or friction at rest, as the scene's integrator has it."""
+    limit = terms.method.drag_limit
+    return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
+
+
 def most_bottles(scene: Scene) -> int | None:
     """Bottles that a run can hold at most, None if an infeed has no end."""
     fed = 0

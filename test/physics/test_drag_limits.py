@@ -1,0 +1,123 @@
+"""How long a step may be for a drag, that is for friction at rest: gamma dt = 2, 1 and 2.785 for the explicit methods.
+
+Bounds on the time step scale with it (`Method.drag_limit`), so that each integrator keeps the same margin.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import MASS, RADIUS, base, belt, bottle, contact, scene
+from worlds import ALONE, FAR, state_of
+
+from conveyor_sim.engine.integrators import INTEGRATORS, START
+from conveyor_sim.methods import METHODS
+from conveyor_sim.model import build_model
+from conveyor_sim.state import State
+
+LIMIT, MU, G = 1e-5, 0.5, 9.81
+"""v_lim (m/s) is so low that steps in question are far too short for the springs to matter."""
+K, DEPTH = 5000.0, 1e-4
+LIMITS = {"semi_implicit_euler": 2.0, "velocity_verlet": 1.0, "rk4": 2.785}
+STEPS = 300
+
+
+def resting(integrator: str, points: Any, floor: float) -> State:
+    given = scene(
+        accuracy={"integrator": integrator},
+        contacts=[contact(K, friction=MU)],
+        floor={"friction": floor},
+        slip_limit=LIMIT,
+        lever_arm="radius",
+        gravity=G,
+        bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
+    )
+    # So little slip that friction is a drag.
+    velocities = 1e-3 * LIMIT * np.random.default_rng(1).uniform(-1.0, 1.0, (len(points), 2))
+    return state_of(given, points, velocities)
+
+
+def shaking(state: State, integrator: str, dt: float) -> float:
+    """Largest change of speed (m/s) that the last forces make in a step, after STEPS steps in one call.
+
+    Velocity Verlet shakes in its forces and between its steps, and hardly in its velocities.
+    """
+    INTEGRATORS[integrator](state.world, ALONE, STEPS, dt, START)
+    spin, load, bottles = state.world.spin, state.world.load, state.world.bottles
+    assert spin is not None
+    turned = RADIUS * np.abs(spin.moment * spin.inverse_inertia)
+    # In a packing the turning alone: normal forces stay.
+    pushed = np.hypot(load.fx, load.fy) * bottles.inverse_mass if state.world.bottles.id.max() == 0 else 0.0 * turned
+    return dt * float(max(pushed.max(), turned.max()))
+
+
+def packing() -> tuple[list[tuple[float, float]], float]:
+    """A bottle with six around it, all pressed into each other by DEPTH, and gamma (1/s) of its fastest shear."""
+    apart = 2.0 * RADIUS - DEPTH
+    ring = [(apart * math.cos(k * math.pi / 3.0), apart * math.sin(k * math.pi / 3.0)) for k in range(6)]
+    points = np.array([(0.0, 0.0), *ring])
+    drag = np.zeros((21, 21))
+    for i in range(7):
+        for j in range(i):
+            away = points[j] - points[i]
+            if np.hypot(*away) < apart + 0.1 * DEPTH:
+                nx, ny = away / apart
+                slip = np.zeros(21)
+                # vx, vy and R omega, which has the inertia of the mass for a hoop.
+                slip[3 * i : 3 * i + 3] = -ny, nx, 1.0
+                slip[3 * j : 3 * j + 3] = ny, -nx, 1.0
+                drag += 2.0 * MU * K * DEPTH / (LIMIT * MASS) * np.outer(slip, slip)
+    return [(float(x), float(y)) for x, y in points], float(np.linalg.eigvalsh(drag)[-1])
+
+
+@pytest.mark.parametrize("integrator", LIMITS)
+def test_a_bottle_on_a_floor(integrator: str) -> None:
+    """gamma = 2 mu g / v_lim; beyond the limit it shakes within v_lim, for good."""
+    gamma = 2.0 * MU * G / LIMIT
+    for share, calm in [(0.9, True), (1.1, False)]:
+        state = resting(integrator, [(0.0, 0.0)], MU)
+        shaken = shaking(state, integrator, share * LIMITS[integrator] / gamma)
+        assert shaken < 1e-6 * LIMIT if calm else shaken > 0.01 * LIMIT
+
+
+@pytest.mark.parametrize("integrator", LIMITS)
+def test_a_hexagonal_packing_under_pressure(integrator: str) -> None:
+    points, gamma = packing()
+    for share, calm in [(0.9, True), (1.1, False)]:
+        # On a floor that is as good as smooth: the kernels are those of the bottle on a floor.
+        state = resting(integrator, points, 1e-9)
+        spin = state.world.spin
+        assert spin is not None
+        spin.omega[:7] = 1e-3 * LIMIT / RADIUS * np.random.default_rng(2).uniform(-1.0, 1.0, 7)
+        shaken = shaking(state, integrator, share * LIMITS[integrator] / gamma)
+        assert shaken < 1e-6 * LIMIT if calm else shaken > 0.01 * LIMIT
+
+
+@pytest.mark.parametrize("integrator", LIMITS)
+def test_bounds_keep_the_same_share_of_the_limit(integrator: str) -> None:
+    """Of friction half, of a dashpot a quarter: in a packing, gamma is three times that of two bottles."""
+    assert METHODS[integrator].drag_limit == pytest.approx(0.5 * LIMITS[integrator], rel=2e-3)
+    tangential = {"tangential": {"stiffness": 1e3, "damping": 2.0}} if integrator == "semi_implicit_euler" else {}
+    model = build_model(
+        scene(
+            accuracy={"integrator": integrator},
+            contacts=[contact(K, friction=MU, damping=("normal", 3.0), **tangential)],
+            base=base(MU),
+            belts={"belt": belt(0.1)},
+            bottle_types={"bottle": {"radius": RADIUS, "mass": MASS, "material": "glass", "base_radius": 0.5 * RADIUS}},
+            bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)],
+            gravity=G,
+            slip_limit=LIMIT,
+        )
+    )
+    gammas = {
+        "base friction": 2.0 * MU * G / LIMIT,
+        "spin on the base": 0.25 * 2.0 * MU * G / LIMIT,
+        "normal damping": 2.0 * 3.0 / (MASS / 2.0),
+        "tangential damping": 2.0 * 2.0 / (MASS / 4.0),
+        "contact friction": 2.0 * MU * (2.0 / MASS) * (2.0 * MU * MASS * G) / LIMIT,
+    }
+    shares = {b.name: gammas[b.name] * b.dt / LIMITS[integrator] for b in model.bounds if b.name in gammas}
+    assert shares.keys() >= {"base friction", "spin on the base", "normal damping"}
+    assert shares == pytest.approx(dict.fromkeys(shares, 0.5), rel=2e-3)
