@@ -29,9 +29,9 @@ from conveyor_sim.engine.arrays import (
     World,
 )
 from conveyor_sim.engine.integrator_arrays import Blocks, Linear, PairTangent, Slopes, Stage, Triple
-from conveyor_sim.engine.integrators import LINEAR, SLOPES, STAGED
+from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED
 from conveyor_sim.engine.ledger import BELTS
-from conveyor_sim.engine.moving_arrays import MovingRails
+from conveyor_sim.engine.moving_arrays import MovingRails, MovingSprings
 from conveyor_sim.engine.slots import WIDTH
 from conveyor_sim.engine.team import UNIT
 from conveyor_sim.model import Model
@@ -101,6 +101,7 @@ def empty_world(model: Model, slots: int) -> World:
         load=Load(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
         peaks=Peaks(reals(), reals()) if peaks else None,
         stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
+        path=_triple(slots) if model.integrator in ON_PATHS and _has_springs(model) else None,
         slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
         linear=_linear(slots) if model.integrator in LINEAR else None,
         implicit=Implicit(reals(), reals(), reals()) if model.has("implicit_friction") else None,
@@ -140,7 +141,15 @@ def _moving(model: Model, slots: int) -> MovingRails | None:
         return None
     pieces = sum(len(rail.pieces) for rail in model.rails_at_rest)
     rails, ledger = len(model.rails_at_rest), model.has("energy_ledger")
-    return moving_arrays(model.moving_shapes, model.rail_materials, rails, pieces, slots, ledger)
+    moving = moving_arrays(model.moving_shapes, model.rail_materials, rails, pieces, slots, ledger)
+    if model.rail_law is None or model.rail_law.tangential_stiffness is None:
+        return moving
+    count = len(model.moving_shapes)
+    return moving._replace(springs=MovingSprings(np.zeros((slots, count)), np.zeros(count)))
+
+
+def _has_springs(model: Model) -> bool:
+    return any(law is not None and law.tangential_stiffness is not None for law in (model.pair_law, model.rail_law))
 
 
 def _surface(model: Model) -> Surface | None:

@@ -11,6 +11,7 @@ import numpy as np
 from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of, prediction_of
 from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.engine.integrators import AHEAD
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws import BaseSprings, Laws, build_laws
 from conveyor_sim.mouths import cut_at_mouths
@@ -126,6 +127,7 @@ def build_model(scene: Scene) -> Model:
         place = Places(scene).of(("accuracy",))
         raise SceneError(f"{place}: accuracy: {reason}; expected at most {MOST_STEPS} steps a tick")
     dt = scene.tick_ns * 1e-9 / steps
+    ahead, at_once = AHEAD.get(scene.accuracy.integrator, (1.0, 0.0))
     return Model(
         name=scene.name,
         dt=dt,
@@ -159,6 +161,8 @@ def build_model(scene: Scene) -> Model:
             reach=2.0 * float(radius[0]),
             atan=1 if "atan_friction" in on else None,
             error=terms.step_error,
+            ahead=ahead,
+            at_once=at_once,
         ),
         pair_law=laws.pair,
         rail_law=laws.rail,

@@ -61,6 +61,7 @@ def moving_arrays(
         course=course,
         clock=np.zeros(1),
         actuators=_actuators(shapes, slots, ledger),
+        springs=None,
     )
 
 
@@ -88,10 +89,17 @@ def pushes(slots: int, rails: int, columns: int) -> F8:
 
 def for_slots(moving: MovingRails | None, slots: int) -> MovingRails | None:
     """The same rails beside more slots of bottles."""
-    if moving is None or moving.actuators is None:
-        return moving
-    _, rails, columns = moving.actuators.push.shape
-    return moving._replace(actuators=moving.actuators._replace(push=pushes(slots, rails, columns)))
+    if moving is None:
+        return None
+    actuators, springs = moving.actuators, moving.springs
+    if actuators is not None:
+        _, rails, columns = actuators.push.shape
+        actuators = actuators._replace(push=pushes(slots, rails, columns))
+    if springs is not None:
+        elongation = np.zeros((slots, springs.elongation.shape[1]))
+        elongation[: len(springs.elongation)] = springs.elongation
+        springs = springs._replace(elongation=elongation)
+    return moving._replace(actuators=actuators, springs=springs)
 
 
 def fastest_rail(moving: MovingRails | None) -> float:

@@ -73,6 +73,8 @@ class State:
         for near in (world.near_segments, world.near_arcs):
             if near is not None and near.springs is not None:
                 drop_near_springs(near, near.springs, slot)
+        if world.moving is not None and world.moving.springs is not None:
+            world.moving.springs.elongation[slot] = 0.0
         world.neighbourhood.stale[0] = 1
 
     def take(self, other: "State") -> None:
@@ -145,6 +147,9 @@ class State:
             entry = np.maximum(static.belt, 0) * static.types + world.bottles.type
             held = np.flatnonzero((static.belt >= 0) & (static.stiffness[entry] > 0.0))
             parts += [held, static.belt[held], static.x[held], static.y[held]]
+        if world.moving is not None and world.moving.springs is not None:
+            bottle, rail = np.nonzero(world.moving.springs.elongation)
+            parts += [bottle, rail, world.moving.springs.elongation[bottle, rail]]
         return b"".join(part.tobytes() for part in parts)
 
     def moving_rails(self) -> tuple[RailShape, ...]:

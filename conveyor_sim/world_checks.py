@@ -28,6 +28,8 @@ SCRATCH = (
     "spin.moment",
     "load.",
     "stage.",
+    "path.",
+    "moving.springs.path",
     "slopes.",
     "linear.",
     "implicit.",

@@ -152,7 +152,12 @@ ATAN_FRICTION = Effect(
 )
 IMPLICIT_FRICTION = Effect(
     name="implicit_friction",
-    law="friction of the slip at the end of a step, with the mass of a bottle split among its contacts",
+    law="friction of the slip at the end of a step, with the mass of a bottle split among its contacts; with "
+    "velocity Verlet and rk4 it is explicit friction, and as exact, up to gamma dt = 2/3 and 1, with gamma = 2 "
+    "mu N / (m_t v_lim) times the closed contacts; a longer step looks ahead by what it is longer: friction is "
+    "then full from a slip of 1.5 and 1 times mu N dt / m_t on, not from v_lim, and gives way to a pull the "
+    "faster; none with dormand_prince, which divides its steps, and linearly_implicit, which solves for "
+    "friction itself",
     source="added",
     called_for=_implicit,
     absent="friction_solver is explicit, or nothing has friction",
@@ -163,7 +168,9 @@ TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
     law="a spring along the contact, drawn out by the slip, its force at most mu N; with stiffness_ratio its stiffness "
     "is that ratio times dN/d delta of a Hertz contact: where it grows the spring keeps its force, where it falls its "
-    "elongation",
+    "elongation; at rails that move by the slip along them; with semi-implicit Euler, velocity Verlet (order 2) and "
+    "rk4 (order 4 while it sticks, 2 where it begins to slide), which cut it once a step; dormand_prince gives steps "
+    "up and linearly_implicit solves for all velocities at once: they take none",
     source="Cundall and Strack 1979; Mindlin 1949, Thornton, Cummins and Cleary 2013",
     called_for=_spring,
     absent="no contact with tangential, or no friction in contacts",

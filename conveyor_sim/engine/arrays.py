@@ -160,6 +160,8 @@ class Gathered(NamedTuple):
     """(BLOCK,), R omega of i and of j together, m/s, where radii differ."""
     ease: F8
     """(BLOCK,), dt/m_t, s/kg, for the implicit solver."""
+    way: F8
+    """(4 * BLOCK,), how far j has gone less i, x and y (m), how far both have turned (rad), and their rims (m)."""
 
 
 class Slots(NamedTuple):
@@ -183,7 +185,7 @@ class Implicit(NamedTuple):
     closed: F8
     """Closed contacts of each bottle, its base among them."""
     ease: F8
-    """dt times mobility times closed contacts, s/kg."""
+    """dt times mobility times closed contacts, s/kg, times `Settings.ahead`."""
 
 
 class Ends(NamedTuple):
@@ -442,6 +444,10 @@ class Settings(NamedTuple):
     """None: the polynomial friction curve; 1: the arctangent."""
     error: float
     """m/s, largest error of a step; for the integrators that choose their own."""
+    ahead: float
+    """Steps by which implicit friction looks ahead, less `at_once`: see `friction.py`."""
+    at_once: float
+    """Share of v_lim that friction may take of a slip without looking ahead."""
 
 
 class World(NamedTuple):
@@ -453,6 +459,8 @@ class World(NamedTuple):
     load: Load
     peaks: Peaks | None
     stage: Stage | None
+    path: Triple | None
+    """m, m, rad: how far each bottle has gone since tangential springs were last kept; None: they follow the slip."""
     slopes: Slopes | None
     linear: Linear | None
     implicit: Implicit | None

@@ -86,8 +86,9 @@ def _quotient(
 ) -> float:
     if implicit is None:
         return regularisation(speed, settings.slip_limit, atan)
-    b = dt * footing.pull[i] * bottles.inverse_mass[i] * implicit.closed[i] / settings.slip_limit
-    return implicit_regularisation(speed, b, settings.slip_limit, atan)
+    ahead = settings.ahead * dt
+    b = ahead * footing.pull[i] * bottles.inverse_mass[i] * implicit.closed[i] / settings.slip_limit - settings.at_once
+    return implicit_regularisation(speed, 0.0 if b < 0.0 else b, settings.slip_limit, atan)
 
 
 @part

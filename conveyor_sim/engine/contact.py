@@ -35,7 +35,7 @@ def contact_force(
     share: effective over geometric overlap, 1 for a contact on its own; it scales the law as a whole.
     closing: m/s, relative velocity (a less b) along n. slip: m/s, relative velocity of the contact points along t.
     atan: which friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None.
-    implicit: dt/m_t in s/kg for friction at the slip after the step, or None.
+    implicit: (dt/m_t times `Settings.ahead`, s/kg, `Settings.at_once`) for implicit friction, or None.
     """
     depth = 0.0 if overlap < 0.0 else overlap
     normal = elastic_force(law.stiffness, law.hertz, law.curve, curves, e, depth)
@@ -145,7 +145,9 @@ def _tangential_stiffness(stiffness: Any, mindlin: Any, e: int, depth: float) ->
 def _curve_share(most: float, slip: float, slip_limit: float, atan: Any, implicit: Any) -> float:
     if implicit is None:
         return friction_share(slip, slip_limit, atan)
-    return implicit_share(slip, most * implicit * (1.0 / slip_limit), slip_limit, atan)
+    ease, at_once = implicit
+    b = most * ease * (1.0 / slip_limit) - at_once
+    return implicit_share(slip, 0.0 if b < 0.0 else b, slip_limit, atan)
 
 
 @part

@@ -101,7 +101,7 @@ def _rail_contacts(
             if found.share[c] > 0.0:
                 if count < kind.size:
                     spring = rail_elongation(
-                        law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, found.entry[c]
+                        law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, i, found.entry[c]
                     )
                     normal, tangential, _, _ = rail_contact(
                         c,

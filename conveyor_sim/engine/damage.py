@@ -103,7 +103,7 @@ def _list_rails(i: int, world: World, law: Any, damage: Any, member: Member, cou
         if found.share[c] > 0.0 and count < MOST_BORNE:
             entry = found.entry[c]
             spring = rail_elongation(
-                law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, entry
+                law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, i, entry
             )
             normal, tangential, slip, _ = rail_contact(
                 c,

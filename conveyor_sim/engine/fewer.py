@@ -18,6 +18,7 @@ def _for_forces(world: World) -> World:
         load=world.load,
         peaks=None,
         stage=None,
+        path=world.path,
         slopes=None,
         linear=None,
         implicit=world.implicit,
@@ -54,6 +55,7 @@ def lists_of(world: World) -> Any:
         load=None,  # type: ignore[arg-type]
         peaks=None,
         stage=None,
+        path=None,
         slopes=None,
         linear=None,
         implicit=None,

@@ -12,6 +12,7 @@ from .compile import part
 from .footing import check_footing
 from .ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_parts
 from .pairs import find_touching, pack, pair_forces
+from .path import forget_path
 from .rails import add_rail_forces, count_rail_contacts
 from .slots import sum_pair_forces, sum_slots
 from .static_friction import add_static_friction
@@ -21,6 +22,7 @@ from .team import BLOCK, share, wait_for_all
 @part
 def evaluate_forces(world: World, member: Member, dt: float) -> None:
     """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
+    forget_path(world.path, world.moving, member)
     pack_all(world, member)
     pair_phase(world, member, dt, 0.0)
     begin, stop = share(member, world.bottles.x.size)
@@ -41,11 +43,21 @@ def pack_all(world: World, member: Member) -> None:
 def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> None:
     """Find what this member's share of the pairs exerts; all pairs are done on return.
 
-    All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, by how much the tangential
-    springs are taken along, 0 if this evaluation is not that of a step.
+    All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, of slip by which the
+    tangential springs are drawn out, or by `World.path` if there is one; 0: what they are then is not kept.
     """
     _count_closed(world, world.implicit, member, dt)
-    pair_forces(world.settings, world.bottles, world.spin, world.pairs, world.curves, world.implicit, member, spring_dt)
+    pair_forces(
+        world.settings,
+        world.bottles,
+        world.spin,
+        world.path,
+        world.pairs,
+        world.curves,
+        world.implicit,
+        member,
+        spring_dt,
+    )
     find_pair_parts(world.settings, world.bottles, world.spin, world.pairs, world.ledger, world.curves, member)
     wait_for_all(member)
 
@@ -59,6 +71,7 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, fir
         world.settings,
         world.bottles,
         world.spin,
+        world.path,
         world.load,
         world.segments,
         world.near_segments,
@@ -140,7 +153,7 @@ def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> Non
         for i in range(first, end):
             # The base is a contact too.
             implicit.closed[i] += 1.0
-            implicit.ease[i] = dt * implicit.mobility[i] * implicit.closed[i]
+            implicit.ease[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
     wait_for_all(member)
 
 

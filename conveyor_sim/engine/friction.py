@@ -7,6 +7,12 @@ arctangent.
 Implicit: the force is that of the slip *after* the step, s + b v_lim p(s) = s_0 with b = dt mu N/(m_t v_lim), 1/m_t
 what the slip gains from a unit of impulse. It never turns the slip round, whatever the step.
 
+That is semi-implicit Euler. For velocity Verlet and rk4 the same is solved with B = max(0, ahead b - at_once) in place
+of b (`integrators.AHEAD`). At rest the force then takes at most 1/ahead of the slip in a step, and velocity Verlet,
+whose slip s_0 is that at the end of the step, turns no slip round while that is at most 2/3, rk4 while it is at most 1.
+Up to b = at_once/ahead friction is the explicit one, and so is its order. Beyond, a steady pull of a share f of mu N
+creeps by B f v_lim too fast (semi-implicit Euler: by b f v_lim, at any b).
+
 Formulas without branches and without a division by a slip that may be 0, so that loops over them are vectorised.
 """
 

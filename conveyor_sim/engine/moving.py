@@ -37,10 +37,21 @@ def pass_step(moving: Any, ledger: Any, member: Member, dt: float, centred: bool
     if moving is None:
         return
     if member.rank == 0:
+        _note_path(moving, moving.springs, -1.0)
         drive_rails(moving.actuators, moving, ledger, moving.clock[0] * dt, dt, centred)
         moving.clock[0] += 1.0
         _place(moving, moving.clock[0] * dt)
+        _note_path(moving, moving.springs, 1.0)
     wait_for_all(member)
+
+
+@part
+def _note_path(moving: MovingRails, springs: Any, sign: float) -> None:
+    """Before a step, and after it: its way is the difference of the positions."""
+    if springs is None:
+        return
+    for q in range(moving.x.size):
+        springs.path[q] = (springs.path[q] if sign > 0.0 else 0.0) + sign * moving.position[q]
 
 
 @part
@@ -134,6 +145,44 @@ def add_rail_push(
     if q < 0:
         return
     add_push(moving.actuators, moving, found, c, q, bottles, i, normal, tangential)
+
+
+@part
+def surface_path(moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
+    """How far (m) the rail has gone at contact c of bottle i since springs were last kept; 0 for a rail at rest."""
+    if moving is None:
+        return 0.0, 0.0
+    q = found.entry[c] - MOVING
+    if q < 0:
+        return 0.0, 0.0
+    arm, path = bottles.radius[i] - found.overlap[c], moving.springs.path[q]
+    turned = moving.turning[q] * path
+    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    return moving.along_x[q] * path - turned * dy, moving.along_y[q] * path + turned * dx
+
+
+@part
+def moving_spring(moving: Any, i: int, entry: int) -> float:
+    """Elongation (m) of the spring of bottle i at a moving rail, by the entry of the contact."""
+    if moving is None:
+        return 0.0
+    return moving.springs.elongation[i, entry - MOVING]
+
+
+@part
+def set_moving_spring(moving: Any, i: int, entry: int, elongation: float) -> None:
+    """Keep the elongation (m) of that spring."""
+    if moving is not None:
+        moving.springs.elongation[i, entry - MOVING] = elongation
+
+
+@part
+def forget_moving_springs(moving: Any, i: int) -> None:
+    """Forget the springs of bottle i at all rails that move."""
+    if moving is not None:
+        for q in range(moving.x.size):
+            moving.springs.elongation[i, q] = 0.0
 
 
 @part

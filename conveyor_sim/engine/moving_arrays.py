@@ -50,6 +50,15 @@ class Actuators(NamedTuple):
     """
 
 
+class MovingSprings(NamedTuple):
+    """Tangential springs at rails that move: by bottle slot and rail, so that no list has to remember them."""
+
+    elongation: F8
+    """(S, Q), m"""
+    path: F8
+    """(Q,), m or rad, how far the rail has gone since springs were last kept."""
+
+
 class MovingRails(NamedTuple):
     """Straight rails that slide or swing. The fields up to `surface` are those of Segments, as they are now."""
 
@@ -89,6 +98,7 @@ class MovingRails(NamedTuple):
     clock: F8
     """(1,), steps since the tick began."""
     actuators: Actuators | None
+    springs: MovingSprings | None
 
 
 def present(moving: MovingRails) -> tuple[NDArray[Any], ...]:

@@ -20,9 +20,10 @@ from typing import Any
 
 from numba import uint64
 
-from .arrays import Bottles, Member, Pairs, Settings
+from .arrays import Bottles, ContactLaw, Member, Pairs, Settings
 from .compile import part
 from .contact import carried, contact_force, spring_after, stretched
+from .path import slip_time_of, way_in_touch
 from .team import BLOCK, share
 
 # Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
@@ -51,6 +52,7 @@ def pair_forces(
     settings: Settings,
     bottles: Bottles,
     spin: Any,
+    path: Any,
     pairs: Any,
     curves: Any,
     implicit: Any,
@@ -59,7 +61,7 @@ def pair_forces(
 ) -> None:
     """Find the forces and moments of this member's share of the pairs, from `bottles.packed` and `spin.omega`.
 
-    spring_dt: s, how far the tangential springs are taken along; 0 for an evaluation that is not a step of its own.
+    path, spring_dt: how far the tangential springs are taken along (`pair_phase`).
     """
     if pairs is None:
         return
@@ -69,10 +71,12 @@ def pair_forces(
         count: Any = uint64(min(BLOCK, stop - start))
         _gather(bottles.packed, spin, pairs, pairs.reach, first, count, member.gathered)
         _gather_ease(implicit, pairs, first, count, member.gathered.ease)
+        _gather_ways(path, pairs, pairs.reach, first, count, member.gathered.way)
         _law(
             settings,
             settings.atan,
             spin,
+            path,
             pairs,
             pairs.reach,
             pairs.moment,
@@ -127,6 +131,25 @@ def _gather_ease(implicit: Any, pairs: Pairs, first: int, count: int, ease: Any)
 
 
 @part
+def _gather_ways(path: Any, pairs: Pairs, reach: Any, first: int, count: int, way: Any) -> None:
+    if path is None:
+        return
+    for c in range(count):
+        p, row = first + c, c * _4
+        i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
+        way[row] = path.x[j] - path.x[i]
+        way[row + _1] = path.y[j] - path.y[i]
+        way[row + _2] = path.turn[i] + path.turn[j]
+        way[row + _3] = 0.0 if reach is None else _rim_way(path, pairs, reach, p)
+
+
+@part
+def _rim_way(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
+    radius = pairs.radius_i[p]  # type: ignore[index]
+    return radius * path.turn[pairs.i[p]] + (reach[p] - radius) * path.turn[pairs.j[p]]
+
+
+@part
 def normal_and_overlap(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
     """Overlap (m; 0 or less: apart) and unit normal of two circles, (dx, dy) being the way from axis to axis."""
     distance = math.sqrt(dx * dx + dy * dy)
@@ -140,6 +163,7 @@ def _law(
     settings: Settings,
     atan: Any,
     spin: Any,
+    path: Any,
     pairs: Pairs,
     reach: Any,
     moment: Any,
@@ -160,7 +184,9 @@ def _law(
         overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
         closing = -(dvx * nx + dvy * ny)
         slip = dvx * ny - dvy * nx + _rim_slip(settings, spin, reach, gathered, c, half * overlap)
-        spring = carried(pairs.law, p, elongation(springs, p), overlap, closing * spring_dt, slip * spring_dt)
+        kept, deeper, slipped = elongation(springs, p), closing * spring_dt, slip * spring_dt
+        spring = _drawn_out(settings, pairs.law, path, reach, gathered, c, p, kept, overlap, deeper, slipped, nx, ny)
+        slip_time = slip_time_of(path, spring_dt)
         normal, tangential = contact_force(
             pairs.law,
             p,
@@ -171,8 +197,8 @@ def _law(
             1.0,
             closing,
             slip,
-            stretched(spring, slip, spring_dt),
-            _ease(implicit, gathered, c),
+            stretched(spring, slip, slip_time),
+            _ease(settings, implicit, gathered, c),
         )
         fx = -normal * nx - tangential * ny
         fy = tangential * nx - normal * ny
@@ -188,9 +214,8 @@ def _law(
             normals[p] = normal
             normals[q] = normal
         if springs is not None:
-            before = springs.elongation[p]
-            after = spring_after(pairs.law, p, spring, overlap, slip, spring_dt, normal, 1.0)
-            springs.elongation[p] = after if spring_dt > 0.0 else before
+            after = spring_after(pairs.law, p, spring, overlap, slip, slip_time, normal, 1.0)
+            springs.elongation[p] = after if spring_dt > 0.0 else springs.elongation[p]
 
 
 @part
@@ -226,10 +251,53 @@ def elongation(springs: Any, p: int) -> Any:
 
 
 @part
-def _ease(implicit: Any, gathered: Any, c: int) -> Any:
+def _drawn_out(
+    settings: Settings,
+    law: ContactLaw,
+    path: Any,
+    reach: Any,
+    gathered: Any,
+    c: int,
+    p: int,
+    spring: Any,
+    overlap: float,
+    deeper: float,
+    slipped: float,
+    nx: float,
+    ny: float,
+) -> Any:
+    """Elongation (m) of a spring, or None, after what its bottles have gone since it was kept.
+
+    Without a path: of one that is yet to be drawn out by what has slipped (m), at an overlap (m) that is by so much
+    deeper (m).
+    """
+    if spring is None:
+        return None
+    if path is None:
+        return carried(law, p, spring, overlap, deeper, slipped)
+    way: Any = gathered.way
+    row: Any = c * _4
+    approach = -(way[row] * nx + way[row + _1] * ny)
+    # The normal turns on the way, and its mean is that of half of it: |r| n of its end over |r| of its middle.
+    distance = _reach(settings, reach, p) - overlap
+    along = (way[row] * ny - way[row + _1] * nx) * (distance / (distance + 0.5 * approach))
+    shorter = 0.5 * settings.lever * (overlap - 0.5 * approach)
+    further = way_in_touch(along + _rims_way(settings, reach, way, row, shorter), approach, overlap)
+    return carried(law, p, spring, overlap, approach, further) + further
+
+
+@part
+def _rims_way(settings: Settings, reach: Any, way: Any, row: int, shorter: float) -> float:
+    if reach is None:
+        return (0.5 * settings.reach - shorter) * way[row + _2]
+    return way[row + _3] - shorter * way[row + _2]
+
+
+@part
+def _ease(settings: Settings, implicit: Any, gathered: Any, c: int) -> Any:
     if implicit is None:
         return None
-    return gathered.ease[c]
+    return gathered.ease[c], settings.at_once
 
 
 @part

@@ -8,7 +8,19 @@ from .compile import part
 from .contact import carried, contact_force, spring_after, stretched
 from .keep import keep_deepest
 from .ledger_parts import add_rail_parts
-from .moving import add_rail_push, clear_rail_power, clear_rail_push, moves, moving_contacts, surface_velocity
+from .moving import (
+    add_rail_push,
+    clear_rail_power,
+    clear_rail_push,
+    forget_moving_springs,
+    moves,
+    moving_contacts,
+    moving_spring,
+    set_moving_spring,
+    surface_path,
+    surface_velocity,
+)
+from .path import slip_time_of, way_in_touch
 from .segment import segment_contact
 from .shares import share_overlaps
 from .team import units
@@ -80,7 +92,7 @@ def rail_contact(
 ) -> tuple[float, float, float, Any]:
     """N and T (N) on bottle i in its contact c with a rail, its slip (m/s) along it, and its spring before that slip.
 
-    spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: s/kg, or None (see `contact_force`).
+    spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: as in `contact_force`.
     """
     nx, ny = found.nx[c], found.ny[c]
     ux, uy = surface_velocity(moving, found, c, bottles, i)
@@ -147,6 +159,7 @@ def add_rail_forces(
     settings: Settings,
     bottles: Bottles,
     spin: Any,
+    path: Any,
     load: Load,
     segments: Any,
     near_segments: Any,
@@ -165,23 +178,25 @@ def add_rail_forces(
 ) -> None:
     """Add the forces and moments of all rails on bottles first to end to `load` and `spin.moment`.
 
-    spring_dt: s, how far the tangential springs are taken along.
+    path, spring_dt: how far the tangential springs are taken along (`pair_phase`).
     """
     if railed is None:
         return
     clear_rail_power(ledger, moving, first, end)
     clear_rail_push(moving, first, end)
     begin, stop = units(first, end)
+    slip_time = slip_time_of(path, spring_dt)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
         count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, moving, found)
         for c in range(count):
             found.solution[c] = 0.0
             if found.share[c] > 0.0:
-                spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, found.entry[c])
-                ease = _ease(implicit, i)
+                kept = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
+                spring = _drawn_out(settings, law, bottles, spin, path, moving, found, c, i, kept)
+                ease = _ease(settings, implicit, i)
                 normal, tangential, slip, spring = rail_contact(
-                    c, i, settings, settings.atan, bottles, spin, moving, found, law, curves, spring, spring_dt, ease
+                    c, i, settings, settings.atan, bottles, spin, moving, found, law, curves, spring, slip_time, ease
                 )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
@@ -192,10 +207,40 @@ def add_rail_forces(
                     spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
                 entry = law_entry(settings, bottles, found, c, i)
                 found.solution[c] = _spring_after(
-                    law, entry, spring, found.overlap[c], slip, spring_dt, normal, found.share[c]
+                    law, entry, spring, found.overlap[c], slip, slip_time, normal, found.share[c]
                 )
         if spring_dt > 0.0:
             _store_springs(law.tangential_stiffness, near_segments, near_arcs, moving, found, count, i)
+
+
+@part
+def _drawn_out(
+    settings: Settings,
+    law: ContactLaw,
+    bottles: Bottles,
+    spin: Any,
+    path: Any,
+    moving: Any,
+    found: RailContacts,
+    c: int,
+    i: int,
+    spring: Any,
+) -> Any:
+    """Elongation (m) of a spring, or None, after what bottle and rail have gone since it was kept."""
+    if spring is None:
+        return None
+    if path is None:
+        return spring
+    nx, ny = found.nx[c], found.ny[c]
+    ux, uy = surface_path(moving, found, c, bottles, i)
+    x, y = path.x[i] - ux, path.y[i] - uy
+    approach = x * nx + y * ny
+    way = y * nx - x * ny
+    if spin is not None:
+        way += path.turn[i] * rail_arm(found.overlap[c] - 0.5 * approach, bottles.radius[i], settings.lever)
+    entry = law_entry(settings, bottles, found, c, i)
+    further = way_in_touch(way, approach, found.overlap[c])
+    return carried(law, entry, spring, found.overlap[c], approach, further) + further
 
 
 @part
@@ -248,19 +293,19 @@ def _note_parts(
 
 
 @part
-def _ease(implicit: Any, i: int) -> Any:
+def _ease(settings: Settings, implicit: Any, i: int) -> Any:
     if implicit is None:
         return None
-    return implicit.ease[i]
+    return implicit.ease[i], settings.at_once
 
 
 @part
-def rail_elongation(tangential: Any, near_segments: Any, near_arcs: Any, moving: Any, entry: int) -> Any:
-    """Elongation of the spring of a contact, by its entry in the lists (`RailContacts.entry`)."""
+def rail_elongation(tangential: Any, near_segments: Any, near_arcs: Any, moving: Any, i: int, entry: int) -> Any:
+    """Elongation of the spring of a contact of bottle i, by its entry in the lists (`RailContacts.entry`)."""
     if tangential is None:
         return None
     if moves(moving, entry):
-        return 0.0
+        return moving_spring(moving, i, entry)
     if entry >= 0:
         return _spring_at(near_segments, entry)
     return _spring_at(near_arcs, -1 - entry)
@@ -282,10 +327,11 @@ def _store_springs(
         return
     _forget_springs(near_segments, i)
     _forget_springs(near_arcs, i)
+    forget_moving_springs(moving, i)
     for c in range(count):
         if moves(moving, found.entry[c]):
-            continue
-        if found.entry[c] >= 0:
+            set_moving_spring(moving, i, found.entry[c], found.solution[c])
+        elif found.entry[c] >= 0:
             _set_spring(near_segments, found.entry[c], found.solution[c])
         else:
             _set_spring(near_arcs, -1 - found.entry[c], found.solution[c])

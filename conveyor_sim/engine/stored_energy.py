@@ -60,7 +60,7 @@ def _at_rails(world: World, law: Any, found: RailContacts, energy: F8) -> None:
         count = find_rail_contacts(i, bottles, world.segments, near_segments, world.arcs, near_arcs, moving, found)
         for c in range(count):
             e = law_entry(world.settings, bottles, found, c, i)
-            spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, found.entry[c])
+            spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
             energy[ELASTIC] += found.share[c] * _elastic(law, e, world.curves, found.overlap[c])
             energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring, found.overlap[c])
 

@@ -39,7 +39,7 @@ def members(size: int) -> tuple[Member, ...]:
 
 
 def _gathered() -> Gathered:
-    return Gathered(np.zeros(4 * BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(BLOCK))
+    return Gathered(np.zeros(4 * BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(BLOCK), np.zeros(4 * BLOCK))
 
 
 def _rail_contacts() -> RailContacts:

@@ -77,6 +77,8 @@ def _moving(world: World) -> Iterator[NDArray[np.generic]]:
         yield from (static.x, static.y, static.belt)
     if world.moving is not None:
         yield from present(world.moving)
+        if world.moving.springs is not None:
+            yield world.moving.springs.elongation
     if world.ledger is not None:
         yield world.ledger.work
     if world.damage is not None:

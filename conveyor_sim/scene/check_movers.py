@@ -16,7 +16,7 @@ INTEGRATORS = ("semi_implicit_euler", "velocity_verlet")
 
 def mover_problems(scene: Scene) -> list[Problem]:
     """Problems of the rails that move."""
-    return [*_shapes(scene), *_drives(scene), *_integrator(scene), *_springs(scene)]
+    return [*_shapes(scene), *_drives(scene), *_integrator(scene)]
 
 
 def unsound_movers(scene: Scene) -> set[Path]:
@@ -61,18 +61,3 @@ def _integrator(scene: Scene) -> Iterator[Problem]:
                 "the other integrators take rails to be at rest within a step",
             )
             return
-
-
-def _springs(scene: Scene) -> Iterator[Problem]:
-    bottles = {kind.material for kind in scene.bottle_types.values()}
-    movers = {mover.material: path for path, mover in reversed(list(movers_of(scene)))}
-    for index, contact in enumerate(scene.contacts):
-        a, b = contact.between
-        moving = next((rail for one, rail in ((a, b), (b, a)) if one in bottles and rail in movers), None)
-        if contact.tangential is not None and moving is not None:
-            path = movers[moving]
-            yield Problem(
-                ("contacts", index, "tangential"),
-                f"given, expected none for {moving}, of which {path[0]}.{path[1]} is made: "
-                "rails that move have no tangential springs",
-            )

@@ -75,7 +75,8 @@ class Contact(Part):
     damping: Damping = quantity("Damping of the contact.", default=Damping.model_construct())
     friction: NotNegative = quantity("Coefficient of friction of the contact.", "1", default=0.0)
     tangential: Tangential | None = quantity(
-        "A tangential spring with history in place of the friction curve; needs friction. Left out: none.",
+        "A tangential spring with history in place of the friction curve; needs friction, and "
+        "semi_implicit_euler, velocity_verlet or rk4. Left out: none.",
         default=None,
     )
 

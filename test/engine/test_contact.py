@@ -128,10 +128,21 @@ def test_a_share_scales_the_whole_law() -> None:
 def test_implicit_friction_takes_the_slip_after_the_step() -> None:
     """T dt/m_t is what the slip loses: s + b v_lim p(s) = s_0 with mu N p(s) = -T."""
     ease, slip = 5e-4, 0.6 * LIMIT
-    normal, tangential = force(0.002, 0.5, slip, implicit=ease, stiffness=K, friction=MU, damping_normal=C)
+    normal, tangential = force(0.002, 0.5, slip, implicit=(ease, 0.0), stiffness=K, friction=MU, damping_normal=C)
     after = slip + ease * tangential
     assert 0.0 < after < slip
     assert -tangential == pytest.approx(MU * normal * (2.0 * after / LIMIT - (after / LIMIT) ** 2))
+
+
+def test_implicit_friction_of_a_small_ease_is_the_explicit_one() -> None:
+    """Up to b = at_once friction takes the slip as it is; beyond, it looks ahead by what b is more."""
+    slip = 0.6 * LIMIT
+    columns = {"stiffness": K, "friction": MU}
+    normal, explicit = force(0.002, 0.0, slip, **columns)
+    one = LIMIT / (MU * normal)
+    assert force(0.002, 0.0, slip, implicit=(0.5 * one, 0.5), **columns)[1] == pytest.approx(explicit, rel=1e-14)
+    ahead = force(0.002, 0.0, slip, implicit=(1.5 * one, 0.5), **columns)
+    assert ahead == force(0.002, 0.0, slip, implicit=(one, 0.0), **columns)
 
 
 def test_the_tangential_spring_holds_up_to_coulombs_limit() -> None:
@@ -202,15 +213,15 @@ def test_apart_there_is_no_force_at_all(overlap: float) -> None:
     """Exactly 0 from every law, whatever the velocities: loops add it up for all listed pairs."""
     for closing in (-3.0, 0.0, 3.0):
         for slip in (-3.0, 0.0, 1e-3):
-            assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, implicit=1e-3) == (0.0, 0.0)
+            assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5)) == (0.0, 0.0)
             assert force(overlap, closing, slip, **EVERYTHING, spring=0.01, atan=1) == (0.0, 0.0)
 
 
 def test_what_is_not_a_number_stays_visible() -> None:
     """No clamp hides a NaN."""
     for arguments in ((math.nan, 0.1, 0.1), (0.001, math.nan, 0.1)):
-        assert math.isnan(force(*arguments, **EVERYTHING, spring=0.01, implicit=1e-3)[0])
-    assert math.isnan(force(0.001, 0.1, math.nan, **EVERYTHING, spring=0.01, implicit=1e-3)[1])
+        assert math.isnan(force(*arguments, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5))[0])
+    assert math.isnan(force(0.001, 0.1, math.nan, **EVERYTHING, spring=0.01, implicit=(1e-3, 0.5))[1])
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])

@@ -73,7 +73,7 @@ def test_contacts(names: list[str], atan: bool, spring: bool, implicit: bool) ->
     ) -> None:
         for c in range(uint64(count)):
             normal, tangential = contact_force(
-                law, c, None, 0.01, atan, overlap[c], 1.0, closing[c], slip[c], at(elongation, c), at(ease, c)
+                law, c, None, 0.01, atan, overlap[c], 1.0, closing[c], slip[c], at(elongation, c), both(ease, c)
             )
             found[c] = normal
             found[c + uint64(COUNT)] = tangential
@@ -98,6 +98,13 @@ def at(values: Any, c: int) -> Any:
     if values is None:
         return None
     return values[c]
+
+
+@compiled
+def both(ease: Any, c: int) -> Any:
+    if ease is None:
+        return None
+    return ease[c], 0.5
 
 
 def test_tangential_springs() -> None:

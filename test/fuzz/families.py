@@ -9,6 +9,8 @@ from typing import Any
 INTEGRATORS = ("semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit")
 MOVING = INTEGRATORS[:2]
 """Those that move rails."""
+STEPPED = INTEGRATORS[:3]
+"""Those with tangential springs and implicit friction."""
 ELASTIC = ("linear", "hertz", "table")
 DAMPING = ("none", "paper", "normal", "tsuji", "onset")
 FORCED = (
@@ -67,16 +69,16 @@ def random_family(seed: int) -> Family:
     """The family of a seed; integrators take turns, everything else is drawn."""
     draw = random.Random(seed)
     integrator = INTEGRATORS[seed % len(INTEGRATORS)]
-    euler = integrator == INTEGRATORS[0]
+    stepped = integrator in STEPPED
     friction = draw.random() < 0.8
     family = Family(
         integrator=integrator,
-        implicit_friction=euler and draw.random() < 0.3,
+        implicit_friction=stepped and draw.random() < 0.3,
         atan=draw.random() < 0.25,
         elastic=_some(draw, ELASTIC),
         damping=_some(draw, DAMPING),
         friction=friction,
-        springs=euler and friction and draw.random() < 0.4,
+        springs=stepped and friction and draw.random() < 0.4,
         base_friction=draw.random() < 0.85,
         ring=draw.random() < 0.3,
         belts=_some(draw, ("straight", "curved"), least=0),
@@ -86,8 +88,7 @@ def random_family(seed: int) -> Family:
         outfeeds=draw.random() < 0.4,
         effects=tuple(draw.choice(FORCED if draw.random() < 0.5 else FORCED[:1]).items()),
     )
-    # Rails that move have no tangential springs, and two integrators only.
-    move = integrator in MOVING and not family.springs
+    move = integrator in MOVING
     return replace(
         family,
         drives=draw.random() < 0.5,

@@ -1,14 +1,16 @@
-"""How long a step may be for a drag, that is for friction at rest: gamma dt = 2, 1 and 2.785 for the explicit methods.
+"""How long a step may be for a drag, that is for friction at rest: gamma dt = 2, 1 and 2.785 for the explicit methods,
+and any length where friction is implicit.
 
 Bounds on the time step scale with it (`Method.drag_limit`), so that each integrator keeps the same margin.
 """
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, scene
+from scenes import MASS, RADIUS, base, belt, bottle, contact, order, scene, segment
 from worlds import ALONE, FAR, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, START
@@ -23,12 +25,13 @@ LIMITS = {"semi_implicit_euler": 2.0, "velocity_verlet": 1.0, "rk4": 2.785}
 STEPS = 300
 
 
-def resting(integrator: str, points: Any, floor: float) -> State:
+def resting(integrator: str, points: Any, floor: float, solver: str = "explicit") -> State:
     given = scene(
         accuracy={"integrator": integrator},
         contacts=[contact(K, friction=MU)],
         floor={"friction": floor},
         slip_limit=LIMIT,
+        friction_solver=solver,
         lever_arm="radius",
         gravity=G,
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
@@ -98,11 +101,14 @@ def test_a_hexagonal_packing_under_pressure(integrator: str) -> None:
 def test_bounds_keep_the_same_share_of_the_limit(integrator: str) -> None:
     """Of friction half, of a dashpot a quarter: in a packing, gamma is three times that of two bottles."""
     assert METHODS[integrator].drag_limit == pytest.approx(0.5 * LIMITS[integrator], rel=2e-3)
-    tangential = {"tangential": {"stiffness": 1e3, "damping": 2.0}} if integrator == "semi_implicit_euler" else {}
     model = build_model(
         scene(
             accuracy={"integrator": integrator},
-            contacts=[contact(K, friction=MU, damping=("normal", 3.0), **tangential)],
+            contacts=[
+                contact(K, friction=MU, damping=("normal", 3.0)),
+                contact(K, "steel", ("normal", 3.0), MU, tangential={"stiffness": 1e3, "damping": 2.0}),
+            ],
+            rails={"edge": segment((0.0, 6.0), (1.0, 6.0))},
             base=base(MU),
             belts={"belt": belt(0.1)},
             bottle_types={"bottle": {"radius": RADIUS, "mass": MASS, "material": "glass", "base_radius": 0.5 * RADIUS}},
@@ -115,9 +121,58 @@ def test_bounds_keep_the_same_share_of_the_limit(integrator: str) -> None:
         "base friction": 2.0 * MU * G / LIMIT,
         "spin on the base": 0.25 * 2.0 * MU * G / LIMIT,
         "normal damping": 2.0 * 3.0 / (MASS / 2.0),
-        "tangential damping": 2.0 * 2.0 / (MASS / 4.0),
+        "tangential damping": 2.0 * 2.0 / (MASS / 2.0),
         "contact friction": 2.0 * MU * (2.0 / MASS) * (2.0 * MU * MASS * G) / LIMIT,
     }
     shares = {b.name: gammas[b.name] * b.dt / LIMITS[integrator] for b in model.bounds if b.name in gammas}
-    assert shares.keys() >= {"base friction", "spin on the base", "normal damping"}
+    assert shares.keys() >= gammas.keys() - {"contact friction"}
     assert shares == pytest.approx(dict.fromkeys(shares, 0.5), rel=2e-3)
+
+
+@pytest.mark.parametrize("integrator", LIMITS)
+def test_implicit_friction_never_turns_a_slip_round(integrator: str) -> None:
+    """On a floor, from far beyond v_lim and from far below, in steps of up to 100 times the bound: it only falls."""
+    for steps in (0.1, 1.0, 10.0, 100.0):
+        dt = steps * 0.5 * LIMIT / (MU * G)
+        for speed in (1e-3 * LIMIT, 0.7 * MU * G * dt, 5.3 * MU * G * dt + LIMIT):
+            slips = [speed]
+            for n in range(1, 40):
+                # In one call each: the first step of a call is like no other.
+                state = resting(integrator, [(0.0, 0.0)], MU, "implicit")
+                state.world.bottles.vx[0], state.world.bottles.vy[0] = speed, 0.0
+                INTEGRATORS[integrator](state.world, ALONE, n, dt, START)
+                slips.append(float(state.world.bottles.vx[0]))
+            assert all(0.0 <= after < before for before, after in pairwise(slips))
+            assert slips[-1] < (0.1 if steps < 1.0 else 1e-6) * speed
+
+
+@pytest.mark.parametrize("integrator", LIMITS)
+def test_implicit_friction_is_stable_in_a_packing(integrator: str) -> None:
+    """A hundred times beyond the limit of explicit friction: no spin of the packing grows, and all die out."""
+    points, gamma = packing()
+    spins = []
+    for n in (0, 1, 2, 3, 5, 10, 20, 40):
+        state = resting(integrator, points, 1e-9, "implicit")
+        spin = state.world.spin
+        assert spin is not None
+        spin.omega[:7] = 1e-3 * LIMIT / RADIUS * np.random.default_rng(2).uniform(-1.0, 1.0, 7)
+        INTEGRATORS[integrator](state.world, ALONE, n, 100.0 * LIMITS[integrator] / gamma, START)
+        spins.append(float(np.linalg.norm(spin.omega[:7])))
+    assert all(after < before for before, after in pairwise(spins))
+    assert spins[-1] < 0.1 * spins[0]
+
+
+@pytest.mark.parametrize(
+    ("integrator", "expected"), [("semi_implicit_euler", 1.0), ("velocity_verlet", 2.0), ("rk4", 4.0)]
+)
+def test_implicit_friction_has_the_order_of_the_method(integrator: str, expected: float) -> None:
+    """Below v_lim: u = v/v_lim falls by du/dt = -(mu g/v_lim)(2 u - u^2)."""
+    start, time, rate = 0.8, 1.0, MU * G / LIMIT
+    decayed = start / (2.0 - start) * math.exp(-2.0 * time)
+    numbers, errors = [6, 12, 24, 48], []
+    for n in numbers:
+        state = resting(integrator, [(0.0, 0.0)], MU, "implicit")
+        state.world.bottles.vx[0], state.world.bottles.vy[0] = start * LIMIT, 0.0
+        INTEGRATORS[integrator](state.world, ALONE, n, time / rate / n, START)
+        errors.append(abs(float(state.world.bottles.vx[0]) / LIMIT - 2.0 * decayed / (1.0 + decayed)))
+    assert order(numbers, errors) == pytest.approx(expected, abs=0.25)

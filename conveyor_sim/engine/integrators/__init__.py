@@ -23,6 +23,12 @@ INTEGRATORS: dict[str, Advance] = {
     "linearly_implicit": linearly_implicit.advance,
 }
 
+AHEAD = {"semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
+"""Integrators with implicit friction: `Settings.ahead` and `at_once` (`friction.py`)."""
+
+ON_PATHS = frozenset({"velocity_verlet", "rk4"})
+"""Integrators whose tangential springs follow the ways of bottles (``World.path``, `path.py`)."""
+
 STAGED = frozenset({"velocity_verlet"})
 """Integrators that keep a copy of the velocities within a step (``World.stage``)."""
 

@@ -9,6 +9,9 @@ friction 4.03 below v_lim, 3.09 across it (test/physics/test_head_on.py, test_co
 Peak forces are those at the beginning of each step, and at the end of the tick: the states of other evaluations are off
 the path. An undamped peak between two steps is missed by up to (pi/n)^2/8 at n steps a contact, and none is exceeded.
 Impulses weight all evaluations as the momentum does.
+
+Tangential springs in a stage are as long as its way draws them, and are cut and kept where a step ends, once: order 4
+while a contact sticks. Within a tick the look at damage sees them one step late.
 """
 
 from typing import Any
@@ -23,9 +26,10 @@ from ..forces import bottle_forces, pack_all, pair_phase
 from ..ledger import book_stages, note_powers
 from ..motion import lists_hold, note_moved, watch_rebuilt
 from ..pairs import pack
+from ..path import forget_path, note_stage
 from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
 from ..team import BLOCK, share
-from .phase import RESUME
+from .phase import RESUME, START
 
 STAGES = 4
 TIMES = np.array([0.0, 0.5, 0.5, 1.0, 1.0])
@@ -50,14 +54,18 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     begin, stop = share(member, bottles.x.size)
     stage = int(slopes.progress[0]) if phase == RESUME else 0
     taken = 0
+    if phase == START:
+        forget_path(line.path, line.moving, member)
     pack_all(line, member)
     while True:
         if stage == 0 and taken < steps:
             note_damage(world, member, dt)
-        pair_phase(line, member, dt, 0.0)
+        # Springs are as long as a stage's way draws them, and are cut and kept where a step ends.
+        kept = dt if stage == 0 else 0.0
+        pair_phase(line, member, dt, kept)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, member, dt, 0.0, first, end)
+            bottle_forces(line, member, dt, kept, first, end)
             if stage == 0:
                 note_peaks(world.load, world.peaks, first, end)
                 if taken == steps:
@@ -66,6 +74,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             go_to(bottles, world.spin, slopes, TIMES, WEIGHTS, WAYS, stage + 1, dt, first, end)
+            note_stage(world.path, bottles, world.spin, slopes, TIMES, WAYS, stage + 1, dt, first, end)
             if stage + 1 == STAGES:
                 come_to_rest(bottles, world.spin, first, end)
                 turn(world.spin, slopes, WAYS, dt, first, end)

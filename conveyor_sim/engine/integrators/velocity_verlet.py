@@ -5,6 +5,10 @@ be first order in damping; the prediction to the end of the step is second. Orde
 undamped linear spring, 2.5 in velocity for Hertz; 1 through a dashpot, clamped or not, for its force jumps at first
 touch. Measured in a rebound: 1.00 with a dashpot, clamped or not, 1.99 without, 2.46 with Hertz; 2.00 in friction
 (test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). One force evaluation a step, one more a tick.
+
+Tangential springs are drawn out by the way of the drift, dt v_half, and cut where the step ends: order 2, and no cycle
+of sticking and slipping gains energy. A drag gamma is unstable from gamma dt = 1 on: the force then shakes from step to
+step, velocities hardly (test/physics/test_drag_limits.py). Implicit friction holds gamma dt at 2/3 (`friction.py`).
 """
 
 from typing import Any
@@ -21,6 +25,7 @@ from ..ledger import book_kick
 from ..motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
 from ..moving import pass_step, place_rails
 from ..pairs import pack_row
+from ..path import note_path
 from ..static_friction import carry_anchors
 from ..team import BLOCK, share
 from .phase import START
@@ -86,6 +91,7 @@ def _begin_step(world: World, line: World, stage: Stage, member: Member, dt: flo
     _move(bottles, load, stage, dt, first, end)
     _turn(spin, stage, dt, first, end)
     carry_anchors(world.footing, world.static_friction, dt, first, end)
+    note_path(world.path, stage, dt, first, end)
     note_moved(line, member, first, end)
 
 
