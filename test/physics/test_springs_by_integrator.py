@@ -209,7 +209,9 @@ def test_a_gate_takes_a_bottle_along(integrator: str, expected: float) -> None:
 
 def crowd(integrator: str, threads: int | None = 1) -> Simulation:
     """A queue of bottles that turn, pressed against a rail that slides along itself, if the integrator moves rails."""
-    queue = [bottle(FAR + 1.934 - 0.1305 * (i % 14), FAR + 0.3 + 0.1305 * (i // 14), 0.3) for i in range(140)]
+    queue = [
+        bottle(FAR + 1.934 - 0.1305 * (i % 14), FAR + 0.3 + 0.1305 * (i // 14), 0.3, 0.02 * (i % 3)) for i in range(140)
+    ]
     stop = {"kind": "slide", "from": [FAR + 2.0, FAR], "to": [FAR + 2.0, FAR + 4.0], "direction": "90 deg",
             "stroke": 0.2, "max_speed": 0.05, "acceleration": 1.0, "material": "steel"}  # fmt: skip
     moves: dict[str, Any] = {"gates": {"g": stop}} if integrator in MOVING else {}
