@@ -41,7 +41,7 @@ def scene_of(
     """Rails of steel along x, at y = -R and R; with a gate for those that move rails, R above the origin at x = 10."""
     gates = {
         "g": {"kind": "slide", "from": [9.0, RADIUS], "to": [11.0, RADIUS], "direction": 0, "stroke": 0.5,
-              "max_speed": SPEED, "acceleration": 1e9, "material": "steel"}
+              "max_speed": SPEED, "acceleration": 1e9, "material": "steel", "force_limit": "none"}
     }  # fmt: skip
     given: dict[str, Any] = {
         "tick": 0.01,
@@ -213,7 +213,8 @@ def crowd(integrator: str, threads: int | None = 1) -> Simulation:
         bottle(FAR + 1.934 - 0.1305 * (i % 14), FAR + 0.3 + 0.1305 * (i // 14), 0.3, 0.02 * (i % 3)) for i in range(140)
     ]
     stop = {"kind": "slide", "from": [FAR + 2.0, FAR], "to": [FAR + 2.0, FAR + 4.0], "direction": "90 deg",
-            "stroke": 0.2, "max_speed": 0.05, "acceleration": 1.0, "material": "steel"}  # fmt: skip
+            "stroke": 0.2, "max_speed": 0.05, "acceleration": 1.0, "material": "steel",
+            "force_limit": "none"}  # fmt: skip
     moves: dict[str, Any] = {"gates": {"g": stop}} if integrator in MOVING else {}
     return scene_of(
         integrator,
