@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from conveyor_sim.model import Model
 from conveyor_sim.prediction import percent
 from conveyor_sim.simulation import Simulation
+
+WINDOW = 1.0
+"""s, over which loads are means: no impact lasts so long."""
 
 HARDER = 1.05
 """Times the expected force that is still as expected: damping may add to the peak of an impact."""
@@ -41,6 +48,59 @@ class Achieved:
         )
 
 
+@dataclass(frozen=True)
+class Pressed:
+    """What pressed on a bottle for long, against the load that explicit friction in contacts is stable at."""
+
+    load: float
+    """N, half of the normal forces on a bottle, as two contacts share them in a file; mean over WINDOW."""
+    expected: float
+    """N"""
+    expected_of: str
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the load stayed below what the bound on the time step rests on."""
+        return self.load <= self.expected
+
+    @property
+    def sentence(self) -> str:
+        """All of it."""
+        bound = f"the {self.expected:.3g} N that friction in contacts is stable at ({self.expected_of})"
+        told = f"pressed for {WINDOW:g} s with at most {self.load:.3g} N"
+        if self.as_expected:
+            return f"{told}, within {bound}"
+        return f"{told}, more than {bound}: friction may chatter; friction_solver: implicit or more steps a tick help"
+
+
+class PressWatch:
+    """What pressed for long, from the impulses that bottles had from one output to the next."""
+
+    def __init__(self) -> None:
+        self.load: float | None = None
+        """N, as in `Pressed`; None before the first WINDOW has passed, or where impulses are not known."""
+        self._began: float | None = None
+        self._ids: list[NDArray[np.uint64]] = []
+        self._impulses: list[NDArray[np.float64]] = []
+
+    def take(self, time: float, ids: NDArray[np.uint64], impulses: NDArray[np.float64]) -> None:
+        """At a time in s: bottles, and what they were pushed by since the last call, N s."""
+        if self._began is None:
+            self._began = time
+            return
+        self._ids.append(np.asarray(ids))
+        self._impulses.append(np.asarray(impulses))
+        passed = time - self._began
+        if passed < WINDOW * (1.0 - 1e-9):
+            return
+        _, which = np.unique(np.concatenate(self._ids), return_inverse=True)
+        sums = np.bincount(which, np.concatenate(self._impulses))
+        load = 0.5 * float(sums.max(initial=0.0)) / passed
+        if math.isfinite(load):
+            self.load = max(load, self.load or 0.0)
+        self._began, self._ids, self._impulses = time, [], []
+
+
 class PeakWatch:
     """The largest contact force of a run; looked up after every tick, for peaks begin anew with outputs."""
 
@@ -48,12 +108,22 @@ class PeakWatch:
         self._simulation = simulation
         self.force = simulation.peak_force
         """N, so far; None where the scene has no effect `peaks`."""
+        self._pressing = PressWatch()
+
+    @property
+    def load(self) -> float | None:
+        """N, that pressed for long, as in `Pressed`."""
+        return self._pressing.load
 
     def after_tick(self) -> None:
         """Look."""
-        now = self._simulation.peak_force
+        simulation = self._simulation
+        now = simulation.peak_force
         if now is not None and self.force is not None:
             self.force = max(self.force, now)
+            if simulation.due("bottles"):
+                bottles = simulation.bottles()
+                self._pressing.take(simulation.time, bottles.id, bottles.impulse)
 
 
 def achieved(model: Model, peak_force: float | None) -> Achieved | None:
@@ -62,3 +132,10 @@ def achieved(model: Model, peak_force: float | None) -> Achieved | None:
         return None
     overlap = max(impact.overlap(peak_force) / impact.diameter for impact in model.impacts)
     return Achieved(peak_force, model.prediction.force, model.prediction.force_reason, overlap)
+
+
+def pressed(model: Model, load: float | None) -> Pressed | None:
+    """What pressed for long (N) beside what was expected; None where no bound on the time step rests on it."""
+    if load is None or not any(bound.name == "contact friction" for bound in model.bounds):
+        return None
+    return Pressed(load, model.load.force, model.load.reason)

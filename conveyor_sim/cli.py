@@ -134,11 +134,11 @@ def run(
     scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None, outside_tables: bool
 ) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
-    from conveyor_sim.achieved import achieved
+    from conveyor_sim.achieved import achieved, pressed
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.compilation import Compilation
-    from conveyor_sim.explain import setting_line
+    from conveyor_sim.explain import setting_line, step_rows
     from conveyor_sim.model import build_model
     from conveyor_sim.report import report
     from conveyor_sim.resources import scene_path
@@ -162,6 +162,11 @@ def run(
         reached = achieved(model, done.peak_force)
         if reached is not None:
             click.echo(reached.sentence)
+        load = pressed(model, done.load)
+        if load is not None:
+            click.echo(load.sentence)
+        for _, text in step_rows(loaded):
+            click.echo(text)
         for said in done.guard:
             click.echo(f"guard: {said}")
     else:
@@ -334,7 +339,7 @@ def _supply(entry: Infeed | Source | Spill) -> str:
 
 def _account(scene: Scene, model: Model) -> Table:
     """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
-    from conveyor_sim.explain import accuracy_rows, note_rows
+    from conveyor_sim.explain import accuracy_rows, note_rows, step_rows
     from conveyor_sim.scene import initial_bottles
 
     table = Table.grid(padding=(0, 2))
@@ -344,7 +349,7 @@ def _account(scene: Scene, model: Model) -> Table:
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    for name, text in [*accuracy_rows(model), *note_rows(scene, model)]:
+    for name, text in [*accuracy_rows(model), *step_rows(scene), *note_rows(scene, model)]:
         table.add_row(name, text)
     for index, bound in enumerate(model.bounds):
         table.add_row("" if index else "bounds", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")

@@ -13,6 +13,7 @@ from conveyor_sim.effects import EFFECTS
 from conveyor_sim.effects.notes import notes
 from conveyor_sim.model import Model
 from conveyor_sim.prediction import percent
+from conveyor_sim.remedies import step_limit
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.places import Places
 from conveyor_sim.timestep import fewest_steps
@@ -25,7 +26,7 @@ def explanation(scene: Scene, model: Model) -> Group:
     """Effects on and off with the lines that decide, bounds on dt with the one that rules, steps, expected errors."""
     steps = Table.grid(padding=(0, 2))
     steps.add_row("scene", f"{model.name} ({scene.source_name})")
-    for name, text in accuracy_rows(model):
+    for name, text in [*accuracy_rows(model), *step_rows(scene)]:
         steps.add_row(name, text)
     for name, text in note_rows(scene, model):
         steps.add_row(name, text)
@@ -54,6 +55,11 @@ def accuracy_rows(model: Model) -> list[tuple[str, str]]:
         ("", resting),
         *(("", f"{percent(term.value)} in {term.quantity}: {term.reason}") for term in prediction.terms),
     ]
+
+
+def step_rows(scene: Scene) -> list[tuple[str, str]]:
+    """What sets the number of steps, and what would lower it, each with its name."""
+    return [("" if index else "steps", line) for index, line in enumerate(step_limit(scene).lines)]
 
 
 def setting_line(model: Model) -> str:

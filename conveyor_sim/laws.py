@@ -42,10 +42,16 @@ class Laws:
     """(T,), m, of the ring that a type stands on, 0 for a point; None if all stand on points."""
 
     @property
+    def friction_under_bottles(self) -> F8 | None:
+        """(H + 1, T), the floor last: coefficients of friction under the bottles, by curve or spring; None without."""
+        if self.base_spring is None or self.base_friction is None:
+            return self.base_friction if self.base_spring is None else self.base_spring.friction
+        return np.maximum(self.base_friction, self.base_spring.friction)
+
+    @property
     def largest_base_friction(self) -> float:
-        """The largest coefficient of friction under any bottle, by curve or spring; 0 if there is none."""
-        tables = (self.base_friction, None if self.base_spring is None else self.base_spring.friction)
-        return max((float(table.max()) for table in tables if table is not None), default=0.0)
+        """The largest coefficient of friction under any bottle; 0 if there is none."""
+        return 0.0 if (table := self.friction_under_bottles) is None else float(table.max())
 
 
 def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str]) -> Laws:

@@ -8,23 +8,25 @@ from importlib.metadata import version
 import llvmlite.binding as llvm
 import numpy as np
 
-from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of, prediction_of
+from conveyor_sim.effects import EffectChoice, prediction_of
+from conveyor_sim.effects.load import Load, contact_load
 from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD
 from conveyor_sim.errors import SceneError
-from conveyor_sim.laws import BaseSprings, Laws, build_laws
+from conveyor_sim.laws import BaseSprings, Laws
 from conveyor_sim.mouths import cut_at_mouths
 from conveyor_sim.plant import plant_grid, rail_arrays
 from conveyor_sim.prediction import Impact, Prediction
-from conveyor_sim.presets import target
+from conveyor_sim.remedies import too_many
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
-from conveyor_sim.timestep import Bound, fewest_steps, steps_per_tick
+from conveyor_sim.step_choice import choose_steps
+from conveyor_sim.timestep import Bound
 from conveyor_sim.version import __version__, sources_hash
 
 SKIN = 0.2
@@ -48,6 +50,8 @@ class Model:
     impacts: tuple[Impact, ...]
     """The hardest that are expected, of each pair of types and materials."""
     prediction: Prediction
+    load: Load
+    """What is expected to press on a contact for long."""
     integrator: str
     effects: tuple[EffectChoice, ...]
     belts: tuple[str, ...]
@@ -106,26 +110,18 @@ class Model:
 
 def build_model(scene: Scene) -> Model:
     """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
-    effects = choose_effects(scene)
-    on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
+    choice = choose_steps(scene)
+    laws, on, steps = choice.laws, choice.on, choice.steps
+    if steps > MOST_STEPS:
+        raise SceneError(f"{Places(scene).of(('accuracy',))}: accuracy: {too_many(scene, choice)}")
     types = list(scene.bottle_types.values())
     radius = np.array([kind.radius for kind in types])
     rails, belts, moving = rail_shapes(scene), belt_shapes(scene), moving_shapes(scene)
     rails = cut_at_mouths(rails, float(radius.max()))
     all_rails = [*rails, *(shape.shape(shape.first) for shape in moving)]
-    rail_materials = sorted({rail.material for rail in all_rails})
-    laws = build_laws(scene, rail_materials, on)
+    rail_materials = list(choice.rail_materials)
     skin = SKIN * float(radius.min())
     segments, arcs = rail_arrays(rails, rail_materials)
-    aim = target(scene.accuracy)
-    terms = Terms(scene, laws, on, aim.tolerance)
-    impacts = impacts_of(terms)
-    bounds = bounds_of(terms, impacts)
-    given = _given_steps(scene)
-    steps, reason = steps_per_tick(scene.tick, bounds, given, aim.words)
-    if steps > MOST_STEPS:
-        place = Places(scene).of(("accuracy",))
-        raise SceneError(f"{place}: accuracy: {reason}; expected at most {MOST_STEPS} steps a tick")
     dt = scene.tick_ns * 1e-9 / steps
     ahead, at_once = AHEAD.get(scene.accuracy.integrator, (1.0, 0.0))
     return Model(
@@ -133,13 +129,14 @@ def build_model(scene: Scene) -> Model:
         dt=dt,
         steps_per_tick=steps,
         tick_ns=scene.tick_ns,
-        dt_reason=reason,
-        bounds=bounds,
-        accuracy=aim.words if given is None else f"given, {_given_words(scene)}",
-        impacts=impacts,
-        prediction=prediction_of(terms, impacts, dt),
+        dt_reason=choice.reason,
+        bounds=choice.bounds,
+        accuracy=choice.aim.words if choice.given is None else f"given, {_given_words(scene)}",
+        impacts=choice.impacts,
+        prediction=prediction_of(choice.terms, choice.impacts, dt),
+        load=contact_load(choice.terms),
         integrator=scene.accuracy.integrator,
-        effects=effects,
+        effects=choice.effects,
         belts=tuple(scene.belts),
         rails=tuple(rail.name for rail in all_rails),
         bottle_types=tuple(scene.bottle_types),
@@ -160,7 +157,7 @@ def build_model(scene: Scene) -> Model:
             rail_materials=len(rail_materials),
             reach=2.0 * float(radius[0]),
             atan=1 if "atan_friction" in on else None,
-            error=terms.step_error,
+            error=choice.terms.step_error,
             ahead=ahead,
             at_once=at_once,
         ),
@@ -186,13 +183,6 @@ def versions_here() -> tuple[str, ...]:
     """ "package=version" of what can change a bit, beside the engine (`ENGINE_HASH`)."""
     packages = (f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy"))
     return f"conveyor_sim={__version__}+{sources_hash()}", *packages
-
-
-def _given_steps(scene: Scene) -> int | None:
-    """Steps a tick that the scene itself gives."""
-    if scene.accuracy.dt is not None:
-        return fewest_steps(scene.tick, scene.accuracy.dt)
-    return scene.accuracy.per_tick
 
 
 def _given_words(scene: Scene) -> str:

@@ -34,6 +34,8 @@ class Run:
     """Ended early by Ctrl-C or a request to terminate."""
     peak_force: float | None
     """N, the largest normal contact force; None where the scene has no effect `peaks`."""
+    load: float | None
+    """N, that pressed on a bottle for long (`achieved.Pressed`); None where it is not known."""
     guard: tuple[str, ...]
     """What the guard said."""
 
@@ -68,7 +70,7 @@ def run_scene(
             recorder.close()
         wall = time.monotonic() - start
         noticed = tuple(event.text for event in outputs.take_noticed())
-        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, noticed)
+        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, noticed)
 
 
 @contextmanager

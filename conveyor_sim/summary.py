@@ -14,7 +14,7 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from conveyor_sim.achieved import Achieved, achieved
+from conveyor_sim.achieved import Achieved, Pressed, PressWatch, achieved, pressed
 from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.bag.recorded_scene import recorded_scene
@@ -26,6 +26,9 @@ from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.printable import SENTENCE, printable
+from conveyor_sim.remedies import step_limit
+from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.step_choice import choose_steps
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3
@@ -123,8 +126,12 @@ class Summary:
     """Integrator and time step, and why."""
     predicted: str | None
     """The errors to expect; None if this version refuses the recorded scene."""
+    steps: list[str]
+    """What sets the number of steps, and what would lower it; empty if this version would choose another number."""
     achieved: Achieved | None
     """What the peak force says; None if it or the prediction is not known."""
+    pressed: Pressed | None
+    """What pressed for long; None if it is not known, or no bound on the time step rests on it."""
     guard: dict[str, int]
     """How often the guard said something, by kind (`GuardEvent.kind`)."""
     guard_texts: list[str]
@@ -182,6 +189,7 @@ class _Tally:
         self._guard: list[tuple[str, str]] = []
         self._borne: Borne | None = None
         self._passed: list[tuple[str, str]] = []
+        self._pressing = PressWatch()
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
@@ -192,7 +200,9 @@ class _Tally:
         self._last_tick = max(self._last_tick, int(message.tick))
         if kind == BOTTLES:
             self._bottles = to_columns(BottleColumns, message)
-            self._itinerary.take(self._bag.time(message.tick), self._bottles)
+            time = self._bag.time(message.tick)
+            self._itinerary.take(time, self._bottles)
+            self._pressing.take(time, self._bottles.id, self._bottles.impulse)
             self._forces.append(self._bottles.peak_force[self._bottles.peak_force > 0.0])
             self._unknown = self._unknown or bool(np.isnan(self._bottles.peak_force).any())
         elif kind == SIGNALS:
@@ -228,7 +238,9 @@ class _Tally:
             peak_force_99=None if self._unknown else float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
             setting=printable(f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}", SENTENCE),
             predicted=None if model is None else model.prediction.sentence,
+            steps=_steps(line),
             achieved=None if model is None else achieved(model, peak),
+            pressed=None if model is None else pressed(model, self._pressing.load),
             guard=dict(Counter(kind for kind, _ in self._guard)),
             guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
             energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),
@@ -288,6 +300,17 @@ def _model(line: Any) -> Model | None:
         return None
 
 
+def _steps(line: Any) -> list[str]:
+    """What sets the steps of a recorded scene; nothing if this version would choose others than were recorded."""
+    try:
+        scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
+        choice = choose_steps(scene)
+    except SceneError:
+        return []
+    same = (scene.accuracy.integrator, choice.steps) == (line.integrator, line.steps_per_tick)
+    return step_limit(scene, choice).lines if same else []
+
+
 def render(summary: Summary) -> Group:
     """The summary for a terminal."""
     account = Table.grid(padding=(0, 2))
@@ -330,6 +353,8 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("setting", summary.setting),
         ("predicted error", "not known" if summary.predicted is None else summary.predicted),
         ("achieved", "not known" if summary.achieved is None else summary.achieved.sentence),
+        *([] if summary.pressed is None else [("load", summary.pressed.sentence)]),
+        *([("steps", "\n".join(summary.steps))] if summary.steps else []),
         ("guard", _told(summary.guard, summary.guard_texts)),
         *([] if summary.borne is None else [("damage", summary.borne.sentence)]),
         *([("limits passed", _told(summary.damage_events, summary.damage_texts))] if summary.damage_events else []),

@@ -4,9 +4,9 @@ import math
 from typing import Any
 
 import pytest
-from scenes import MASS, NO_FLOOR, PEAKS, RADIUS, bottle, contact, kind, scene, simulation
+from scenes import MASS, NO_FLOOR, PEAKS, RADIUS, base, belt, bottle, contact, kind, scene, segment, simulation
 
-from conveyor_sim.achieved import Achieved, PeakWatch, achieved
+from conveyor_sim.achieved import Achieved, PeakWatch, achieved, pressed
 from conveyor_sim.model import build_model
 
 K = 5e3
@@ -54,7 +54,8 @@ def test_the_overlap_follows_from_the_force(law: dict[str, Any], overlap: float)
 
 def test_the_overlap_is_that_of_the_softest_contact_and_the_smaller_bottle() -> None:
     types = {"bottle": kind(), "small": kind(0.03, 0.2)}
-    assert reached(10.0, bottle_types=types).overlap == pytest.approx(10.0 / K / 0.06)
+    both = [bottle(0.0, 0.0, 1.0), bottle(1.0, 0.0, type="small")]
+    assert reached(10.0, bottle_types=types, bottles=both).overlap == pytest.approx(10.0 / K / 0.06)
 
 
 def test_where_nothing_touches_nothing_is_said() -> None:
@@ -80,3 +81,34 @@ def test_without_peaks_the_largest_force_is_not_known() -> None:
     assert sim.peak_force is None
     assert PeakWatch(sim).force is None
     assert simulation(**TWO, **PEAKS).peak_force == 0.0
+
+
+def test_what_presses_for_long_is_half_of_the_forces_on_a_bottle() -> None:
+    """Five in a queue against a stop, each dragged by mu m g: the first has 5 of the stop and 4 of the next."""
+    places = [bottle(-2.0 * RADIUS * n, 0.0) for n in range(5)]
+    sim = simulation(
+        contacts=[contact(5e3, damping=("normal", 5.0), friction=0.1), contact(5e3, "steel", ("normal", 5.0), 0.1)],
+        base=base(0.4), belts={"table": belt(0.2)}, rails={"stop": segment((RADIUS, -0.2), (RADIUS, 0.2))},
+        bottles=places, outputs={"bottles": 50},
+    )  # fmt: skip
+    watch = PeakWatch(sim)
+    for _ in range(500):
+        sim.advance()
+        watch.after_tick()
+    drag = 0.4 * MASS * 9.81
+    assert watch.load == pytest.approx(4.5 * drag, rel=0.01)
+    found = pressed(sim.model, watch.load)
+    assert found is not None and found.as_expected
+    assert found.sentence == (
+        f"pressed for 1 s with at most {watch.load:.3g} N, within the {15 * drag:.3g} N that friction in contacts is "
+        "stable at (all 5 bottles)"
+    )
+    harder = pressed(sim.model, 16 * drag)
+    assert harder is not None
+    assert harder.sentence.endswith(
+        "(all 5 bottles): friction may chatter; friction_solver: implicit or more steps a tick help"
+    )
+
+
+def test_where_no_bound_rests_on_it_no_load_is_told() -> None:
+    assert pressed(build_model(scene(**TWO)), 1.0) is None

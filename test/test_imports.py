@@ -14,6 +14,8 @@ FLOORS = [
     ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["mouths", "plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
+    ["step_choice"],
+    ["remedies"],
     ["model"],
     ["empty_damage"],
     ["empty_world"],

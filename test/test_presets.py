@@ -46,13 +46,13 @@ def steps_of(name: str) -> list[int]:
 
 
 def test_shipped_scenes() -> None:
-    """Contact friction in a queue rules where contacts are soft; with few bottles, the peak between two steps.
+    """Contact friction in a pile rules where contacts are soft; with few bottles, the peak between two steps.
 
     On a belt that turns, resting load: 1 / tolerance steps in v_lim / (mu g) for an integrator of first order.
     """
     assert steps_of("two_bottles") == [1, 2, 5]
-    assert steps_of("turntable") == [157, 393, 3924]
-    assert steps_of("paper_plant") == [157, 393, 3924]
+    assert steps_of("turntable") == [158, 393, 3924]
+    assert steps_of("paper_plant") == [240, 393, 3924]
 
 
 def test_the_table_has_the_numbers() -> None:

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.model import build_model
+from conveyor_sim.remedies import step_limit
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.summary import render, summarize, write_summary
 
@@ -83,6 +84,7 @@ def test_a_recording_is_told_the_errors_of_the_steps_it_ran_with(bag: Path, tmp_
     summary = summarize(edited(bag, tmp_path / "older", lengthen))
     assert summary.predicted == build_model(load_scene(SMALL_LINE, ran)).prediction.sentence
     assert summary.predicted != summarize(bag).predicted
+    assert summary.steps == []
 
 
 def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
@@ -94,6 +96,10 @@ def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_
     assert summary.predicted is None
     assert summary.achieved is None
     assert summary.peak_force is not None
+
+
+def test_what_sets_the_steps_is_told(bag: Path) -> None:
+    assert summarize(bag).steps == step_limit(load_scene(SMALL_LINE)).lines != []
 
 
 def test_foreign_text_in_a_recording_is_told_in_printable_words(bag: Path, tmp_path: Path) -> None:

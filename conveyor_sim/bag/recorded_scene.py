@@ -3,12 +3,16 @@
 from typing import Any
 
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
-from conveyor_sim.scene.accuracy import explicit
 
 
 def recorded_scene(line: Any, name: str) -> Scene:
-    """The scene of a recorded Line message; `name` stands for its file in errors. SceneError if it is refused today."""
+    """The scene of a recorded Line message; `name` stands for its file in errors. SceneError if it is refused today.
+
+    It is never read in today's defaults, which may be none that it allows.
+    """
     overrides = parse_overrides(line.overrides)
-    error = parse_scene(line.scene_text, name, overrides).accuracy.error
-    ran = explicit(line.integrator, line.steps_per_tick, error)
-    return parse_scene(line.scene_text, name, {**overrides, "accuracy": ran})
+    given = overrides.get("accuracy")
+    kept = given if isinstance(given, dict) else {}  # such as `error`; a preset or tolerance has come to the steps
+    ran = {"integrator": str(line.integrator), "per_tick": int(line.steps_per_tick)}
+    pinned = {**kept, "preset": None, "tolerance": None, "dt": None, **ran}
+    return parse_scene(line.scene_text, name, {**overrides, "accuracy": pinned})

@@ -201,8 +201,7 @@ def _environment(bag: Bag, simulation: Simulation) -> tuple[str, ...]:
         ("engine", line.engine_hash, model.engine_hash),
         ("versions", ", ".join(line.versions), ", ".join(model.versions)),
         ("machine", line.machine, model.machine),
-        ("integrator", line.integrator, model.integrator),
-        ("steps a tick", line.steps_per_tick, model.steps_per_tick),
+        ("effects", ", ".join(line.effects), ", ".join(effect.name for effect in model.effects if effect.on)),
         ("dt", line.dt, model.dt),
         ("seed", line.seed, simulation.scene.seed),
     ]

@@ -14,11 +14,12 @@ from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
 from conveyor_sim.effects.impacts import impact_bounds, impacts
+from conveyor_sim.effects.load import contact_load
 from conveyor_sim.effects.observers import CONTACT_ARRAYS, ENERGY_LEDGER, PEAKS
 from conveyor_sim.effects.rotation import ROTATION
 from conveyor_sim.effects.static_friction import STATIC_FRICTION
 from conveyor_sim.effects.supply import INFEED, OUTFEED
-from conveyor_sim.effects.terms import Terms, most_bottles, queue_force, queue_length
+from conveyor_sim.effects.terms import Terms, most_bottles
 from conveyor_sim.errors import SceneError
 from conveyor_sim.prediction import Impact, Prediction, predict
 from conveyor_sim.scene.effect_names import EffectName
@@ -109,8 +110,8 @@ def prediction_of(terms: Terms, expected: Sequence[Impact], dt: float) -> Predic
     on = [effect for effect in EFFECTS if effect.name in terms.on]
     sides = [term for effect in on if effect.side is not None for term in effect.side(terms, dt)]
     resting = [term for effect in on if effect.resting is not None for term in effect.resting(terms, dt)]
-    pressing = (queue_force(terms), f"a single-file queue of {queue_length(terms.scene)}")
-    return predict(expected, resting, sides, pressing, dt)
+    load = contact_load(terms)
+    return predict(expected, resting, sides, (load.force, load.reason), dt)
 
 
 def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterator
 
 from conveyor_sim.effects.declaration import Cause, Effect
+from conveyor_sim.effects.load import contact_load
 from conveyor_sim.effects.movers import mover_bounds
 from conveyor_sim.effects.terms import (
     Meeting,
@@ -13,7 +14,6 @@ from conveyor_sim.effects.terms import (
     meetings,
     most_bottles,
     overlap_at,
-    queue_force,
     steepest,
     table_of,
     tightest,
@@ -94,7 +94,7 @@ def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
     k = meeting.value(meeting.law.hertz)
     if k == 0.0:
         return 0.0, ""
-    pressed = overlap_at(meeting, terms, queue_force(terms))
+    pressed = overlap_at(meeting, terms, contact_load(terms).force)
     tangent = 1.5 * k * max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed) ** 0.5
     return tangent, f"dN/d delta = {tangent:.3g} N/m"
 
@@ -148,8 +148,8 @@ HERTZ = Effect(
     absent="no contact with hertz_stiffness",
     needs="k by pair of materials",
     bounds=_stable("Hertz ", _hertz),
-    bound="those of linear at the tangent stiffness, pressed by an impact at v or by a queue; v is the speed of the "
-    "fastest belt or infeed, or that by which bottles differ at the start, 1 m/s if all rest",
+    bound="those of linear at the tangent stiffness, pressed by an impact at v or by belts as in contact_friction; v "
+    "is the speed of the fastest belt or infeed, or that by which bottles differ at the start, 1 m/s if all rest",
     shares=_peak(_hertz),
     share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the deepest of an impact at v: a peak between two "
     "steps",

@@ -5,6 +5,7 @@ from collections.abc import Collection
 
 from conveyor_sim.effects.contacts import contacts_in_use
 from conveyor_sim.effects.declaration import Cause, Effect
+from conveyor_sim.effects.load import contact_load
 from conveyor_sim.effects.terms import (
     Meeting,
     Terms,
@@ -14,8 +15,6 @@ from conveyor_sim.effects.terms import (
     impact_speed,
     meetings,
     overlap_at,
-    queue_force,
-    queue_length,
     tightest,
 )
 from conveyor_sim.prediction import Term
@@ -31,18 +30,18 @@ def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
 
 
 def _contact_friction_bounds(terms: Terms) -> list[Bound]:
-    """At the force with which a single-file queue of all bottles presses."""
-    force, queue = queue_force(terms), queue_length(terms.scene)
-    if force == 0.0 or "implicit_friction" in terms.on or not terms.method.explicit:
+    """At the load that belts can put on a contact."""
+    load = contact_load(terms)
+    if load.force == 0.0 or "implicit_friction" in terms.on or not terms.method.explicit:
         return []
     candidates = []
     for meeting in meetings(terms):
         mu, kind = _curve_friction(meeting), meeting.first
         if mu > 0.0:
             dt = contact_friction_bound(
-                mu, force, kind.mass, kind.moment_of_inertia, kind.radius, terms.scene.slip_limit
+                mu, load.force, kind.mass, kind.moment_of_inertia, kind.radius, terms.scene.slip_limit
             )
-            at = f"at mu = {mu:g} and N = {force:.3g} N, a single-file queue of {queue}"
+            at = f"at mu = {mu:g} and N = {load.force:.3g} N, {load.reason}"
             candidates.append(drag_bound(terms, dt, f"v_lim / [2 mu (1/m + R^2/J) N] {at}"))
     return tightest("contact friction", candidates, stability=True)
 
@@ -110,7 +109,7 @@ def _rim_mobility(kind: BottleType | None) -> float:
 def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
     """N/m, of the tangential spring; Mindlin's at the deepest overlap of an impact or a queue."""
     if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
-        pressed = overlap_at(meeting, terms, queue_force(terms))
+        pressed = overlap_at(meeting, terms, contact_load(terms).force)
         return mindlin * math.sqrt(max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed))
     return meeting.value(meeting.law.tangential_stiffness)
 
@@ -136,7 +135,8 @@ CONTACT_FRICTION = Effect(
     absent="no contact with friction",
     needs="mu by pair of materials",
     bounds=_contact_friction_bounds,
-    bound="v_lim / [2 mu (1/m + R^2/J) N], N the force of all bottles in a single-file queue",
+    bound="v_lim / [2 mu (1/m + R^2/J) N], N what belts full of bottles press with on "
+    "a contact, at most all bottles there can be (effects/load.py)",
     side=_kick,
     beside="of the tangential speed after an impact, mu (w dt)^2 / 2 of the speed of impact, in fewer steps a contact "
     "than 2 pi mu v / v_lim",

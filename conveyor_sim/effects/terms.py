@@ -15,9 +15,6 @@ from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import BottleType, Scene, Single
 from conveyor_sim.timestep import Bound, contact_time, hertz_contact_time, least_steps
 
-ENDLESS_QUEUE = 100
-"""Bottles assumed to press on each other where an infeed has no end."""
-
 SPEED_AT_REST = 1.0
 """m/s, assumed of impacts where nothing in a scene moves at first."""
 
@@ -79,17 +76,20 @@ class Meeting:
 
 
 def meetings(terms: Terms) -> Iterator[Meeting]:
-    """Every pair of types that can touch, then every type and rail material."""
+    """Every pair of types that can touch, then every type and rail material; types that no bottle has are left out."""
     types = terms.types
+    present = [index for index, name in enumerate(terms.scene.bottle_types) if name in supply(terms.scene)]
     if terms.laws.pair is not None:
-        for a, one in enumerate(types):
-            for b, other in enumerate(types):
+        for a in present:
+            for b in present:
+                one, other = types[a], types[b]
                 reduced = one.mass * other.mass / (one.mass + other.mass)
                 yield Meeting("two bottles", terms.laws.pair, a * len(types) + b, reduced, one, other)
     if terms.laws.rail is not None:
         columns = [column for column in terms.laws.rail if column is not None]
         materials = columns[0].size // len(types) if columns else 0
-        for a, one in enumerate(types):
+        for a in present:
+            one = types[a]
             for material in range(materials):
                 entry = a * materials + material
                 yield Meeting("a bottle and a rail", terms.laws.rail, entry, one.mass, one, None)
@@ -109,29 +109,24 @@ def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
     return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
 
 
+def supply(scene: Scene) -> dict[str, float]:
+    """How many bottles of each type a run can hold at most, by name; infinite from an infeed without end.
+
+    Types that no bottle has are not in it.
+    """
+    found: dict[str, float] = {}
+    for name, *_ in initial_bottles(scene):
+        found[name] = found.get(name, 0.0) + 1.0
+    for _, entry in scene.entries():
+        count = None if isinstance(entry, Source) else entry.count
+        found[entry.bottle] = found.get(entry.bottle, 0.0) + (math.inf if count is None else count)
+    return found
+
+
 def most_bottles(scene: Scene) -> int | None:
     """Bottles that a run can hold at most, None if an infeed has no end."""
-    fed = 0
-    for _, entry in scene.entries():
-        if isinstance(entry, Source) or entry.count is None:
-            return None
-        fed += entry.count
-    return fed + len(initial_bottles(scene))
-
-
-def queue_length(scene: Scene) -> int:
-    """Bottles that may press on each other in a single file."""
-    most = most_bottles(scene)
-    return ENDLESS_QUEUE if most is None else most
-
-
-def queue_force(terms: Terms) -> float:
-    """Force with which a single-file queue of all bottles presses, N; 0 without friction under them."""
-    if (friction := terms.laws.largest_base_friction) == 0.0:
-        return 0.0
-    # Which types queue behind which is not known: the heaviest may press on the lightest.
-    heaviest = max(kind.mass for kind in terms.types)
-    return queue_length(terms.scene) * friction * heaviest * terms.scene.gravity
+    most = sum(supply(scene).values())
+    return int(most) if math.isfinite(most) else None
 
 
 def impact_speed(scene: Scene) -> float:

@@ -18,7 +18,8 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.scene import load_scene
+from conveyor_sim.model import build_model
+from conveyor_sim.scene import load_scene, parse_scene
 
 
 def test_recording_replays_bit_for_bit(bag: Path) -> None:
@@ -208,6 +209,44 @@ def test_stock_recording_that_began_late_replays_what_it_has(bag: Path, tmp_path
     report = replay(stock(bag, tmp_path / "stock", iter(messages)))
     assert report.difference is None
     assert report.first_tick == 41
+
+
+def test_a_recording_replays_in_the_steps_and_the_integrator_that_it_ran_in(tmp_path: Path) -> None:
+    """The scene of the bag states neither, as of a version that chose others; the replay is exact all the same."""
+    ran = {"accuracy": {"integrator": "velocity_verlet", "per_tick": 73}}
+    record(load_scene(SMALL_LINE, ran), tmp_path / "ran", 60)
+
+    def forget(name: str, message: Any) -> None:
+        if name == "line":
+            message.overrides = ""
+
+    forgetful = edited(tmp_path / "ran", tmp_path / "forgetful", forget)
+    with open_bag(forgetful) as opened:
+        chosen = build_model(parse_scene(opened.line.scene_text))
+    assert (chosen.integrator, chosen.steps_per_tick) != ("velocity_verlet", 73)
+    report = replay(forgetful)
+    assert report.difference is None
+    assert report.exact and report.environment == ()
+
+
+def test_a_recording_of_more_steps_than_this_version_takes_is_refused(bag: Path, tmp_path: Path) -> None:
+    def many(name: str, message: Any) -> None:
+        if name == "line":
+            message.steps_per_tick = 3_500_000
+
+    with pytest.raises(SceneError, match=r"is refused by this version:\n.*accuracy.per_tick: 3500000 given"):
+        replay(edited(bag, tmp_path / "many", many))
+
+
+def test_effects_that_were_not_recorded_are_said(bag: Path, tmp_path: Path) -> None:
+    """Such as those of another default: replayed, and compared within the tolerance."""
+
+    def more(name: str, message: Any) -> None:
+        if name == "line":
+            message.effects = [*message.effects, "unheard_of"]
+
+    (told,) = replay(edited(bag, tmp_path / "more", more)).environment
+    assert told.startswith("effects: ") and "unheard_of recorded, " in told
 
 
 def test_scene_that_is_refused_today_is_said(bag: Path, tmp_path: Path) -> None:
