@@ -87,7 +87,9 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 
 @main.command()
 @click.argument("scene")
-@click.option("--price", is_flag=True, help="Measure what each effect costs, in ns per bottle and step.")
+@click.option(
+    "--price", is_flag=True, help="Measure what each effect costs, in ns per bottle and step, and what remedies bring."
+)
 @click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
@@ -118,7 +120,11 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
         pricing.prepare(bar.update)
     with ProgressBar("with and without, in turn", 0.0, counted="measurements") as bar:
         prices = pricing.measure(bar.update)
+    with ProgressBar("with what would take fewer steps", 0.0, counted="measurements") as bar:
+        gains = pricing.gains(bar.update)
     _print(price_table(prices))
+    for gain in gains:
+        click.echo(f"fewer steps: {gain.sentence}")
 
 
 @main.command()

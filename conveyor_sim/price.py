@@ -11,6 +11,7 @@ from statistics import median
 from conveyor_sim.effects import EFFECTS
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model import Model
+from conveyor_sim.remedies import step_limit, with_remedy
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.accuracy import explicit
 from conveyor_sim.simulation import Simulation
@@ -69,6 +70,26 @@ class PriceList:
 
 
 @dataclass(frozen=True)
+class Gain:
+    """What a remedy (`remedies.py`) brings in time: a tick of the scene over a tick with it, from the same state."""
+
+    words: str
+    steps: int
+    """In a tick with it."""
+    faster: float
+    """Times; the median of paired measurements. Below 1 it is slower."""
+    low: float
+    """Between `low` and `high` lies the true median with CONFIDENCE."""
+    high: float
+
+    @property
+    def sentence(self) -> str:
+        """All of it."""
+        span = f"{CONFIDENCE:.0%} within {self.low:.2g} .. {self.high:.2g}"
+        return f"{self.words}: {self.steps} steps a tick, measured {self.faster:.2g} times as fast ({span})"
+
+
+@dataclass(frozen=True)
 class _Variant:
     name: str
     simulation: Simulation
@@ -78,8 +99,9 @@ class _Variant:
 class Pricing:
     """Runs a scene to a warm state, then prices every effect that is on and can be forced off.
 
-    To be called in this order: `warm_up`, `prepare`, `measure`; each tells its progress. Every variant takes the steps
-    a tick that the scene has as it is. SceneError or SimulationError if the scene does not run.
+    To be called in this order: `warm_up`, `prepare`, `measure`, `gains`; each tells its progress. Every variant takes
+    the steps a tick that the scene has as it is, but those of `gains`. SceneError or SimulationError if the scene does
+    not run.
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
@@ -142,6 +164,23 @@ class Pricing:
                 choice.name for choice in warm.model.effects if choice.on and choice.name not in _removable(warm.model)
             ),
         )
+
+    def gains(self, progress: Progress, rounds: int = ROUNDS) -> tuple[Gain, ...]:
+        """What the remedies of the scene bring, after `warm_up`; progress in measurements."""
+        found, remedies = [], step_limit(self._scene).remedies
+        for index, remedy in enumerate(remedies):
+            simulation = Simulation(with_remedy(self._scene, remedy.overrides), threads=1, shorten=False)
+            ticks = min(_ticks_of(self._full, self._warm), _ticks_of(simulation, self._warm))
+            ratios = []
+            for count in range(rounds):
+                times = [_run(one, self._warm, ticks)[0] for one in (self._full, simulation)[:: 1 if count % 2 else -1]]
+                before, after = times if count % 2 else times[::-1]
+                ratios.append(before / after)
+                progress(index * rounds + count + 1, len(remedies) * rounds)
+            ratios.sort()
+            rank = _rank(rounds)
+            found.append(Gain(remedy.words, remedy.steps, median(ratios), ratios[rank], ratios[-1 - rank]))
+        return tuple(found)
 
 
 def _removable(model: Model) -> list[str]:

@@ -41,7 +41,7 @@ def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
         "7 at the start",
         "straight, turn",
         "turn_outer",
-        "100 steps a tick, given in the scene; 4.7 x beyond the bound of stability by contact friction",
+        "100 steps a tick, given in the scene; 3 x beyond the bound of stability by contact friction",
         "accuracy given, 100 steps a tick",
         "% in the peak force of impacts: impact of two bottles, ",
         "% in creep on curved belts: 25.5 steps in v_lim / (mu g)",
@@ -99,11 +99,12 @@ def test_run_of_a_duration_that_is_no_number_of_ticks_is_refused(command: Comman
 def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     result = command("run", SMALL_LINE, "--no-record", "--duration", "0.1")
     assert result.exit_code == 0, result.output
-    setting, *_, last = result.output.splitlines()
+    setting, *_, peak, steps = result.output.splitlines()
     assert setting.startswith("semi_implicit_euler, dt = 100 us (100 steps a tick, given in the scene; ")
     assert "; predicted error: " in setting
     assert "0.10 s simulated in" in result.output
-    assert last.startswith("peak force ")
+    assert peak.startswith("peak force ")
+    assert steps.startswith("100 steps a tick are given in the scene; base slip needs ")
     assert list(tmp_path.iterdir()) == []
 
 

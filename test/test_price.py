@@ -51,6 +51,18 @@ def test_variants_take_the_steps_of_the_scene() -> None:
     assert pricing._warm.model.steps_per_tick > 2
 
 
+def test_what_takes_fewer_steps_is_measured() -> None:
+    """A thousand steps a tick are given where two would do."""
+    pricing = Pricing(scene(**{**FIELDS, "accuracy": {"per_tick": 1000}}), at=0.02)
+    pricing.warm_up(lambda done, whole: None)
+    seen: list[tuple[float, float]] = []
+    (gain,) = pricing.gains(lambda done, whole: seen.append((done, whole)), rounds=7)
+    assert seen[-1] == (7, 7)
+    assert (gain.words, gain.steps) == ("without accuracy.per_tick", 2)
+    assert 0.0 < gain.low <= gain.faster <= gain.high
+    assert gain.sentence.startswith("without accuracy.per_tick: 2 steps a tick, measured ")
+
+
 @pytest.mark.parametrize("count", range(1, 40))
 def test_interval_of_the_median_covers_95_percent(count: int) -> None:
     """By the binomial distribution of how many values lie below the median; no narrower than that, no wider."""
