@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 from conveyor_sim.effects.base import MEETING
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, impact_speed, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
 from conveyor_sim.laws import base_springs
 from conveyor_sim.methods import Share
 from conveyor_sim.scene.schema import Scene
@@ -34,7 +34,7 @@ def _bounds(terms: Terms) -> list[Bound]:
             reason = f"{terms.steps:.3g} steps in pi sqrt(m / k) at k = {k:g} N/m"
             springs.append((contact_time(k, kind.mass) / terms.steps, reason))
         if c > 0.0:
-            dashpots.append((damping_bound(c, kind.mass), f"m / (2 c) at c = {c:g} kg/s"))
+            dashpots.append(drag_bound(terms, damping_bound(c, kind.mass), f"m / (2 c) at c = {c:g} kg/s"))
     return [*tightest("base spring", springs), *tightest("base spring damping", dashpots, stability=True)]
 
 
