@@ -29,7 +29,7 @@ def chi_of(inertia: float) -> float:
     return 0.5 * KAPPA * (1.0 + 1.0 / inertia)
 
 
-def impacts(inertia: float) -> tuple[np.ndarray, np.ndarray]:
+def impacts(inertia: float, integrator: str) -> tuple[np.ndarray, np.ndarray]:
     """psi_2 of impacts on a rail, and of pairs of bottles, (psi,) each, at PSI."""
     deepest = (1.25 * MASS * SPEED**2 / STIFFNESS) ** 0.4
     lasts = 2.943 * deepest / SPEED
@@ -40,7 +40,7 @@ def impacts(inertia: float) -> tuple[np.ndarray, np.ndarray]:
     places = 1.0 + 0.3 * np.arange(PSI.size)
     sim = simulation(
         tick=tick,
-        accuracy={"per_tick": STEPS},
+        accuracy={"per_tick": STEPS, "integrator": integrator},
         lever_arm="radius",
         bottle_types={"bottle": kind(inertia=inertia * MASS * RADIUS**2)},
         contacts=[contact(None, **springy), contact(None, "steel", **springy)],
@@ -101,11 +101,12 @@ def maw(inertia: float, springs: int = 200) -> np.ndarray:
     return np.asarray(KAPPA * slip / MU)
 
 
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "rk4"])
 @pytest.mark.parametrize("body", INERTIA)
-def test_oblique_impacts(body: str) -> None:
+def test_oblique_impacts(body: str, integrator: str) -> None:
     inertia = INERTIA[body]
     chi = chi_of(inertia)
-    on_rail, in_pairs = impacts(inertia)
+    on_rail, in_pairs = impacts(inertia, integrator)
     law, curve = by_force(inertia), maw(inertia)
 
     # The engine has the law, on rails as in pairs, whose normal turns meanwhile, the more the faster they pass.
