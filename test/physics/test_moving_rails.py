@@ -85,6 +85,29 @@ def test_a_pusher_leaves_a_bottle_at_rest_with_twice_its_speed(integrator: str) 
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_pusher_carries_the_friction_of_what_it_pushes_and_its_acceleration(integrator: str) -> None:
+    """Resting load: mu m g + m a while it speeds up, then mu m g; means, for the contact rings at first."""
+    acceleration, top = 0.1, 0.1
+    slow = pusher("steel", max_speed=top, acceleration=acceleration)
+    sim = plant(bottle(RADIUS + 1e-4, 0.0), floor={"friction": 0.4}, pushers={"p": slow}, **with_integrator(integrator))
+    sim.command(["pushers/p/push"], [1])
+
+    def mean_force(ticks: int) -> float:
+        forces = []
+        for _ in range(ticks):
+            sim.advance(1)
+            contacts = sim.contacts()
+            forces.append(float(contacts.normal_force[contacts.a == 0].sum()))
+        return float(np.mean(forces))
+
+    friction = 0.4 * MASS * 9.81
+    sim.advance(40)
+    assert mean_force(50) == pytest.approx(friction + MASS * acceleration, rel=1e-3)
+    sim.advance(60)
+    assert mean_force(100) == pytest.approx(friction, rel=1e-3)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_an_encounter_is_the_same_seen_from_the_rail(integrator: str) -> None:
     """Damping and friction know the rail's velocity: a rail that comes askew, against one at rest (Galilei)."""
     sims, askew = [], 0.3
