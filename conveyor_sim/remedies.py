@@ -36,7 +36,7 @@ STEP_COST: Mapping[str, int] = {
 }
 """Of a step, in evaluations of all forces and what is like them."""
 
-OTHERS = ("velocity_verlet", "linearly_implicit")
+OTHERS = ("velocity_verlet",)
 """Integrators that a remedy may choose."""
 
 BOTTLE_STEP = 3e-8
