@@ -26,18 +26,18 @@ def _friction(scene: Scene, on: Collection[str]) -> Cause | None:
 
 
 def _friction_bounds(terms: Terms) -> list[Bound]:
-    if terms.laws.base_friction is None or _implicit_point(terms):
+    if terms.laws.base_friction is None:
         return []
     mu, g, limit = float(terms.laws.base_friction.max()), terms.scene.gravity, terms.scene.slip_limit
-    bounds = []
-    if terms.method.explicit:
+    implicit, bounds = _implicit_point(terms), []
+    if terms.method.explicit and not implicit:
         reason = f"half of v_lim / (mu g) at mu = {mu:g}"
         bounds.append(
             Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
         )
-    # On a belt that turns, what rests is off by one part in these steps: by no more than the tolerance.
+    # On a belt that turns, what rests is off by one part in these steps, implicit or not: at most by the tolerance.
     turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
-    if (steps := max(_slip_steps(terms), turning)) > 0.0:
+    if (steps := max(0.0 if implicit else _slip_steps(terms), turning)) > 0.0:
         reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
         bounds.append(Bound("base slip", slip_time(mu, g, limit) / steps, reason))
     return bounds

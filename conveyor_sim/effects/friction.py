@@ -162,7 +162,8 @@ IMPLICIT_FRICTION = Effect(
     called_for=_implicit,
     absent="friction_solver is explicit, or nothing has friction",
     needs="closed contacts and 1/m + R^2/J of each bottle",
-    bound="none, and lifts those of contact_friction and, under points, base_friction",
+    bound="none, and lifts those of contact_friction and, under points, base_friction; with semi-implicit Euler not "
+    "that of belts that turn",
 )
 TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
