@@ -239,7 +239,7 @@ def test_the_error_is_that_of_the_worst_impact() -> None:
 def test_a_scene_without_contacts_has_no_force_to_be_wrong() -> None:
     prediction = build_model(scene(bottles=[bottle(0.0, 0.0)], floor={"friction": 0.3})).prediction
     assert prediction.value is None
-    assert prediction.sentence == "no contact force"
+    assert prediction.sentence == "no impacts"
 
 
 def test_what_a_queue_presses_with_is_expected_too() -> None:
