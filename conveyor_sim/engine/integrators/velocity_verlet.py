@@ -46,6 +46,8 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
         evaluate_forces(line, member, dt)
+        if steps == 0:
+            return 0
         note_damage(world, member, dt)
         for first in range(begin, stop, BLOCK):
             _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
