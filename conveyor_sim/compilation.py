@@ -140,7 +140,10 @@ def child() -> None:
     """Compile for the parent: the scene comes on the standard input; kernels that can't be cached go back."""
     task, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever else is printed
-    engine, folder, scene = pickle.load(task)
+    try:
+        engine, folder, scene = pickle.load(task)
+    except EOFError:  # the parent was interrupted before it could say
+        return
     if engine != ENGINE_HASH:  # the sources have changed in between
         return
     threading.Thread(target=_end_with_parent, args=(task,), daemon=True).start()

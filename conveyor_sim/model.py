@@ -12,7 +12,7 @@ from conveyor_sim.effects import EffectChoice, prediction_of
 from conveyor_sim.effects.load import Load, contact_load
 from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
 from conveyor_sim.engine.compile import ENGINE_HASH
-from conveyor_sim.engine.integrators import AHEAD
+from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws import BaseSprings, Laws
 from conveyor_sim.mouths import cut_at_mouths
@@ -160,6 +160,7 @@ def build_model(scene: Scene) -> Model:
             error=choice.terms.step_error,
             ahead=ahead,
             at_once=at_once,
+            lag=LAG.get(scene.accuracy.integrator, 0.0),
         ),
         pair_law=laws.pair,
         rail_law=laws.rail,

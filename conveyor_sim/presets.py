@@ -46,9 +46,9 @@ def table() -> str:
             "by which a peak between two of so many steps is missed, (π/n)²/8",
             lambda tolerance: percent((math.pi / least_steps(tolerance)) ** 2 / 8.0),
         ),
-        ("steps in v_lim/(μ g), semi-implicit Euler", lambda tolerance: f"{least_steps(tolerance):.3g}"),
+        ("steps in v_lim/(μ g), leapfrog and semi-implicit Euler", lambda tolerance: f"{least_steps(tolerance):.3g}"),
         (
-            "the same where a belt turns: creep and resting load are off by one part in them",
+            "the same for semi-implicit Euler where a belt turns: creep and resting load are off by one part in them",
             lambda tolerance: f"{1.0 / tolerance:.0f}",
         ),
     ]

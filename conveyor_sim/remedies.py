@@ -28,6 +28,7 @@ NEAR = 2.0
 """Times the cost of the first remedy, up to which the second is named."""
 
 STEP_COST: Mapping[str, int] = {
+    "leapfrog": 1,
     "semi_implicit_euler": 1,
     "velocity_verlet": 1,
     "rk4": 4,
@@ -36,7 +37,7 @@ STEP_COST: Mapping[str, int] = {
 }
 """Of a step, in evaluations of all forces and what is like them."""
 
-OTHERS = ("velocity_verlet",)
+OTHERS = ("leapfrog", "velocity_verlet")
 """Integrators that a remedy may choose."""
 
 BOTTLE_STEP = 3e-8
@@ -167,7 +168,7 @@ def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping
     if onset is not None:
         words = f"damping: {{law: onset, speed: {impact_speed(scene):g}}} where a restitution is given"
         yield words, {"contacts": onset}, 1
-        if scene.accuracy.integrator == "semi_implicit_euler":
+        if scene.accuracy.integrator in ("leapfrog", "semi_implicit_euler"):
             both = {"contacts": onset, "accuracy": accuracy | {"integrator": "velocity_verlet"}}
             yield f"{words}, with accuracy: {{integrator: velocity_verlet}}", both, 1
     coarser = COARSER.get(scene.accuracy.preset or DEFAULT)

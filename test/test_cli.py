@@ -72,7 +72,7 @@ def test_run_records_sums_up_and_draws(command: Command, tmp_path: Path) -> None
         assert bag.counts["signals"] == 41
     assert json.loads((folder / "summary.json").read_text())["simulated"] == pytest.approx(0.4)
     assert list((folder / "pictures").glob("*.png"))
-    assert result.output.startswith("semi_implicit_euler, dt = 100 us")
+    assert result.output.startswith("leapfrog, dt = 100 us")
     for words in ("real-time factor", "predicted error", "achieved"):
         assert words in result.output
     assert str(folder.relative_to(tmp_path)) in result.output
@@ -100,7 +100,7 @@ def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     result = command("run", SMALL_LINE, "--no-record", "--duration", "0.1")
     assert result.exit_code == 0, result.output
     setting, *_, peak, steps = result.output.splitlines()
-    assert setting.startswith("semi_implicit_euler, dt = 100 us (100 steps a tick, given in the scene; ")
+    assert setting.startswith("leapfrog, dt = 100 us (100 steps a tick, given in the scene; ")
     assert "; predicted error: " in setting
     assert "0.10 s simulated in" in result.output
     assert peak.startswith("peak force ")

@@ -76,7 +76,7 @@ def test_bounds_are_told_with_the_one_that_rules() -> None:
     assert rows[0].endswith("79 20 steps in v_lim / (mu g) at mu = 0.4 (rules)")
     assert rows[3].endswith("a hexagonal packing at k = 5000 N/m, for stability")
     assert not any(row.endswith("(rules)") for row in rows[1:])
-    assert "integrator semi_implicit_euler" in lines
+    assert "integrator leapfrog" in lines
     assert "accuracy standard (1 % in contact force)" in lines
     assert any(line.startswith("time step 126.6 us: 79 steps a tick: standard (1 % in") for line in lines)
 
@@ -99,7 +99,7 @@ def test_a_setting_in_one_line() -> None:
     scene = parse_scene(TEXT, "plant.yaml", {"accuracy": {"per_tick": 10}})
     line = setting_line(build_model(scene))
     assert "\n" not in line
-    assert line.startswith("semi_implicit_euler, dt = 1 ms (10 steps a tick, given in the scene; ")
+    assert line.startswith("leapfrog, dt = 1 ms (10 steps a tick, given in the scene; ")
     tangential = "0.32 % in tangential speed after an impact"
     assert line.endswith(f"; predicted error: {EXPECTED} in the peak force of impacts, {tangential}")
 

@@ -120,7 +120,7 @@ def test_types_and_names_are_in_the_scenes_order() -> None:
     np.testing.assert_allclose(model.type_inertia, [MASS * RADIUS**2, 3e-5])
     assert model.belts == ("feeder", "bend", "end", "side")
     assert model.rails == ("right", "left", "outer", "inner", "fence", "bend_inner", "bend_outer")
-    assert (model.name, model.tick_ns, model.integrator) == ("test", 10_000_000, "semi_implicit_euler")
+    assert (model.name, model.tick_ns, model.integrator) == ("test", 10_000_000, "leapfrog")
     assert model.engine_hash == ENGINE_HASH
     assert [entry.split("=")[0] for entry in model.versions] == ["conveyor_sim", "numba", "llvmlite", "numpy"]
     assert model.machine

@@ -68,7 +68,7 @@ def test_forces_are_of_all_recorded_peaks(bag: Path) -> None:
 def test_the_prediction_is_told_with_what_was_reached(bag: Path) -> None:
     summary = summarize(bag)
     model = build_model(load_scene(SMALL_LINE))
-    assert summary.setting == f"semi_implicit_euler, dt = 100 us: {model.dt_reason}"
+    assert summary.setting == f"leapfrog, dt = 100 us: {model.dt_reason}"
     assert summary.predicted == model.prediction.sentence
     assert summary.achieved is not None
     assert summary.achieved.peak_force == summary.peak_force
@@ -78,9 +78,9 @@ def test_the_prediction_is_told_with_what_was_reached(bag: Path) -> None:
 def test_a_recording_is_told_the_errors_of_the_steps_it_ran_with(bag: Path, tmp_path: Path) -> None:
     def lengthen(topic: str, message: Any) -> None:
         if topic == "line":
-            message.integrator, message.steps_per_tick = "semi_implicit_euler", 20
+            message.integrator, message.steps_per_tick = "leapfrog", 20
 
-    ran = {"accuracy": {"integrator": "semi_implicit_euler", "per_tick": 20}}
+    ran = {"accuracy": {"integrator": "leapfrog", "per_tick": 20}}
     summary = summarize(edited(bag, tmp_path / "older", lengthen))
     assert summary.predicted == build_model(load_scene(SMALL_LINE, ran)).prediction.sentence
     assert summary.predicted != summarize(bag).predicted

@@ -12,7 +12,14 @@ from conveyor_sim.accuracy.set_down import SetDown
 from conveyor_sim.effects.terms import Meeting, Terms, impact_speed, meetings
 from conveyor_sim.scene import Scene
 
-SMOOTH_ORDERS = {"semi_implicit_euler": 1, "velocity_verlet": 2, "rk4": 4, "dormand_prince": 5, "linearly_implicit": 2}
+SMOOTH_ORDERS = {
+    "leapfrog": 1,
+    "semi_implicit_euler": 1,
+    "velocity_verlet": 2,
+    "rk4": 4,
+    "dormand_prince": 5,
+    "linearly_implicit": 2,
+}
 """Order through smooth forces that depend on velocities."""
 
 ROUNDING = 1e-11

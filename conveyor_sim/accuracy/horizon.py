@@ -62,7 +62,7 @@ class HorizonFinder:
         """
         setting = reference_setting(scene)
         fine = replace(setting, error=None if setting.error is None else ERROR)
-        coarse = Setting("semi_implicit_euler", standard_steps(scene))
+        coarse = Setting("leapfrog", standard_steps(scene))
         return cls(
             scene.tick,
             variant(scene, coarse),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conveyor_sim.accuracy.candidates import candidates, forbidden
+from conveyor_sim.accuracy.candidates import candidates, compared, forbidden
 from conveyor_sim.accuracy.closed_forms import orders
 from conveyor_sim.accuracy.cpu import Meter
 from conveyor_sim.accuracy.plain import Unlike, plain, typed
@@ -16,7 +16,6 @@ from conveyor_sim.accuracy.precision import WorkPrecision
 from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.sample_file import check_origin
 from conveyor_sim.accuracy.setting import with_setting
-from conveyor_sim.engine.integrators import INTEGRATORS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.machine import machine
 from conveyor_sim.model import build_model
@@ -69,7 +68,7 @@ def measured_once(scene: Scene, folder: Path, bars: Bars) -> Measured:
 
 def _measure(scene: Scene, bars: Bars) -> Measured:
     banned = forbidden(scene)
-    integrators = [name for name in INTEGRATORS if name not in banned]
+    integrators = compared(scene)
     with bars(f"{scene.name}: closed forms", "cases") as bar:
         found, without = orders(scene, integrators, bar.update)
     precision = WorkPrecision(scene)

@@ -17,17 +17,17 @@ ERROR = 1e-9
 """m/s, of a step."""
 
 FINEST = 32
-"""Steps in one of the preset `standard`, where the reference must be semi-implicit Euler."""
+"""Steps in one of the preset `standard`, where the reference must be leapfrog."""
 
 
 def reference_setting(scene: Scene) -> Setting:
-    """dormand_prince, or semi_implicit_euler in very short steps where tangential springs forbid it."""
+    """dormand_prince, or leapfrog in very short steps where tangential springs forbid it."""
     speed, terms = impact_speed(scene), terms_of(scene)
     shortest = min((duration(collision_of(meeting, terms), speed) for meeting in meetings(terms)), default=math.inf)
     standard = standard_steps(scene)
     steps = max(standard, math.ceil(STEPS * scene.tick / shortest))
     if "dormand_prince" in forbidden(scene, **_explicit(scene)):
-        return Setting("semi_implicit_euler", max(FINEST * standard, steps))
+        return Setting("leapfrog", max(FINEST * standard, steps))
     return Setting("dormand_prince", steps, error=ERROR)
 
 

@@ -52,7 +52,7 @@ HALVINGS = 5
 """The most times that the reference's step is halved."""
 
 FIRST_ORDER = 8
-"""Steps in one of the preset `standard` of a fine run, where semi-implicit Euler must do for want of another method."""
+"""Steps in one of the preset `standard` of a fine run, where leapfrog must do for want of another method."""
 
 Progress = Callable[[float, float], None]
 """Called with what is done so far and the whole."""
@@ -154,7 +154,7 @@ def fine_setting(scene: Scene) -> Setting:
     """Steps of the preset `standard` with velocity Verlet, which is of second order; more where it can't run."""
     steps = standard_steps(scene)
     if "velocity_verlet" in forbidden(scene):
-        return Setting("semi_implicit_euler", FIRST_ORDER * steps)
+        return Setting("leapfrog", FIRST_ORDER * steps)
     return Setting("velocity_verlet", steps)
 
 

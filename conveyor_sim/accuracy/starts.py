@@ -68,7 +68,7 @@ def find_starts(scene: Scene, progress: Progress) -> Found:
 
 
 def _find(scene: Scene, exercise: Exercise | None, progress: Progress) -> list[Start]:
-    setting = Setting("semi_implicit_euler", standard_steps(scene))
+    setting = Setting("leapfrog", standard_steps(scene))
     whole = 2.0 * scene.duration
     strongest = _strongest(scene, setting, exercise, lambda share: progress(share * scene.duration, whole))
     touched = np.flatnonzero(strongest)

@@ -1,6 +1,6 @@
 """Effects of what bottles stand on: friction, belts, and the ring that a base is."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
@@ -45,22 +45,28 @@ def _friction_bounds(terms: Terms) -> list[Bound]:
 
 def _slip_steps(terms: Terms) -> float:
     """Steps in v_lim / (mu g) by which a method of first order is off by one part in `least_steps`."""
-    return terms.method.slip_steps(1.0 / terms.steps)
+    return terms.method.slip_steps(1.0 / terms.steps) if terms.method.second_order else terms.steps
 
 
-def _lag(quantity: str, terms: Terms, dt: float) -> list[Term]:
-    """Of a bottle held on its circle by friction: its velocity lags by half a step (test/physics/test_turntable.py)."""
+def _lag(quantity: str, part: Callable[[float], float], terms: Terms, dt: float) -> list[Term]:
+    """Of a bottle held on its circle by friction, part(steps) at so many steps in v_lim / (mu g).
+
+    The velocity of semi-implicit Euler is half a step older than the position at which it asks the belt for its own;
+    leapfrog asks where the bottle was at mid-step (test/physics/test_turntable.py).
+    """
     if terms.laws.base_friction is None or "curved_belts" not in terms.on:
         return []
     mu = float(terms.laws.base_friction.max())
     steps = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit) / dt
-    off = terms.method.creep_off(steps)
+    off = part(steps)
     reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
     return [Term(quantity, off, reason)] if off > 0.0 else []
 
 
 def _creep(terms: Terms, dt: float) -> list[Term]:
-    return _lag("creep on curved belts", terms, dt)
+    method = terms.method
+    part = method.implicit_creep_off if _implicit_point(terms) else method.creep_off
+    return _lag("creep on curved belts", part, terms, dt)
 
 
 def _resting(terms: Terms, dt: float) -> list[Term]:
@@ -68,11 +74,11 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
 
     The lag is a slip of Omega^2 r dt / 2 outward, which friction answers with m mu g Omega^2 r dt / v_lim.
     """
-    return _lag("load on turning belts", terms, dt)
+    return _lag("load on turning belts", terms.method.creep_off, terms, dt)
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
-    """Semi-implicit Euler brakes by half a step too much or too little: speeds of impact are off by mu g dt / 2."""
+    """First order: the base brakes by half a step too much or too little; speeds of impact are off by mu g dt / 2."""
     if terms.laws.base_friction is None or terms.method.second_order:
         return []
     braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
@@ -130,15 +136,16 @@ BASE_FRICTION = Effect(
     absent="no friction under the bottles",
     needs="mu by belt and bottle type, velocity of each surface",
     bounds=_friction_bounds,
-    bound="half of v_lim / (mu g); with semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %, and "
-    "1 / tolerance where a belt turns, 100 at 1 %; with the linearly implicit method 4 steps in it, as it is stable in "
-    "any",
+    bound="half of v_lim / (mu g); with leapfrog and semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %, "
+    "and with the latter 1 / tolerance where a belt turns, 100 at 1 %; with the linearly implicit method 4 steps in "
+    "it, as it is stable in any",
     shares=_braked,
-    share="with semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
+    share="with leapfrog and semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
     resting=_resting,
     rest="on belts that turn, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
     side=_creep,
-    beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
+    beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
+    "and implicit friction two",
 )
 RING_BASE = Effect(
     name="ring_base",

@@ -169,9 +169,9 @@ TANGENTIAL_SPRING = Effect(
     name="tangential_spring",
     law="a spring along the contact, drawn out by the slip, its force at most mu N; with stiffness_ratio its stiffness "
     "is that ratio times dN/d delta of a Hertz contact: where it grows the spring keeps its force, where it falls its "
-    "elongation; at rails that move by the slip along them; with semi-implicit Euler, velocity Verlet (order 2) and "
-    "rk4 (order 4 while it sticks, 2 where it begins to slide), which cut it once a step; dormand_prince gives steps "
-    "up and linearly_implicit solves for all velocities at once: they take none",
+    "elongation; at rails that move by the slip along them; with leapfrog, semi-implicit Euler, velocity Verlet "
+    "(order 2) and rk4 (order 4 while it sticks, 2 where it begins to slide), which cut it once a step; dormand_prince "
+    "gives steps up and linearly_implicit solves for all velocities at once: they take none",
     source="Cundall and Strack 1979; Mindlin 1949, Thornton, Cummins and Cleary 2013",
     called_for=_spring,
     absent="no contact with tangential, or no friction in contacts",

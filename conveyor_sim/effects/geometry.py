@@ -66,8 +66,8 @@ MOVING_RAILS = Effect(
     called_for=_moving,
     absent="no gate, pusher or diverter",
     needs="the course of each rail and where it is now; a box that it sweeps; unless no drive has a limit, the sum of "
-    "what bottles exert on each rail; a contact for each pair of materials; integrators semi_implicit_euler and "
-    "velocity_verlet",
+    "what bottles exert on each rail; a contact for each pair of materials; integrators leapfrog, "
+    "semi_implicit_euler and velocity_verlet",
     can_force_off=False,
 )
 UNEQUAL_RADII = Effect(

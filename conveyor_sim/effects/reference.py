@@ -73,7 +73,7 @@ Spring and dashpot together exert at most mu N. While a contact slides, the spri
 Without `damping` the two are the same; with it they slide alike, and differ in the elongation from which a contact that
 stops sliding goes on.
 
-Bounds on dashpots and on friction at rest are those of semi-implicit Euler, which a drag makes unstable at
+Bounds on dashpots and on friction at rest are those of leapfrog and semi-implicit Euler, which a drag makes unstable at
 dt = 2 / gamma. Velocity Verlet, unstable at 1 / gamma, takes half of them; rk4, at 2.785 / gamma, takes 1.39 times.
 
 `conveyor-sim explain` tells what came of the choice. In the list below, numbers in brackets are equations of the paper

@@ -39,7 +39,7 @@ def _bounds(terms: Terms) -> list[Bound]:
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
-    """As under the friction curve: semi-implicit Euler brakes what slides by half a step too much or too little."""
+    """As under the friction curve: a method of first order brakes what slides by half a step too much or too little."""
     table = terms.laws.base_spring
     if table is None or terms.method.second_order:
         return []
@@ -55,8 +55,8 @@ STATIC_FRICTION = Effect(
     source="Cundall and Strack 1979",
     called_for=_springs,
     absent="no base with tangential, or no friction under the bottles",
-    needs="a point of its belt for each bottle; k, c and mu by belt and bottle type; integrators semi_implicit_euler "
-    "and velocity_verlet",
+    needs="a point of its belt for each bottle; k, c and mu by belt and bottle type; integrators leapfrog, "
+    "semi_implicit_euler and velocity_verlet",
     bounds=_bounds,
     bound="2 / sqrt(tolerance) steps in pi sqrt(m / k), 20 at 1 %; m / (2 c)",
     shares=_braked,

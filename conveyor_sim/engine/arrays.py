@@ -448,6 +448,8 @@ class Settings(NamedTuple):
     """Steps by which implicit friction looks ahead, less `at_once`: see `friction.py`."""
     at_once: float
     """Share of v_lim that friction may take of a slip without looking ahead."""
+    lag: float
+    """Steps by which velocities are older than positions, in the slip on belts: 1/2 with leapfrog, else 0."""
 
 
 class World(NamedTuple):

@@ -44,17 +44,17 @@ def add_base_friction(
         _ring_friction(
             settings, settings.atan, bottles, spin, load, footing, footing.turn, ring, implicit, dt, first, end
         )
-        _straddling(settings, bottles, spin, load, belts, surface, ring, powers, first, end)
+        _straddling(settings, bottles, spin, load, belts, surface, ring, powers, settings.lag * dt, first, end)
 
 
 @part
-def relative_velocity(bottles: Bottles, footing: Any, turn: Any, i: int) -> tuple[float, float]:
-    """Velocity of the axis relative to the belt, m/s."""
+def relative_velocity(bottles: Bottles, footing: Any, turn: Any, lag: float, i: int) -> tuple[float, float]:
+    """Velocity of the axis relative to the belt, m/s; where the axis was when it had this velocity, lag seconds ago."""
     vx = bottles.vx[i] - footing.ux[i]
     vy = bottles.vy[i] - footing.uy[i]
     if turn is not None:
-        vx += turn[i] * bottles.y[i]
-        vy -= turn[i] * bottles.x[i]
+        vx += turn[i] * (bottles.y[i] - lag * bottles.vy[i])
+        vy -= turn[i] * (bottles.x[i] - lag * bottles.vx[i])
     return vx, vy
 
 
@@ -72,7 +72,7 @@ def _point_friction(
     end: int,
 ) -> None:
     for i in range(uint64(first), uint64(end)):
-        vx, vy = relative_velocity(bottles, footing, turn, i)
+        vx, vy = relative_velocity(bottles, footing, turn, settings.lag * dt, i)
         pull = footing.pull[i] * _quotient(
             settings, atan, bottles, footing, implicit, dt, i, math.sqrt(vx * vx + vy * vy)
         )
@@ -108,7 +108,7 @@ def _ring_friction(
 ) -> None:
     """A bottle with a base radius of 0 stands on a point beside others on rings."""
     for i in range(uint64(begin), uint64(end)):
-        vx, vy = relative_velocity(bottles, footing, turn, i)
+        vx, vy = relative_velocity(bottles, footing, turn, settings.lag * dt, i)
         turning = spin.omega[i] - _turn(turn, i)
         rim = abs(turning) * ring.radius[i]
         slide = math.sqrt(vx * vx + vy * vy)
@@ -138,6 +138,7 @@ def _straddling(
     surface: Any,
     ring: Any,
     powers: Any,
+    lag: float,
     first: int,
     end: int,
 ) -> None:
@@ -162,6 +163,7 @@ def _straddling(
             bottles.weight[i],
             bottles.type[i],
             settings.slip_limit,
+            lag,
             powers,
         )
         load.fx[i] += fx

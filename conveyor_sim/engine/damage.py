@@ -316,7 +316,8 @@ def _find_base(world: World, bottles: Bottles, spin: Any, tipping: Any, dt: floa
         first,
         end,
     )
-    add_static_friction(bottles, load, world.footing, world.static_friction, False, first, end)
+    lag = world.settings.lag * dt
+    add_static_friction(bottles, load, world.footing, world.static_friction, lag, False, first, end)
 
 
 @part

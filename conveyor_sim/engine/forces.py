@@ -105,7 +105,8 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, fir
         first,
         end,
     )
-    add_static_friction(world.bottles, world.load, world.footing, world.static_friction, True, first, end)
+    lag = world.settings.lag * dt
+    add_static_friction(world.bottles, world.load, world.footing, world.static_friction, lag, True, first, end)
     find_base_parts(
         world.bottles, world.spin, world.load, world.belts, world.footing, world.ring, world.ledger, first, end
     )

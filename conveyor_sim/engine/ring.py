@@ -88,12 +88,14 @@ def straddling_ring(
     weight: float,
     kind: int,
     slip_limit: float,
+    lag: float,
     powers: Any,
 ) -> tuple[float, float, float]:
     """Force (N, x and y) and moment about the axis (N m) on a ring whose points may stand on different belts.
 
     i: the bottle, whose candidate belts are listed; kind: its type. x, y: m, vx, vy: m/s, omega: rad/s, of its axis.
-    radius: R_b, m. weight: m g, N. powers: (units, H + 1), W, the power of each belt is added to it; or None.
+    radius: R_b, m. weight: m g, N. lag: s, as in `relative_velocity`. powers: (units, H + 1), W, the power of each belt
+    is added to it; or None.
     """
     squared = 0.25 * slip_limit * slip_limit
     fx = fy = moment = 0.0
@@ -105,7 +107,7 @@ def straddling_ring(
         next_x, next_y = x + radius * _COS[(k + 1) % POINTS], y + radius * _SIN[(k + 1) % POINTS]
         there = carrier(i, belts, floor, next_x, next_y)
         after = _extent(i, belts, floor, here_x, here_y, here, next_x, next_y, there)
-        ux, uy = surface_velocity(here, here_x, here_y, surface, surface.turn)
+        ux, uy = surface_velocity(here, here_x - lag * vx, here_y - lag * vy, surface, surface.turn)
         arm_x, arm_y = here_x - x, here_y - y
         slip_x = vx - omega * arm_y - ux
         slip_y = vy + omega * arm_x - uy

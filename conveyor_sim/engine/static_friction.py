@@ -19,11 +19,12 @@ from .compile import part
 
 @part
 def add_static_friction(
-    bottles: Bottles, load: Load, footing: Any, static: Any, drags: bool, first: int, end: int
+    bottles: Bottles, load: Load, footing: Any, static: Any, lag: float, drags: bool, first: int, end: int
 ) -> None:
     """Add the pull of the springs to `load` of bottles first to end; `footing` must be that of now.
 
-    drags: set anchors where there are none, and drag them where the base slides; False for a look at the forces.
+    lag: s, as in `relative_velocity`. drags: set anchors where there are none, and drag them where the base slides;
+    False for a look at the forces.
     """
     if static is None:
         return
@@ -38,7 +39,7 @@ def add_static_friction(
         kept = most / drawn if drawn > most else 1.0
         ex *= kept
         ey *= kept
-        vx, vy = relative_velocity(bottles, footing, footing.turn, i)
+        vx, vy = relative_velocity(bottles, footing, footing.turn, lag, i)
         fx = stiffness * ex + static.damping[entry] * vx
         fy = stiffness * ey + static.damping[entry] * vy
         total = math.sqrt(fx * fx + fy * fy)

@@ -55,7 +55,7 @@ def _resist_point(
     lean: float,
     i: int,
 ) -> None:
-    vx, vy = relative_velocity(bottles, footing, turn, i)
+    vx, vy = relative_velocity(bottles, footing, turn, 0.0, i)
     least = DIFFERENCE * settings.slip_limit
     speed = math.sqrt(vx * vx + vy * vy)
     far = speed if speed > least else least
@@ -85,7 +85,7 @@ def _resist_ring(
     lean: float,
     i: int,
 ) -> None:
-    vx, vy = relative_velocity(bottles, footing, turn, i)
+    vx, vy = relative_velocity(bottles, footing, turn, 0.0, i)
     turning = spin.omega[i] - turn[i] if turn is not None else spin.omega[i]
     least = DIFFERENCE * settings.slip_limit
     speed, rim, radius = math.sqrt(vx * vx + vy * vy), abs(turning) * ring.radius[i], ring.radius[i]
@@ -146,7 +146,7 @@ def _resist_straddling(
         fx_x, fy_x, moment_x = _straddled(settings, bottles, belts, surface, ring, spin, i, step, 0.0, 0.0)
         _, fy_y, moment_y = _straddled(settings, bottles, belts, surface, ring, spin, i, 0.0, step, 0.0)
         _, _, moment_t = _straddled(settings, bottles, belts, surface, ring, spin, i, 0.0, 0.0, step / radius)
-        vx, vy = relative_velocity(bottles, footing, footing.turn, i)
+        vx, vy = relative_velocity(bottles, footing, footing.turn, 0.0, i)
         pull = dt * surface.friction[footing.carrier[i], bottles.type[i]] * bottles.weight[i]
         secant = pull * regularisation(math.sqrt(vx * vx + vy * vy), settings.slip_limit, None)
         turned = firmness(2.0 * secant * bottles.inverse_mass[i])
@@ -186,5 +186,6 @@ def _straddled(
         bottles.weight[i],
         bottles.type[i],
         settings.slip_limit,
+        0.0,
         None,
     )

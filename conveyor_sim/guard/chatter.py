@@ -8,7 +8,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays import F8, World
 
-EXPLICIT = frozenset({"semi_implicit_euler", "velocity_verlet", "rk4"})
+EXPLICIT = frozenset({"leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4"})
 """The integrators that chatter; the others solve for friction, or look at their errors."""
 
 EVERY = 262144

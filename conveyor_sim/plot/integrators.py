@@ -23,7 +23,8 @@ class Look:
 
 
 _LOOKS: Final = {
-    "semi_implicit_euler": Look("semi-implicit Euler", style.SERIES[0], "o", "-"),
+    "leapfrog": Look("leapfrog", style.SERIES[0], "o", "-"),
+    "semi_implicit_euler": Look("semi-implicit Euler", style.SERIES[4], "X", (0.0, (2.0, 1.0))),
     "velocity_verlet": Look("velocity Verlet", style.SERIES[1], "s", (0.0, (6.0, 1.5))),
     "rk4": Look("RK4", style.SERIES[2], "^", (0.0, (3.0, 1.2))),
     "dormand_prince": Look("Dormand-Prince", style.SERIES[3], "D", (0.0, (1.0, 1.2))),

@@ -3,14 +3,16 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args
 
-from annotated_types import Le
-from pydantic import model_validator
+from annotated_types import Ge, Le
+from pydantic import Strict, model_validator
 
 from conveyor_sim.scene.part import Part
-from conveyor_sim.scene.types import Count, Positive, Tolerance, quantity
+from conveyor_sim.scene.types import Positive, Says, Tolerance, quantity
 
 Preset = Literal["draft", "standard", "fine"]
-IntegratorName = Literal["semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit"]
+IntegratorName = Literal[
+    "leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit"
+]
 INTEGRATOR_NAMES: tuple[IntegratorName, ...] = get_args(IntegratorName)
 
 MOST_STEPS = 1_000_000
@@ -21,6 +23,8 @@ The stiffest shipped scene at the preset `fine`, ten times finer again, stays be
 
 MANY_STEPS = 20_000
 """In a tick, from which on a scene is told to be slow: 100 bottles take a minute for ten simulated seconds."""
+
+StepCount = Annotated[int, Strict(), Ge(1), Le(MOST_STEPS), Says(f"a whole number from 1 to {MOST_STEPS}")]
 
 CHOICES = ("preset", "tolerance", "dt", "per_tick")
 """The fields that each choose the time step; one of them at most."""
@@ -37,13 +41,13 @@ class Accuracy(Part):
         "Relative error in contact force to stay below; the time step follows.", "1", default=None
     )
     integrator: IntegratorName = quantity(
-        "Integration method; the first is the paper's, (5)-(6). docs/accuracy.md tells how to choose.",
-        default="semi_implicit_euler",
+        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md tells how to choose.",
+        default="leapfrog",
     )
     dt: Positive | None = quantity(
         "Longest time step: a tick is divided into the fewest equal steps that keep it.", "s", default=None
     )
-    per_tick: Annotated[Count, Le(MOST_STEPS)] | None = quantity("The same as a number of steps.", "1", default=None)
+    per_tick: StepCount | None = quantity("The same as a number of steps.", "1", default=None)
     error: Positive | None = quantity(
         "Largest error of a step, dormand_prince only, which divides the steps of dt itself. Left out: 1e-6.",
         "m/s",

@@ -15,9 +15,9 @@ _RESTITUTION = {
 }
 """Laws of damping, and the elastic laws beside which they have a restitution."""
 
-BASE_SPRINGS = ("semi_implicit_euler", "velocity_verlet")
+BASE_SPRINGS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators with springs under the bottles: one evaluation a step, at places that bottles really come to."""
-STEPPED = ("semi_implicit_euler", "velocity_verlet", "rk4")
+STEPPED = ("leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4")
 """Integrators with tangential springs and implicit friction: a step that is begun is taken, and its length is known.
 
 dormand_prince gives steps up and chooses others; linearly_implicit solves for all velocities at once.

@@ -8,9 +8,9 @@ from conveyor_sim.scene.movers import Diverter, SwingingGate
 from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.words import listed, shown
 
-INTEGRATORS = ("semi_implicit_euler", "velocity_verlet")
+INTEGRATORS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Those that move rails: the others take forces within a step, or solve for what a rail at rest exerts."""
 
 
@@ -57,7 +57,7 @@ def _integrator(scene: Scene) -> Iterator[Problem]:
         if chosen not in INTEGRATORS:
             yield Problem(
                 ("accuracy", "integrator"),
-                f"{shown(chosen)} given, expected {' or '.join(INTEGRATORS)}, as {path[0]}.{path[1]} moves: "
+                f"{shown(chosen)} given, expected {listed(list(INTEGRATORS))}, as {path[0]}.{path[1]} moves: "
                 "the other integrators take rails to be at rest within a step",
             )
             return

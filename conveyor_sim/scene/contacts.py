@@ -76,7 +76,7 @@ class Contact(Part):
     friction: NotNegative = quantity("Coefficient of friction of the contact.", "1", default=0.0)
     tangential: Tangential | None = quantity(
         "A tangential spring with history in place of the friction curve; needs friction, and "
-        "semi_implicit_euler, velocity_verlet or rk4. Left out: none.",
+        "leapfrog, semi_implicit_euler, velocity_verlet or rk4. Left out: none.",
         default=None,
     )
 

@@ -40,7 +40,8 @@ problem is one line that names the file, the line, the field, the value and what
 - Where a rail ends on another (within 1e-6 m), both are one surface. Rails of curved belts follow those under
   `rails` in the order of indices, then come gates, pushers and diverters.
 - Gates, pushers and diverters are straight rails that move on command, each a surface of its own: where one ends on
-  another rail, a bottle that slides past touches both. They take `semi_implicit_euler` or `velocity_verlet`.
+  another rail, a bottle that slides past touches both. They take `leapfrog`, `semi_implicit_euler` or
+  `velocity_verlet`.
 - No bottle may be born inside a rail or another bottle; touching is allowed.
 """
 

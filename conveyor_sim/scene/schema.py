@@ -215,7 +215,7 @@ class Scene(Part):
     )
     friction_solver: Literal["explicit", "implicit"] = quantity(
         "explicit: friction bounds the time step; implicit: solved for the velocity at the end of a step, which does "
-        "not (with semi_implicit_euler, velocity_verlet and rk4; bases that are rings stay explicit).",
+        "not (with leapfrog, semi_implicit_euler, velocity_verlet and rk4; bases that are rings stay explicit).",
         default="explicit",
     )
     lever_arm: Literal["overlap", "radius"] = quantity(

@@ -184,7 +184,7 @@ def test_kill_9_and_resume_give_the_table_of_an_uninterrupted_study(tmp_path: Pa
 
 def test_ctrl_c_ends_a_study_and_its_processes_at_once(tmp_path: Path) -> None:
     """Runs that take minutes are not waited for; the interrupt passes on."""
-    with study(filling(), tmp_path / "long", (10_000_000, 9_999_999)) as process:
+    with study(filling(), tmp_path / "long", (1_000_000, 999_999)) as process:
         wait_until(lambda: len(workers_of(process.pid)) == WORKERS)
         wait_until(lambda: (tmp_path / "long" / SAMPLES).exists())
         time.sleep(1.0)  # for the interrupt to find it in a run rather than in an import

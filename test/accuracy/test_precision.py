@@ -235,14 +235,14 @@ def test_integrators_that_effects_forbid_are_left_out_and_named() -> None:
     reasons = forbidden(sprung)
     assert reasons.keys() == {"dormand_prince", "linearly_implicit"}
     assert "tangential" in reasons["dormand_prince"]
-    assert {setting.integrator for setting in candidates(sprung)} == {"semi_implicit_euler", "velocity_verlet", "rk4"}
-    assert reference_setting(sprung).integrator == "semi_implicit_euler"
+    assert {setting.integrator for setting in candidates(sprung)} == {"leapfrog", "velocity_verlet", "rk4"}
+    assert reference_setting(sprung).integrator == "leapfrog"
     assert reference_setting(sprung).per_tick >= 32 * standard_steps(sprung)
 
 
 def test_implicit_friction_has_an_explicit_reference() -> None:
     implicit = head_on(contacts=[contact(K, friction=0.1)], friction_solver="implicit")
-    assert {setting.integrator for setting in candidates(implicit)} == {"semi_implicit_euler", "velocity_verlet", "rk4"}
+    assert {setting.integrator for setting in candidates(implicit)} == {"leapfrog", "velocity_verlet", "rk4"}
     assert reference_setting(implicit).integrator == "dormand_prince"
 
 

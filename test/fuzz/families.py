@@ -6,10 +6,10 @@ import random
 from dataclasses import dataclass, replace
 from typing import Any
 
-INTEGRATORS = ("semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit")
-MOVING = INTEGRATORS[:2]
-"""Those that move rails."""
-STEPPED = INTEGRATORS[:3]
+INTEGRATORS = ("leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4", "dormand_prince", "linearly_implicit")
+MOVING = INTEGRATORS[:3]
+"""Those that move rails, and take springs under bases."""
+STEPPED = INTEGRATORS[:4]
 """Those with tangential springs and implicit friction."""
 ELASTIC = ("linear", "hertz", "table")
 DAMPING = ("none", "paper", "normal", "tsuji", "onset")
@@ -35,7 +35,7 @@ FORCED = (
 class Family:
     """One mixture of effects; a scene of it has at least one of everything named."""
 
-    integrator: str = "semi_implicit_euler"
+    integrator: str = "leapfrog"
     implicit_friction: bool = False
     atan: bool = False
     elastic: tuple[str, ...] = ("linear",)
@@ -43,6 +43,7 @@ class Family:
     friction: bool = True
     springs: bool = False
     base_friction: bool = True
+    base_springs: bool = False
     ring: bool = False
     belts: tuple[str, ...] = ("straight",)
     rails: tuple[str, ...] = ("segment",)
@@ -58,7 +59,11 @@ class Family:
 
     def __str__(self) -> str:
         parts = [self.integrator, *self.elastic, *(f"{law} damping" for law in self.damping)]
-        parts += [name for name in ("implicit_friction", "atan", "friction", "springs", "ring") if getattr(self, name)]
+        parts += [
+            name
+            for name in ("implicit_friction", "atan", "friction", "springs", "base_springs", "ring")
+            if getattr(self, name)
+        ]
         parts += [name for name in ("drives", "movers", "machines", "sensors", "ledger") if getattr(self, name)]
         parts += [*(f"{kind} belts" for kind in self.belts), *(f"{kind}s" for kind in self.rails)]
         parts += [f"{self.types} types", *(f"{name} {value}" for name, value in self.effects)]
@@ -91,6 +96,7 @@ def random_family(seed: int) -> Family:
     move = integrator in MOVING
     return replace(
         family,
+        base_springs=move and family.base_friction and not family.ring and draw.random() < 0.4,
         drives=draw.random() < 0.5,
         movers=move and draw.random() < 0.6,
         machines=draw.random() < 0.5,

@@ -66,6 +66,9 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
     }
     if not family.base_friction:
         data["base"] = [{**base, "friction": 0.0} for base in data["base"]]
+    if family.base_springs:
+        spring = {"stiffness": frame.stiffness * draw(between(0.1, 1.0)), "damping": draw(scaled(0.1, 10.0))}
+        data["base"] = [{**base, "tangential": spring} for base in data["base"]]
     if family.drives:
         data["belts"] = {name: {**belt, **draw(drives(frame))} for name, belt in data["belts"].items()}
     if family.movers:

@@ -85,7 +85,7 @@ class Case:
         return self.short if short and self.short is not None else self.duration
 
     def scene(
-        self, integrator: str = "semi_implicit_euler", preset: str = "standard", variant: str = "", short: bool = True
+        self, integrator: str = "leapfrog", preset: str = "standard", variant: str = "", short: bool = True
     ) -> Scene:
         """The scene as it is run. Raises SceneError where it is refused."""
         variant = variant or self.variants[0]

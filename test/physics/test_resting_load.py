@@ -82,7 +82,8 @@ def mean_forces(sim: Simulation, settling: float) -> Sequence[float]:
 
 @pytest.mark.parametrize("preset", ["standard", "fine"])
 @pytest.mark.parametrize(
-    ("integrator", "solver"), [*((name, "explicit") for name in INTEGRATOR_NAMES), ("semi_implicit_euler", "implicit")]
+    ("integrator", "solver"),
+    [*((name, "explicit") for name in INTEGRATOR_NAMES), ("leapfrog", "implicit"), ("semi_implicit_euler", "implicit")],
 )
 def test_the_load_of_a_turning_belt_on_its_rim(integrator: str, solver: Any, preset: Any) -> None:
     """Within the promise of the preset, and within what is predicted."""

@@ -84,6 +84,23 @@ def test_semi_implicit_euler_creeps_less_by_half_a_step_of_the_pull(steps: int) 
     assert distance(sim) - start == pytest.approx(creep - lag, rel=0.02)
 
 
+@pytest.mark.parametrize("steps", [8, 40, 200])
+def test_leapfrog_creeps_as_much_at_any_step(steps: int) -> None:
+    """It asks the belt for its velocity where the bottle was when it had its own."""
+    radius, share = 0.5, 0.5
+    omega = math.sqrt(share * MU * G / radius)
+    coarse, fine = (
+        turntable(omega, radius, steps=n, integrator=name) for n, name in ((steps, "leapfrog"), (400, "rk4"))
+    )
+    gone = []
+    for sim in (coarse, fine):
+        sim.advance(50)
+        start = distance(sim)
+        sim.advance(100)
+        gone.append(distance(sim) - start)
+    assert gone[0] == pytest.approx(gone[1], rel=1e-4)
+
+
 def test_it_slides_away_beyond_mu_g_over_omega_squared() -> None:
     """Just inside the limit it stays within a creep of at most v_lim; just beyond it leaves, faster than v_lim."""
     omega = 2.5

@@ -68,7 +68,7 @@ def test_the_setting_and_what_was_reached_are_logged(start_node: Callable[..., C
         next(line for line in node.log.read_text().splitlines() if words in line)
         for words in ("scene small_line", "end of the run")
     )
-    assert "semi_implicit_euler, dt = " in greeting
+    assert "leapfrog, dt = " in greeting
     assert " in contact force" in greeting
     assert "end of the run, 0.2 s simulated in " in end
     assert " x real time; peak force " in end

@@ -16,6 +16,7 @@ __all__ = ["INTEGRATORS", "RESUME", "START", "Advance"]
 Advance = Callable[[World, Member, int, float, int], int]
 
 INTEGRATORS: dict[str, Advance] = {
+    "leapfrog": semi_implicit_euler.advance,
     "semi_implicit_euler": semi_implicit_euler.advance,
     "velocity_verlet": velocity_verlet.advance,
     "rk4": rk4.advance,
@@ -23,8 +24,11 @@ INTEGRATORS: dict[str, Advance] = {
     "linearly_implicit": linearly_implicit.advance,
 }
 
-AHEAD = {"semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
+AHEAD = {"leapfrog": (1.0, 0.0), "semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
 """Integrators with implicit friction: `Settings.ahead` and `at_once` (`friction.py`)."""
+
+LAG = {"leapfrog": 0.5}
+"""Integrators that ask belts for their velocity where bottles were at mid-step (`Settings.lag`)."""
 
 ON_PATHS = frozenset({"velocity_verlet", "rk4"})
 """Integrators whose tangential springs follow the ways of bottles (``World.path``, `path.py`)."""

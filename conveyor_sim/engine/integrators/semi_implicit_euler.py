@@ -1,4 +1,9 @@
-"""Semi-implicit Euler, the paper's integrator (eqs. 5 and 6): v += dt a(r, v), then r += dt v with the new v.
+"""Semi-implicit Euler, the paper's integrator (eqs. 5 and 6), and leapfrog: v += dt a(r, v), then r += dt v, the new v.
+
+Velocities are those of mid-step, positions those of the step's end. Semi-implicit Euler takes both for one instant,
+so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at rest are off
+by mu g dt / v_lim. Leapfrog asks the belt for its velocity where the bottle was at mid-step (`Settings.lag`), and is
+not (test/physics/test_resting_load.py). On straight belts and floors the two are the same to the bit.
 
 Order 1 through dashpots, clamped or not, and through friction, with a jump at first touch or without. Without damping
 its errors in energy stay bounded; a rebound and a peak force are of order 2 then, with Hertz a rebound is of 2.5.
