@@ -2,6 +2,7 @@
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
 # make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about an hour (ARGS=funnel for one)
+# make promises  sets up the same, then holds all shipped scenes and ten unseen ones to the presets' promises, about half an hour
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
 # make lint    style and types
@@ -22,7 +23,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test bench accuracy fuzz stability lint clean set-up set-up-test set-up-bench
+.PHONY: help run test bench accuracy promises fuzz stability lint clean set-up set-up-test set-up-bench
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -38,6 +39,9 @@ bench: set-up-bench
 
 accuracy: set-up
 	@$(PYTHON) docs/studies/accuracy.py $(ARGS)
+
+promises: set-up
+	@$(PYTHON) docs/studies/promises.py $(ARGS)
 
 # Beside the tests, whose scenes and checks it uses.
 fuzz: set-up-test

@@ -23,16 +23,14 @@ with while_importing():
 
     from conveyor_sim.accuracy.answer import find_answer
     from conveyor_sim.accuracy.apply import line
-    from conveyor_sim.accuracy.candidates import preset_setting
     from conveyor_sim.accuracy.files import STUDY, read_study
     from conveyor_sim.accuracy.lines import three_lines
     from conveyor_sim.accuracy.measured import foretold
-    from conveyor_sim.accuracy.results import Point, Study
+    from conveyor_sim.accuracy.results import Study
     from conveyor_sim.accuracy.tables import markdown
-    from conveyor_sim.accuracy.words import duration, percent
     from conveyor_sim.plot import plot_accuracy
-    from conveyor_sim.presets import PRESETS, table
-    from conveyor_sim.scene import Scene, load_scene
+    from conveyor_sim.presets import table
+    from conveyor_sim.scene import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy.md"
@@ -49,7 +47,8 @@ SCENES = (
     "funnel",
     "two_bottles",
 )
-KEPT = ("*.csv", "study.json", "pareto.png", "stiffness.png", "scene.yaml")
+TABLES = "tables.md"
+KEPT = ("*.csv", "study.json", "pareto.png", "stiffness.png", "scene.yaml", TABLES)
 
 
 def scene_file(name: str) -> Path:
@@ -89,15 +88,19 @@ def keep_only_what_the_page_shows(folder: Path) -> None:
 def page(text: str) -> str:
     """The page with its tables made anew from the studies in docs/accuracy/; ValueError without a marker."""
     studies = {name: of_today(name) for name in studied()}
-    parts = {"presets": table(), "answers": answers(studies), "promises": promises(studies)}
-    parts |= {name: section(name, study) for name, study in studies.items()}
+    parts = {"presets": table(), "answers": answers(studies)}
+    parts |= {name: section(name) for name in studies}
     return with_parts(PAGE, text, parts)
 
 
-def section(name: str, study: Study) -> str:
-    """The picture, and all tables folded away."""
-    picture = f"![What accuracy costs on {name}](accuracy/{name}/pareto.png)"
-    return f"{picture}\n\n<details><summary>All tables of this study</summary>\n\n{markdown(study)}\n</details>"
+def section(name: str) -> str:
+    """The picture, and where all tables are."""
+    return f"![What accuracy costs on {name}](accuracy/{name}/pareto.png)\n\n[All tables](accuracy/{name}/{TABLES})"
+
+
+def tables() -> dict[Path, str]:
+    """The page of tables of each study."""
+    return {FOLDER / name / TABLES: f"# The study of {name}\n\n{markdown(of_today(name))}" for name in studied()}
 
 
 def studied() -> list[str]:
@@ -123,34 +126,6 @@ def answers(studies: dict[str, Study]) -> str:
     return "\n\n".join([*parts, f"Measured on {'; '.join(machines)}."])
 
 
-def promises(studies: dict[str, Study]) -> str:
-    """What every preset promises, what is predicted of it and what was measured, in impacts and in resting load."""
-    lines = ["| scene | preset | Δt | promised | impacts: predicted | measured | resting: predicted | measured | |"]
-    lines.append("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |")
-    for name, study in studies.items():
-        scene = load_scene(ROOT / scene_file(name))
-        for preset, tolerance in PRESETS.items():
-            point = preset_point(study, scene, preset)
-            if point is None or point.errors is None:
-                continue
-            kept = "kept" if max(point.errors.peak_force, point.resting or 0.0) <= tolerance else "**not kept**"
-            resting = (percent(point.predicted_resting), percent(point.resting))
-            cells = [name, preset, duration(point.dt), percent(tolerance), percent(point.predicted)]
-            lines.append(f"| {' | '.join([*cells, percent(point.errors.peak_force), *resting])} | {kept} |")
-    return "\n".join(lines)
-
-
-def preset_point(study: Study, scene: Scene, preset: str) -> Point | None:
-    """The measured point of a preset, to 1 % of its steps: its formulas may have changed a little since."""
-    steps = preset_setting(scene, preset).per_tick
-    of_its_kind = [
-        point
-        for point in study.points
-        if (point.setting.integrator, point.setting.stiffness) == ("semi_implicit_euler", 1.0)
-    ]
-    return next((point for point in of_its_kind if abs(point.setting.per_tick - steps) <= 0.01 * steps), None)
-
-
 @click.command()
 @one_line()
 @click.argument("scenes", nargs=-1, type=click.Choice(SCENES))
@@ -161,6 +136,8 @@ def main(scenes: tuple[str, ...], only_tables: bool) -> None:
         make(name)
     for name in studied() if only_tables else ():
         draw(name)
+    for path, text in tables().items():
+        path.write_text(text, encoding="utf-8")
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 

@@ -25,15 +25,14 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.presets import PRESETS
 from conveyor_sim.progress import ProgressBar
+from conveyor_sim.remedies import STEP_COST
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.version import sources_hash
 
 WORK = 1.5e7
-"""Of one run, about a second: ticks times TICK, and steps times (bottles + BESIDE) times the cost of a step."""
+"""Of one run, about a second: ticks times TICK, and steps times (bottles + BESIDE) times STEP_COST."""
 TICK, BESIDE = 3000, 20
-COST = {"semi_implicit_euler": 1, "velocity_verlet": 1, "rk4": 4, "dormand_prince": 12, "linearly_implicit": 6}
-"""Of a step, in force evaluations and what is like them."""
 AT_ALL = 20.0
 """Of WORK: what a single tick would take more than is not run."""
 AGAIN = 0.1
@@ -125,7 +124,7 @@ def _tick_work(model: Model, scene: Scene) -> float:
     bottles = sum(
         entry.grid.rows * entry.grid.columns if hasattr(entry, "grid") else 1 for entry in scene.bottles
     ) + sum(min(feed.count or 100, 100) for feed in scene.infeeds.values())
-    return float(TICK + model.steps_per_tick * (bottles + BESIDE) * COST[model.integrator])
+    return float(TICK + model.steps_per_tick * (bottles + BESIDE) * STEP_COST[model.integrator])
 
 
 def _verdict(case: Case, outcome: Outcome, job: Job, early: bool) -> tuple[str, str]:

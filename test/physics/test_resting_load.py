@@ -109,3 +109,52 @@ def test_what_semi_implicit_euler_misses_of_it_is_predicted(per_tick: int) -> No
     predicted = sim.model.prediction.resting
     assert predicted == pytest.approx(MU * G * sim.model.dt / 0.01)
     assert found / expected == pytest.approx(np.full(4, 1.0 - predicted), abs=0.05 * predicted)
+
+
+JOINT = ((0.3, 0.2), (0.7, 0.35))
+"""Speed (m/s) and friction of two straight belts, one after the other."""
+QUEUE = 6
+"""Bottles in single file against a stop, half of them on each belt."""
+
+
+def across_a_joint(**accuracy: Any) -> Scene:
+    """A queue that stands on two belts of different speed and friction, before a stop, without friction in contacts."""
+    length = 2.0 * RADIUS * QUEUE
+    belts = {
+        f"belt_{number}": {
+            "kind": "straight", "start": (0.5 * length * (number - 1), -0.1), "angle": 0.0, "length": 0.5 * length,
+            "width": 0.2, "material": f"chain_{number}", "speed": speed,
+        }
+        for number, (speed, _) in enumerate(JOINT)
+    }  # fmt: skip
+    end = 0.5 * length
+    return scene(
+        tick=0.01,
+        duration=3.0,
+        gravity=G,
+        slip_limit=0.01,
+        accuracy=accuracy,
+        # So much damping that the queue has stopped ringing after 2 s, to 1e-8.
+        contacts=[contact(STIFFNESS, other, ("normal", 100.0)) for other in ("glass", "steel")],
+        base=[{"between": ["glass", f"chain_{number}"], "friction": mu} for number, (_, mu) in enumerate(JOINT)],
+        bottle_types={"bottle": kind(radius=RADIUS, mass=MASS)},
+        belts=belts,
+        rails={"stop": {"kind": "segment", "from": (end, -0.1), "to": (end, 0.1), "material": "steel"}},
+        bottles=[bottle(end - RADIUS * (1.0 + 2.0 * n), 0.0) for n in range(QUEUE)],
+    )
+
+
+@pytest.mark.parametrize("preset", ["standard", "fine"])
+@pytest.mark.parametrize("integrator", INTEGRATOR_NAMES)
+def test_a_queue_across_a_joint_of_belts(integrator: str, preset: Any) -> None:
+    """Each bottle drags with mu m g of its belt, whatever the belts' speeds: those behind press with the sum of theirs.
+
+    Straight belts take nothing from resting load at any step; rounding is left.
+    """
+    sim = Simulation(across_a_joint(preset=preset, integrator=integrator), threads=1)
+    found = mean_forces(sim, 2.0)
+    assert sim.model.prediction.resting == 0.0
+    drags = [MASS * G * mu for _, mu in reversed(JOINT) for _ in range(QUEUE // 2)]
+    pressed = [sum(drags[n:]) for n in range(QUEUE + 1)]
+    # A contact counts for the bottle that is farther on; the first has the stop's besides.
+    assert found == pytest.approx([pressed[0] + pressed[1], *pressed[2:]], rel=1e-7)
