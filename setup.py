@@ -31,7 +31,7 @@ setup(
     classifiers=["Operating System :: POSIX :: Linux", "Programming Language :: Python :: 3"],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},
-    # share/ as ROS expects it; conveyor_sim/resources.py finds config/ and msg_defs/ there.
+    # share/ as ROS expects it; conveyor_sim/support/resources.py finds config/ and msg_defs/ there.
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

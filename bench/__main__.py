@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Protocol
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     import click
@@ -15,7 +15,7 @@ with while_importing():
     from bench import dense, growth, markdown, memory, node, plant, start, targets
     from bench.measure import Effort, say
     from bench.rows import Row, Rows
-    from conveyor_sim.machine import PACKAGES, machine
+    from conveyor_sim.support.machine import PACKAGES, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "performance.md"

@@ -19,7 +19,7 @@ COLD_REPEATS, CACHED_REPEATS = 2, 7
 # The first step is the first tick: time passes in whole ticks.
 CODE = """
 from conveyor_sim import Simulation, load_scene
-from conveyor_sim.resources import scene_path
+from conveyor_sim.support.resources import scene_path
 simulation = Simulation(load_scene(scene_path("paper_plant")))
 simulation.advance(1)
 print(simulation.tick, flush=True)

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     import click
@@ -17,9 +17,9 @@ with while_importing():
     from rich.table import Table
 
     from conveyor_sim.errors import ConveyorError
-    from conveyor_sim.printable import SENTENCE, printable, printable_lines
-    from conveyor_sim.progress import ProgressBar
-    from conveyor_sim.signals import HandledOnce
+    from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
+    from conveyor_sim.support.progress import ProgressBar
+    from conveyor_sim.support.signals import HandledOnce
     from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
@@ -69,8 +69,8 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     """Validate SCENE (a file, or the name of a shipped one), tell what it comes to, and draw it."""
     from conveyor_sim.model import build_model
     from conveyor_sim.report import plot_function
-    from conveyor_sim.resources import scene_path
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
 
     path = scene_path(scene)
     checked = load_scene(path, outside_tables=outside_tables)
@@ -96,8 +96,8 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
     """Tell why SCENE is simulated as it is: which effects are on, what bounds the time step; with --price, the cost."""
     from conveyor_sim.explain import explanation, price_table
     from conveyor_sim.model import build_model
-    from conveyor_sim.resources import scene_path
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
 
     loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
     if at is not None and not price:
@@ -147,9 +147,9 @@ def run(
     from conveyor_sim.explain import setting_line, step_rows
     from conveyor_sim.model import build_model
     from conveyor_sim.report import report
-    from conveyor_sim.resources import scene_path
     from conveyor_sim.runner import run_scene
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
 
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
@@ -205,8 +205,8 @@ def accuracy(
     from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
     from conveyor_sim.accuracy.tables import terminal
     from conveyor_sim.report import plot_function
-    from conveyor_sim.resources import scene_path
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
 
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")

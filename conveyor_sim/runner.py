@@ -16,9 +16,9 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
-from conveyor_sim.signals import HandledOnce
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stopped import keep_stopped
+from conveyor_sim.support.signals import HandledOnce
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,10 @@ from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.remedies import step_limit
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.step_choice import choose_steps
+from conveyor_sim.support.printable import SENTENCE, printable
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3

@@ -10,8 +10,9 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 
 FLOORS = [
-    ["errors", "version", "machine", "signals", "files", "interrupt", "printable"],
-    ["engine", "scene", "timestep", "methods", "resources", "restitution", "control"],
+    ["errors", "version"],
+    ["support"],
+    ["engine", "scene", "timestep", "methods", "restitution", "control"],
     ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
     ["mouths", "plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
     ["step_choice"],
@@ -26,7 +27,7 @@ FLOORS = [
     ["simulation"],
     ["compilation"],
     ["bag", "price", "accuracy", "achieved", "stopped"],
-    ["progress", "summary", "plot", "explain"],
+    ["summary", "plot", "explain"],
     ["runner", "report"],
     ["ros"],
     ["cli", "testing"],

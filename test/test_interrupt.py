@@ -18,7 +18,7 @@ FUZZ = "print('began', flush=True); import runpy; runpy.run_module('fuzz', run_n
 
 SWALLOWED = """
 import ctypes, time
-from conveyor_sim.interrupt import one_line
+from conveyor_sim.support.interrupt import one_line
 
 @ctypes.CFUNCTYPE(None)
 def callback():
@@ -87,7 +87,7 @@ def test_what_fails_after_a_lost_interrupt_is_an_interrupt() -> None:
 
 def test_other_errors_stay_what_they_are() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", "from conveyor_sim.interrupt import one_line\nwith one_line(): 1 / 0"],
+        [sys.executable, "-c", "from conveyor_sim.support.interrupt import one_line\nwith one_line(): 1 / 0"],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, "ZeroDivisionError" in done.stderr) == (1, True)

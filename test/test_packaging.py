@@ -14,7 +14,7 @@ import pytest
 
 import conveyor_sim
 from conveyor_sim.errors import SceneError
-from conveyor_sim.resources import config_dir, msg_defs_dir, scene_path
+from conveyor_sim.support.resources import config_dir, msg_defs_dir, scene_path
 
 ROOT = Path(__file__).parent.parent
 COLCON = Path(sys.executable).parent / "colcon"
@@ -149,7 +149,8 @@ def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
 
     (packages,) = prefix.glob("lib/python3*/site-packages")
     code = (
-        "from conveyor_sim.resources import config_dir, msg_defs_dir; import conveyor_sim.scene, conveyor_sim.engine;"
+        "from conveyor_sim.support.resources import config_dir, msg_defs_dir;"
+        "import conveyor_sim.scene, conveyor_sim.engine;"
         "print(config_dir(), msg_defs_dir())"
     )
     found = run(sys.executable, "-c", code, cwd=tmp_path / "install", PYTHONPATH=str(packages))

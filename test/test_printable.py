@@ -2,7 +2,7 @@
 
 import pytest
 
-from conveyor_sim.printable import MOST, printable, printable_lines
+from conveyor_sim.support.printable import MOST, printable, printable_lines
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from conveyor_sim.progress import ProgressBar
+from conveyor_sim.support.progress import ProgressBar
 
 
 def test_plain_lines_where_there_is_no_terminal() -> None:

@@ -10,9 +10,9 @@ from scenes import MASS, base, belt, bottle, contact, kind, scene
 from conveyor_sim.errors import SceneError
 from conveyor_sim.model import build_model
 from conveyor_sim.remedies import StepLimit, step_limit, with_remedy
-from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
+from conveyor_sim.support.resources import scene_path
 
 DASHPOTS = [contact(1e8) | {"damping": {"law": "normal", "restitution": 0.5}}]
 TWO: dict[str, Any] = {"bottles": [bottle(0.0, 0.0, 1.0), bottle(1.0, 0.0)], "floor": "none"}

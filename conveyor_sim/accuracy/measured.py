@@ -17,9 +17,9 @@ from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.sample_file import check_origin
 from conveyor_sim.accuracy.setting import with_setting
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.machine import machine
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.machine import machine
 
 if TYPE_CHECKING:
     from conveyor_sim.accuracy.study import Bars

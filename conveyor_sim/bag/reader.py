@@ -27,7 +27,7 @@ from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.printable import printable
+from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")
 

@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.resources import msg_defs_dir
+from conveyor_sim.support.resources import msg_defs_dir
 
 DISTROS = {"jazzy": Stores.ROS2_JAZZY, "kilted": Stores.ROS2_KILTED}
 PACKAGE = "conveyor_msgs"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.line.process_image import Command
-from conveyor_sim.printable import printable
+from conveyor_sim.support.printable import printable
 
 LISTED = 20
 """Names that a refusal lists, of those there are."""

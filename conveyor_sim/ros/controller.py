@@ -19,12 +19,12 @@ from rclpy.node import Node
 from conveyor_sim.bag.qos import QOS
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.support.printable import SENTENCE, printable
 
 LOOK = 0.01  # s of wall time between two looks for the simulation
 PATIENCE = 1.0  # s of wall time without an answer after which the same request is sent again

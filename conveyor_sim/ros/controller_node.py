@@ -12,18 +12,18 @@ import sys
 from contextlib import closing, suppress
 from typing import Any
 
-from conveyor_sim.interrupt import while_importing
+from conveyor_sim.support.interrupt import while_importing
 
 with while_importing():
     from conveyor_sim.control.load import load
     from conveyor_sim.control.scan import ControlError, Controller
     from conveyor_sim.errors import ConveyorError
-    from conveyor_sim.printable import printable_lines
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
     from conveyor_sim.ros.declared import Entry, declare_table
     from conveyor_sim.ros.stop_request import StopRequest
     from conveyor_sim.scene.yaml_lines import Document
+    from conveyor_sim.support.printable import printable_lines
 
 NAME = "controller"
 MODES = ("lockstep", "free")

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.printable import printable
+from conveyor_sim.support.printable import printable
 
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 

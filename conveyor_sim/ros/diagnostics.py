@@ -10,11 +10,11 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.qos import QOS
-from conveyor_sim.printable import printable
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import RosSink, ros_qos
 from conveyor_sim.ros.stepper import State, Stepper
+from conveyor_sim.support.printable import printable
 
 PERIOD = 1.0  # s of wall time
 TICK = "tick"

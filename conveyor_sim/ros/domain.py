@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.resources import config_dir
+from conveyor_sim.support.resources import config_dir
 
 # Above 101 the UDP ports of a domain meet Linux's ephemeral ones; 0 is everybody's default.
 _DOMAINS = range(101, 0, -1)

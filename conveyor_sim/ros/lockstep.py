@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.printable import MOST, printable
+from conveyor_sim.support.printable import MOST, printable
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation

@@ -10,7 +10,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from conveyor_sim.interrupt import STATUS, one_line, while_importing
+from conveyor_sim.support.interrupt import STATUS, one_line, while_importing
 
 with while_importing():
     import click
@@ -19,15 +19,15 @@ with while_importing():
     from conveyor_sim.compilation import compiling, seconds_to_compile
     from conveyor_sim.errors import ConveyorError, Interrupted
     from conveyor_sim.model import build_model
-    from conveyor_sim.printable import printable_lines
-    from conveyor_sim.progress import ProgressBar, told_if_long
     from conveyor_sim.report import report
-    from conveyor_sim.resources import scene_path
     from conveyor_sim.ros.child import Child
     from conveyor_sim.ros.domain import private_domain
     from conveyor_sim.ros.observer import Observer
     from conveyor_sim.ros.stop_request import StopRequest
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.printable import printable_lines
+    from conveyor_sim.support.progress import ProgressBar, told_if_long
+    from conveyor_sim.support.resources import scene_path
 
 LOOK = 0.05  # s of wall time between two looks at the processes
 CONTROLLED = ("feeder", "table")  # belts that plc_node commands unless its parameters say otherwise

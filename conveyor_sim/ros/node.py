@@ -17,7 +17,6 @@ from conveyor_sim.bag.outputs import OUTPUTS, photo_eye_outputs
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.compilation import Cancelled, Compilation
 from conveyor_sim.explain import setting_line
-from conveyor_sim.resources import scene_path
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
@@ -35,6 +34,7 @@ from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.resources import scene_path
 
 REPORT = 10.0  # s of wall time between two words about what is being compiled
 

@@ -9,7 +9,7 @@ from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 
-from conveyor_sim.printable import printable
+from conveyor_sim.support.printable import printable
 
 LAST = ParameterType.PARAMETER_STRING_ARRAY
 

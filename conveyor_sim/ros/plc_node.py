@@ -10,18 +10,18 @@ from collections.abc import Mapping
 from contextlib import closing, suppress
 from typing import Any
 
-from conveyor_sim.interrupt import while_importing
+from conveyor_sim.support.interrupt import while_importing
 
 with while_importing():
     from conveyor_sim.control.level import Count, LevelControl
     from conveyor_sim.control.scan import ControlError, Controller
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.line.process_image import speed_command
-    from conveyor_sim.printable import printable, printable_lines
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
     from conveyor_sim.ros.declared import Entry, declare_table
     from conveyor_sim.ros.stop_request import StopRequest
+    from conveyor_sim.support.printable import printable, printable_lines
 
 SETTINGS = (
     Entry("feeder", "feeder", "Belt that brings bottles to the table."),

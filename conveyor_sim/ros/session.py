@@ -11,9 +11,9 @@ from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome, shown
-from conveyor_sim.printable import SENTENCE, printable
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stopped import keep_stopped
+from conveyor_sim.support.printable import SENTENCE, printable
 
 
 class Session:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import sys
 
-from conveyor_sim.interrupt import while_importing
+from conveyor_sim.support.interrupt import while_importing
 
 with while_importing():
     import rclpy
 
     from conveyor_sim.errors import ConveyorError
-    from conveyor_sim.printable import printable_lines
     from conveyor_sim.ros.context import start_ros
     from conveyor_sim.ros.node import SimNode
     from conveyor_sim.ros.stop_request import StopRequest
+    from conveyor_sim.support.printable import printable_lines
 
 
 def main() -> None:

@@ -19,13 +19,13 @@ from typing import Protocol, TypeVar
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.printable import printable
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.pacing import Pacer
 from conveyor_sim.ros.reception import Reception
 from conveyor_sim.ros.session import Session
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")
 IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens

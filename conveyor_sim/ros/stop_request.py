@@ -10,7 +10,7 @@ import signal
 import socket
 from contextlib import AbstractContextManager
 
-from conveyor_sim.signals import HandledOnce
+from conveyor_sim.support.signals import HandledOnce
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

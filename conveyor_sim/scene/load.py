@@ -10,12 +10,12 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.files import FileError, in_mb, read_file
 from conveyor_sim.scene.checks import problems_of
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.schema import Origin, Scene
 from conveyor_sim.scene.tables import Beside, with_tables
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
+from conveyor_sim.support.files import FileError, in_mb, read_file
 
 _MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from conveyor_sim.printable import printable
+from conveyor_sim.support.printable import printable
 
 Path = tuple[str | int, ...]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from conveyor_sim.files import MB, FileError, OutsideError, read_file
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.words import shown
+from conveyor_sim.support.files import MB, FileError, OutsideError, read_file
 
 _MOST_ROWS = 100_000
 _MOST_BYTES = 10 * MB

@@ -9,9 +9,9 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.files import MB, in_mb
 from conveyor_sim.scene.problems import Path, dotted
 from conveyor_sim.scene.words import cut
+from conveyor_sim.support.files import MB, in_mb
 
 LONGEST_TEXT = 8 * MB
 """Bytes of a file. A bottle that is listed by itself takes 40 of them and 8 values: 0.4 ms and 8 kB to read."""

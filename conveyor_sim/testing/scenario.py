@@ -16,9 +16,9 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ON, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.line import FAULT
-from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing.conditions import Condition, Present, text_of, values
 from conveyor_sim.testing.history import History
 

@@ -13,13 +13,13 @@ from pathlib import Path
 from statistics import mean, stdev
 from typing import Any
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     from rich.progress import track
 
     from conveyor_sim import Simulation, load_scene
-    from conveyor_sim.resources import scene_path
+    from conveyor_sim.support.resources import scene_path
 
 LANES = [f"lane_{lane}" for lane in range(1, 6)]
 CASES: dict[str, tuple[str, float, int, dict[str, Any]]] = {

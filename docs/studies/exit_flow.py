@@ -9,14 +9,14 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     import numpy as np
     from rich.progress import track
 
     from conveyor_sim import Simulation, load_scene
-    from conveyor_sim.resources import scene_path
+    from conveyor_sim.support.resources import scene_path
 
 DURATION = 50.0  # s
 WINDOW = 5.0  # s

@@ -17,7 +17,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     import click
@@ -32,10 +32,10 @@ with while_importing():
     from conveyor_sim.accuracy.setting import Setting
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.presets import PRESETS
-    from conveyor_sim.progress import ProgressBar
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.scene.accuracy import Preset, explicit
     from conveyor_sim.step_choice import choose_steps
+    from conveyor_sim.support.progress import ProgressBar
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy.md"

@@ -14,7 +14,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test"), str(Path(__file__).parent)]
@@ -29,7 +29,7 @@ with while_importing():
     from hard_cases.case import read_table
     from stability_page import page, picture
 
-    from conveyor_sim.machine import machine
+    from conveyor_sim.support.machine import machine
 
 PAGE = ROOT / "docs" / "stability.md"
 FOLDER = ROOT / "docs" / "stability"

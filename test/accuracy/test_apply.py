@@ -10,8 +10,8 @@ import pytest
 from conveyor_sim.accuracy.apply import apply
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import load_scene
+from conveyor_sim.support.resources import scene_path
 
 VERLET = Setting("velocity_verlet", 123)
 

@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.interrupt import one_line, while_importing
+from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     import click
@@ -26,7 +26,7 @@ with while_importing():
     from rich.console import Console
 
     from conveyor_sim.bag.recorder import new_run_folder
-    from conveyor_sim.progress import ProgressBar
+    from conveyor_sim.support.progress import ProgressBar
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs" / "stability"

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import initial_bottles, load_scene, parse_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.resources import scene_path
 
 RECORD = Path(__file__).with_name("record.json")
 

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 from keep.record import RECORD, contact_forces, instants
 
-from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import load_scene
 from conveyor_sim.scene.accuracy import explicit
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.resources import scene_path
 
 TOLERANCE = {"x": 2e-9, "y": 2e-9, "theta": 2e-8, "vx": 1e-7, "vy": 1e-7, "omega": 2e-7}
 """m, rad, m/s, rad/s"""

@@ -7,8 +7,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.resources import scene_path
 from conveyor_sim.scene import load_scene, parse_scene, yaml_lines
+from conveyor_sim.support.resources import scene_path
 
 HERE = Path(__file__).parent
 GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")

@@ -1,0 +1,1 @@
+"""What every room may use: files from outside, foreign text, signals, progress, the machine and its resources."""
