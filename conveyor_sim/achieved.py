@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.model import Model
-from conveyor_sim.prediction import percent
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.timestep.prediction import percent
 
 WINDOW = 1.0
 """s, over which loads are means: no impact lasts so long."""

@@ -12,11 +12,11 @@ from rich.table import Table
 from conveyor_sim.effects import EFFECTS
 from conveyor_sim.effects.notes import notes
 from conveyor_sim.model import Model
-from conveyor_sim.prediction import percent
 from conveyor_sim.remedies import step_limit
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.places import Places
-from conveyor_sim.timestep import fewest_steps
+from conveyor_sim.timestep.bounds import fewest_steps
+from conveyor_sim.timestep.prediction import percent
 
 if TYPE_CHECKING:
     from conveyor_sim.price import Price, PriceList

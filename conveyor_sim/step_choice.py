@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 
 from conveyor_sim.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of
-from conveyor_sim.laws import Laws, build_laws
-from conveyor_sim.prediction import Impact
-from conveyor_sim.presets import Target, target
+from conveyor_sim.laws.coefficients import Laws, build_laws
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound, fewest_steps, steps_per_tick
+from conveyor_sim.timestep.bounds import Bound, fewest_steps, steps_per_tick
+from conveyor_sim.timestep.prediction import Impact
+from conveyor_sim.timestep.presets import Target, target
 
 
 @dataclass(frozen=True, eq=False)

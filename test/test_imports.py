@@ -12,9 +12,10 @@ PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
 FLOORS = [
     ["errors", "version"],
     ["support"],
-    ["engine", "scene", "timestep", "methods", "restitution", "control"],
-    ["prediction", "surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
-    ["mouths", "plant", "moving_rails", "presets", "effects", "world_arrays", "part_memory"],
+    ["engine", "scene", "control"],
+    ["surfaces", "laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
+    ["timestep"],
+    ["mouths", "plant", "moving_rails", "effects", "world_arrays", "part_memory"],
     ["step_choice"],
     ["remedies"],
     ["model"],

@@ -8,9 +8,9 @@ import pytest
 from scenes import MASS, bottle, contact, kind, line, scene, segment
 
 from conveyor_sim.engine.arrays import ContactLaw
-from conveyor_sim.laws import base_radius
+from conveyor_sim.laws.coefficients import base_radius
+from conveyor_sim.laws.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
 from conveyor_sim.model import Model, build_model
-from conveyor_sim.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
 
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]
 RAIL = {"edge": segment((0.0, 6.0), (1.0, 6.0))}

@@ -9,7 +9,7 @@ from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, line, p
 
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import SceneError
-from conveyor_sim.laws import base_friction
+from conveyor_sim.laws.coefficients import base_friction
 from conveyor_sim.model import build_model
 from conveyor_sim.simulation import Simulation
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from conveyor_sim.restitution import (
+from conveyor_sim.laws.restitution import (
     clamped_damping_ratio,
     clamped_restitution,
     normal_damping,
@@ -13,7 +13,7 @@ from conveyor_sim.restitution import (
     paper_damping,
     tsuji_damping,
 )
-from conveyor_sim.timestep import contact_time, hertz_contact_time
+from conveyor_sim.timestep.bounds import contact_time, hertz_contact_time
 
 MASS = 0.1
 """kg, reduced, of two bottles of the paper."""

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from conveyor_sim.timestep import (
+from conveyor_sim.timestep.bounds import (
     Bound,
     base_friction_bound,
     contact_friction_bound,

@@ -10,10 +10,10 @@ import numpy as np
 
 from conveyor_sim.effects import choose_effects
 from conveyor_sim.effects.terms import Meeting, Terms, deepest, table_of
-from conveyor_sim.laws import build_laws
-from conveyor_sim.presets import DEFAULT, PRESETS
-from conveyor_sim.restitution import clamped_restitution
+from conveyor_sim.laws.coefficients import build_laws
+from conveyor_sim.laws.restitution import clamped_restitution
 from conveyor_sim.scene import Scene, rail_shapes
+from conveyor_sim.timestep.presets import DEFAULT, PRESETS
 
 SAMPLES = 2000
 """Steps of an undamped contact's order of duration by which an impact is integrated: its duration to 1e-3 of one."""

@@ -1,7 +1,7 @@
 """The effects: what law each adds, what in a scene calls for it, what it needs, how it bounds the time step.
 
 What no scene asks for is absent: its arrays are None and its branch is not compiled (engine/compile.py). Families of
-effects have a file each; `laws.py` and `model.py` build their arrays, the laws are files in `engine/`.
+effects have a file each; `laws/` and `model.py` build their arrays, the laws are files in `engine/`.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ from conveyor_sim.effects.static_friction import STATIC_FRICTION
 from conveyor_sim.effects.supply import INFEED, OUTFEED
 from conveyor_sim.effects.terms import Terms, most_bottles
 from conveyor_sim.errors import SceneError
-from conveyor_sim.prediction import Impact, Prediction, predict
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound
+from conveyor_sim.timestep.bounds import Bound
+from conveyor_sim.timestep.prediction import Impact, Prediction, predict
 
 __all__ = [
     "EFFECTS",

@@ -4,12 +4,12 @@ from collections.abc import Callable, Collection
 
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
-from conveyor_sim.laws import base_friction
-from conveyor_sim.methods import Share
-from conveyor_sim.prediction import Term
+from conveyor_sim.laws.coefficients import base_friction
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound, base_friction_bound, slip_time
+from conveyor_sim.timestep.bounds import Bound, base_friction_bound, slip_time
+from conveyor_sim.timestep.methods import Share
+from conveyor_sim.timestep.prediction import Term
 
 MEETING = 0.2
 """Of the fastest speed in a scene: at which most bottles meet, on the scenes of docs/accuracy.md."""

@@ -18,13 +18,13 @@ from conveyor_sim.effects.terms import (
     table_of,
     tightest,
 )
-from conveyor_sim.methods import Share
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.machines import Source
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound, lattice_bound, wedge_bound
+from conveyor_sim.timestep.bounds import Bound, lattice_bound, wedge_bound
+from conveyor_sim.timestep.methods import Share
 
 
 def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Contact]]:

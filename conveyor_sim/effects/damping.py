@@ -5,10 +5,10 @@ from collections.abc import Callable, Collection
 from conveyor_sim.effects.contacts import contacts_in_use
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, impact_speed, meetings, tightest
-from conveyor_sim.laws import damping_effect
-from conveyor_sim.methods import Share
+from conveyor_sim.laws.coefficients import damping_effect
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound, damping_bound
+from conveyor_sim.timestep.bounds import Bound, damping_bound
+from conveyor_sim.timestep.methods import Share
 
 
 def _called_for(effect: str, unit: str) -> Callable[[Scene, Collection[str]], Cause | None]:

@@ -4,12 +4,12 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from conveyor_sim.effects.terms import Meeting, Terms
-from conveyor_sim.methods import Share
-from conveyor_sim.prediction import Term
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.problems import Path, dotted
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound
+from conveyor_sim.timestep.bounds import Bound
+from conveyor_sim.timestep.methods import Share
+from conveyor_sim.timestep.prediction import Term
 
 
 @dataclass(frozen=True)

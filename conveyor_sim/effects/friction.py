@@ -17,9 +17,9 @@ from conveyor_sim.effects.terms import (
     overlap_at,
     tightest,
 )
-from conveyor_sim.prediction import Term
 from conveyor_sim.scene.schema import BottleType, Scene
-from conveyor_sim.timestep import Bound, contact_friction_bound, contact_time, damping_bound
+from conveyor_sim.timestep.bounds import Bound, contact_friction_bound, contact_time, damping_bound
+from conveyor_sim.timestep.prediction import Term
 
 
 def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:

@@ -5,8 +5,8 @@ from functools import partial
 
 from conveyor_sim.effects.declaration import Effect
 from conveyor_sim.effects.terms import Meeting, Terms, deepest, duration, impact_speed, meetings, overlap_at, table_of
-from conveyor_sim.prediction import Impact
-from conveyor_sim.timestep import Bound
+from conveyor_sim.timestep.bounds import Bound
+from conveyor_sim.timestep.prediction import Impact
 
 
 def impacts(terms: Terms, effects: Sequence[Effect]) -> tuple[Impact, ...]:

@@ -5,7 +5,7 @@ import math
 from conveyor_sim.effects.terms import Meeting, Terms
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.timestep import mover_bound
+from conveyor_sim.timestep.bounds import mover_bound
 
 
 def mover_bounds(meeting: Meeting, stiffness: float, terms: Terms) -> list[tuple[float, str]]:

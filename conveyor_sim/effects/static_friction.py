@@ -5,10 +5,10 @@ from collections.abc import Collection
 from conveyor_sim.effects.base import MEETING
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
-from conveyor_sim.laws import base_springs
-from conveyor_sim.methods import Share
+from conveyor_sim.laws.coefficients import base_springs
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep import Bound, contact_time, damping_bound
+from conveyor_sim.timestep.bounds import Bound, contact_time, damping_bound
+from conveyor_sim.timestep.methods import Share
 
 
 def _springs(scene: Scene, on: Collection[str]) -> Cause | None:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.engine.arrays import F8, ContactLaw
-from conveyor_sim.laws import Laws
-from conveyor_sim.methods import METHODS, STEP_ERROR, Method
+from conveyor_sim.laws.coefficients import Laws
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.machines import Source, Spill
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import BottleType, Scene, Single
-from conveyor_sim.timestep import Bound, contact_time, hertz_contact_time, least_steps
+from conveyor_sim.timestep.bounds import Bound, contact_time, hertz_contact_time, least_steps
+from conveyor_sim.timestep.methods import METHODS, STEP_ERROR, Method
 
 SPEED_AT_REST = 1.0
 """m/s, assumed of impacts where nothing in a scene moves at first."""

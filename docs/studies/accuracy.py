@@ -29,8 +29,8 @@ with while_importing():
     from conveyor_sim.accuracy.results import Study
     from conveyor_sim.accuracy.tables import markdown
     from conveyor_sim.plot import plot_accuracy
-    from conveyor_sim.presets import table
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.timestep.presets import table
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy.md"

@@ -24,7 +24,7 @@ from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.progress import ProgressBar
-from conveyor_sim.timestep import Bound
+from conveyor_sim.timestep.bounds import Bound
 
 STEPS = 4000
 """That a run must get through."""

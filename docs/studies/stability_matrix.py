@@ -23,11 +23,11 @@ from hard_cases.measures import Outcome, run
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import Model, build_model
-from conveyor_sim.presets import PRESETS
 from conveyor_sim.remedies import STEP_COST
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.support.progress import ProgressBar
+from conveyor_sim.timestep.presets import PRESETS
 from conveyor_sim.version import sources_hash
 
 WORK = 1.5e7

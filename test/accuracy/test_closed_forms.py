@@ -12,9 +12,9 @@ from conveyor_sim.accuracy.collision import Collision, collision_of, duration, o
 from conveyor_sim.accuracy.results import Order
 from conveyor_sim.effects.terms import meetings
 from conveyor_sim.engine.integrators import INTEGRATORS
-from conveyor_sim.restitution import onset_damping
+from conveyor_sim.laws.restitution import onset_damping
 from conveyor_sim.scene import Scene
-from conveyor_sim.timestep import hertz_contact_time
+from conveyor_sim.timestep.bounds import hertz_contact_time
 
 MASS, SPEED = 0.2, 0.7
 K = stiffness_for(0.002, MASS / 2.0)

@@ -8,9 +8,9 @@ import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, scene, segment
 
 from conveyor_sim.effects.terms import impact_speed
+from conveyor_sim.laws.restitution import onset_damping, tsuji_damping
 from conveyor_sim.model import Model, build_model
-from conveyor_sim.restitution import onset_damping, tsuji_damping
-from conveyor_sim.timestep import (
+from conveyor_sim.timestep.bounds import (
     base_friction_bound,
     contact_friction_bound,
     contact_time,

@@ -12,8 +12,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from conveyor_sim.presets import PRESETS
 from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.timestep.presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_name("table.yaml")

@@ -14,9 +14,9 @@ from scenes import MASS, RADIUS, base, belt, bottle, contact, order, scene, segm
 from worlds import ALONE, FAR, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, START
-from conveyor_sim.methods import METHODS
 from conveyor_sim.model import build_model
 from conveyor_sim.state import State
+from conveyor_sim.timestep.methods import METHODS
 
 LIMIT, MU, G = 1e-5, 0.5, 9.81
 """v_lim (m/s) is so low that steps in question are far too short for the springs to matter."""

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from scenes import base, bottle, contact, kind, scene
 
-from conveyor_sim.presets import PRESETS
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.timestep.presets import PRESETS
 
 MASS, RADIUS, MU, G = 0.36, 0.033, 0.3, 9.81
 TABLES = ((0.5, 0.25), (0.5, 0.6), (0.9, 0.5))

@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from conveyor_sim.methods import METHODS, Method
-from conveyor_sim.prediction import Impact, percent
-from conveyor_sim.restitution import paper_damping
+from conveyor_sim.laws.restitution import paper_damping
 from conveyor_sim.scene.accuracy import Accuracy, Preset
-from conveyor_sim.timestep import least_steps
+from conveyor_sim.timestep.bounds import least_steps
+from conveyor_sim.timestep.methods import METHODS, Method
+from conveyor_sim.timestep.prediction import Impact, percent
 
 PRESETS: Mapping[Preset, float] = {"draft": 0.05, "standard": 0.01, "fine": 0.001}
 """Relative error in contact force to stay below; all else follows from it."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from conveyor_sim.engine.arrays import F8, I4, ContactLaw, Curves
-from conveyor_sim.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
+from conveyor_sim.laws.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.schema import Floor, Scene
 

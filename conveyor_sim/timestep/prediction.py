@@ -13,8 +13,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from conveyor_sim.methods import Share
-from conveyor_sim.timestep import Bound, least_steps
+from conveyor_sim.timestep.bounds import Bound, least_steps
+from conveyor_sim.timestep.methods import Share
 
 WHOLE_SCENE = 1.0
 """Error in the peak forces of a scene of many impacts, over that of one impact."""

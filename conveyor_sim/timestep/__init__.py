@@ -1,0 +1,1 @@
+"""How long a time step may be: bounds, what each integrator misses, predicted errors, presets."""
