@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.empty_damage import rail_places
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.damage_arrays import Damage, Worst, worst_columns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.part_memory import Unchecked
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.state import State
+from conveyor_sim.state.empty_damage import rail_places
+from conveyor_sim.state.part_memory import Unchecked
 
 WORDS = {
     "scuffing_work": ("has taken {:.3g} J of sliding work at its wall by the time it is", "J"),

@@ -12,7 +12,7 @@ from rich.table import Table
 from conveyor_sim.effects import EFFECTS
 from conveyor_sim.effects.notes import notes
 from conveyor_sim.model import Model
-from conveyor_sim.remedies import step_limit
+from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.places import Places
 from conveyor_sim.timestep.bounds import fewest_steps

@@ -14,9 +14,9 @@ from conveyor_sim.engine.thread_choice import ThreadChoice
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.guard import Guard, GuardEvent, Violation, chatter
 from conveyor_sim.guard.memory import Memory
-from conveyor_sim.moving_rails import fastest_rail
-from conveyor_sim.part_memory import Unchecked, entries, typed
+from conveyor_sim.model.moving_rails import fastest_rail
 from conveyor_sim.state import State
+from conveyor_sim.state.part_memory import Unchecked, entries, typed
 
 SHORTER = (4, 16, 64)
 """By what factors steps are shortened, one after another, for a tick that the guard objects to."""

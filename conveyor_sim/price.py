@@ -11,7 +11,7 @@ from statistics import median
 from conveyor_sim.effects import EFFECTS
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model import Model
-from conveyor_sim.remedies import step_limit, with_remedy
+from conveyor_sim.model.remedies import step_limit, with_remedy
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.accuracy import explicit
 from conveyor_sim.simulation import Simulation
@@ -71,7 +71,7 @@ class PriceList:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a remedy (`remedies.py`) brings in time: a tick of the scene over a tick with it, from the same state."""
+    """What a remedy (`model/remedies.py`) brings in time: a tick of the scene over a tick with it, from the same state."""
 
     words: str
     steps: int

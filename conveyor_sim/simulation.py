@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
 from conveyor_sim.damage_account import DamageAccount
 from conveyor_sim.energy_account import EnergyAccount
 from conveyor_sim.engine.arrays import F8
@@ -26,11 +25,12 @@ from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.part_memory import entries, recall, remembered, typed
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.state import FIRST_SLOTS, State
-from conveyor_sim.world_arrays import changing_arrays
+from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
+from conveyor_sim.state.part_memory import entries, recall, remembered, typed
+from conveyor_sim.state.state import FIRST_SLOTS, State
+from conveyor_sim.state.world_arrays import changing_arrays
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
 """The seconds of a message header are 32 bits."""

@@ -20,14 +20,14 @@ from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.errors import ConveyorError, SceneError
 from conveyor_sim.model import Model, build_model
+from conveyor_sim.model.remedies import step_limit
+from conveyor_sim.model.step_choice import choose_steps
 from conveyor_sim.observe.borne import Borne
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.remedies import step_limit
 from conveyor_sim.scene import parse_overrides, parse_scene
-from conveyor_sim.step_choice import choose_steps
 from conveyor_sim.support.printable import SENTENCE, printable
 
 FILE_NAME = "summary.json"

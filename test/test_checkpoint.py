@@ -22,14 +22,14 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, every_law, kind, line, polyline, scene
 
-from conveyor_sim.checkpoint import FORMAT, sealed, versions
 from conveyor_sim.engine.arrays import World
 from conveyor_sim.errors import CheckpointError
-from conveyor_sim.part_memory import remembered
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.world_arrays import CONSTANT, changing_arrays
-from conveyor_sim.world_checks import FIXED, SCRATCH, indices, ranges
+from conveyor_sim.state.checkpoint import FORMAT, sealed, versions
+from conveyor_sim.state.part_memory import remembered
+from conveyor_sim.state.world_arrays import CONSTANT, changing_arrays
+from conveyor_sim.state.world_checks import FIXED, SCRATCH, indices, ranges
 
 SPRING = {"stiffness": 2000.0, "damping": 0.5}
 SPRINGS_AND_RINGS: dict[str, Any] = {

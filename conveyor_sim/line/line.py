@@ -14,9 +14,9 @@ from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.part_memory import Unchecked, entries, recall, remembered, typed
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
+from conveyor_sim.state.part_memory import Unchecked, entries, recall, remembered, typed
 from conveyor_sim.support.printable import printable
 
 FAULT = "fault"

@@ -31,9 +31,9 @@ with while_importing():
     from conveyor_sim.accuracy.results import Point
     from conveyor_sim.accuracy.setting import Setting
     from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.model.step_choice import choose_steps
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.scene.accuracy import Preset, explicit
-    from conveyor_sim.step_choice import choose_steps
     from conveyor_sim.support.progress import ProgressBar
     from conveyor_sim.timestep.presets import PRESETS
 

@@ -23,7 +23,7 @@ from hard_cases.measures import Outcome, run
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import Model, build_model
-from conveyor_sim.remedies import STEP_COST
+from conveyor_sim.model.remedies import STEP_COST
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.support.progress import ProgressBar

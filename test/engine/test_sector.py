@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conveyor_sim.engine.sector import span_distance
-from conveyor_sim.plant import reach_code
+from conveyor_sim.model.plant import reach_code
 
 RANDOM = np.random.default_rng(5)
 SPANS = [0.1, 1.0, 3.0, math.pi, 3.3, 5.0, 2.0 * math.pi - 0.2]

@@ -14,8 +14,8 @@ from test_checkpoint import END, SAVED, everything, queue, run
 
 from conveyor_sim.guard.memory import Memory
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.world_arrays import changing_arrays
-from conveyor_sim.world_checks import indices, ranges
+from conveyor_sim.state.world_arrays import changing_arrays
+from conveyor_sim.state.world_checks import indices, ranges
 
 MU, G = 0.4, 9.81
 MOST = MU * MASS * G

@@ -10,8 +10,8 @@ from conveyor_sim.engine.arrays import F8, Arcs, Belts, Ends, Listed, Sectors, S
 from conveyor_sim.engine.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
 from conveyor_sim.engine.static_grid import build_static_grid
 from conveyor_sim.engine.team import UNIT
+from conveyor_sim.model.surfaces import Joints, find_joints
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
-from conveyor_sim.surfaces import Joints, find_joints
 
 STRAIGHT = -1
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from conveyor_sim.model.surfaces import JOINT_TOLERANCE
 from conveyor_sim.scene.geometry import ArcPiece, Piece, RailShape, is_full_turn
 from conveyor_sim.scene.overlaps import near_pieces
-from conveyor_sim.surfaces import JOINT_TOLERANCE
 
 
 def cut_at_mouths(rails: Sequence[RailShape], radius: float) -> list[RailShape]:

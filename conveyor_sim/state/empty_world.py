@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conveyor_sim.empty_damage import empty_damage
 from conveyor_sim.engine.arrays import (
     F8,
     Bottles,
@@ -35,8 +34,9 @@ from conveyor_sim.engine.moving_arrays import MovingRails, MovingSprings
 from conveyor_sim.engine.slots import WIDTH
 from conveyor_sim.engine.team import UNIT
 from conveyor_sim.model import Model
-from conveyor_sim.moving_rails import moving_arrays
-from conveyor_sim.plant import belt_arrays, listed
+from conveyor_sim.model.moving_rails import moving_arrays
+from conveyor_sim.model.plant import belt_arrays, listed
+from conveyor_sim.state.empty_damage import empty_damage
 
 
 def empty_pairs(model: Model, entries: int) -> Pairs | None:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.engine.arrays import Near, NearSprings, PairSprings
 from conveyor_sim.engine.damage_arrays import bin_columns, slot_columns
 from conveyor_sim.engine.fewer import lists_of
@@ -15,10 +14,11 @@ from conveyor_sim.engine.near import drop_near_springs
 from conveyor_sim.engine.neighbours import drop_springs
 from conveyor_sim.engine.rebuild import rebuild
 from conveyor_sim.model import Model
-from conveyor_sim.moving_rails import for_slots
+from conveyor_sim.model.moving_rails import for_slots
 from conveyor_sim.scene.geometry import RailShape
-from conveyor_sim.world_arrays import Arrays, with_arrays
-from conveyor_sim.world_checks import require_sound
+from conveyor_sim.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
+from conveyor_sim.state.world_arrays import Arrays, with_arrays
+from conveyor_sim.state.world_checks import require_sound
 
 FIRST_SLOTS = 16
 

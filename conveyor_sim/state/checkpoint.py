@@ -21,13 +21,13 @@ from pydantic import BaseModel, Field, ValidationError
 
 from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.errors import CheckpointError, SceneError
-from conveyor_sim.model import versions_here
-from conveyor_sim.part_memory import wrong
+from conveyor_sim.model.model import versions_here
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.difference import scene_difference
+from conveyor_sim.state.part_memory import wrong
+from conveyor_sim.state.world_arrays import Arrays
 from conveyor_sim.support.files import MB, FileError, in_mb, read_file, write_file
 from conveyor_sim.support.printable import printable
-from conveyor_sim.world_arrays import Arrays
 
 FORMAT = 2
 """Raised by one whenever the layout of the file changes."""

@@ -11,10 +11,10 @@ from typing import Any
 from conveyor_sim.effects import most_bottles
 from conveyor_sim.effects.terms import impact_speed
 from conveyor_sim.errors import SceneError
+from conveyor_sim.model.step_choice import StepChoice, choose_steps
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
 from conveyor_sim.scene.load import parse_overrides, parse_scene
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.step_choice import StepChoice, choose_steps
 from conveyor_sim.timestep.bounds import Bound, fewest_steps
 from conveyor_sim.timestep.presets import DEFAULT
 

@@ -15,16 +15,16 @@ from conveyor_sim.engine.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws.coefficients import BaseSprings, Laws
-from conveyor_sim.mouths import cut_at_mouths
-from conveyor_sim.plant import plant_grid, rail_arrays
-from conveyor_sim.remedies import too_many
+from conveyor_sim.model.mouths import cut_at_mouths
+from conveyor_sim.model.plant import plant_grid, rail_arrays
+from conveyor_sim.model.remedies import too_many
+from conveyor_sim.model.step_choice import choose_steps
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
-from conveyor_sim.step_choice import choose_steps
 from conveyor_sim.timestep.bounds import Bound
 from conveyor_sim.timestep.prediction import Impact, Prediction
 from conveyor_sim.version import __version__, sources_hash
