@@ -68,7 +68,7 @@ def main(context: click.Context) -> None:
 def check(scene: str, out: Path, outside_tables: bool) -> None:
     """Validate SCENE (a file, or the name of a shipped one), tell what it comes to, and draw it."""
     from conveyor_sim.model import build_model
-    from conveyor_sim.report import plot_function
+    from conveyor_sim.runs.report import plot_function
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
@@ -94,7 +94,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
     """Tell why SCENE is simulated as it is: which effects are on, what bounds the time step; with --price, the cost."""
-    from conveyor_sim.explain import explanation, price_table
+    from conveyor_sim.explain.choices import explanation, price_table
     from conveyor_sim.model import build_model
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
@@ -109,8 +109,8 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
     _print(explanation(loaded, build_model(loaded)))
     if not price:
         return
-    from conveyor_sim.compilation import Compilation
-    from conveyor_sim.price import Pricing
+    from conveyor_sim.explain.effect_cost import Pricing
+    from conveyor_sim.runs.compilation import Compilation
 
     Compilation(loaded, _say).run()
     pricing = Pricing(loaded, at)
@@ -140,14 +140,14 @@ def run(
     scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None, outside_tables: bool
 ) -> None:
     """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
-    from conveyor_sim.achieved import achieved, pressed
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.compilation import Compilation
-    from conveyor_sim.explain import setting_line, step_rows
+    from conveyor_sim.explain.choices import setting_line, step_rows
     from conveyor_sim.model import build_model
-    from conveyor_sim.report import report
-    from conveyor_sim.runner import run_scene
+    from conveyor_sim.runs.compilation import Compilation
+    from conveyor_sim.runs.force_check import achieved, pressed
+    from conveyor_sim.runs.report import report
+    from conveyor_sim.runs.runner import run_scene
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
@@ -204,7 +204,7 @@ def accuracy(
     from conveyor_sim.accuracy.lines import summary
     from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
     from conveyor_sim.accuracy.tables import terminal
-    from conveyor_sim.report import plot_function
+    from conveyor_sim.runs.report import plot_function
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
@@ -305,7 +305,7 @@ def replay(
 @click.option("--bottle", "bottles", type=int, multiple=True, help="Id of a bottle to draw over time; repeatable.")
 def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[int, ...]) -> None:
     """Draw BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces."""
-    from conveyor_sim.report import plot_function
+    from conveyor_sim.runs.report import plot_function
 
     plot_bag = plot_function("plot_bag")
     if plot_bag is None:
@@ -345,7 +345,7 @@ def _supply(entry: Infeed | Source | Spill) -> str:
 
 def _account(scene: Scene, model: Model) -> Table:
     """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
-    from conveyor_sim.explain import accuracy_rows, note_rows, step_rows
+    from conveyor_sim.explain.choices import accuracy_rows, note_rows, step_rows
     from conveyor_sim.scene import initial_bottles
 
     table = Table.grid(padding=(0, 2))

@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.damage_account import DamageAccount
-from conveyor_sim.energy_account import EnergyAccount
+from conveyor_sim.accounts.damage import DamageAccount
+from conveyor_sim.accounts.energy import EnergyAccount
 from conveyor_sim.engine.arrays import F8
 from conveyor_sim.engine.contact_list import closed_contacts
 from conveyor_sim.engine.footing import refresh_footing
-from conveyor_sim.guard import GuardEvent
-from conveyor_sim.integration import Integration
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.line.line import FAULT, Line
 from conveyor_sim.line.process_image import ProcessImage
@@ -31,6 +29,8 @@ from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, 
 from conveyor_sim.state.part_memory import entries, recall, remembered, typed
 from conveyor_sim.state.state import FIRST_SLOTS, State
 from conveyor_sim.state.world_arrays import changing_arrays
+from conveyor_sim.stepping.guard import GuardEvent
+from conveyor_sim.stepping.tick import Integration
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
 """The seconds of a message header are 32 bits."""

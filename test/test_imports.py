@@ -1,49 +1,67 @@
-"""The house stands: imports point down only, and the heavy libraries stay in the rooms that are meant for them."""
+"""The house stands: each room imports what its line below allows and nothing else; no circles; no file too long."""
+
+from __future__ import annotations
 
 import ast
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parent.parent / "conveyor_sim"
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "conveyor_sim"
+PAGE = ROOT / "docs" / "architecture.md"
 
-FLOORS = [
-    ["errors", "version"],
-    ["support"],
-    ["engine", "scene", "control"],
-    ["laws", "observe", "line.process_image", "line.commands", "line.watchdog"],
-    ["timestep"],
-    ["effects"],
-    ["model"],
-    ["state", "elastic"],
-    ["guard", "line", "energy_account", "damage_account"],
-    ["integration"],
-    ["simulation"],
-    ["compilation"],
-    ["bag", "price", "accuracy", "achieved", "stopped"],
-    ["summary", "plot", "explain"],
-    ["runner", "report"],
-    ["ros"],
-    ["cli", "testing"],
-]
-FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
-ONLY_IN = {"rclpy": "ros", "matplotlib": "plot", "numba": "engine"}
+MAY_IMPORT: Mapping[str, str] = {
+    "__init__": "scene simulation version",
+    "errors": "",
+    "version": "",
+    "support": "errors | rich",
+    "engine": "| llvmlite numba numpy",
+    "control": "",
+    "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel",
+    "laws": "engine scene | numpy",
+    "timestep": "laws scene",
+    "effects": "engine errors laws scene timestep | numpy",
+    "observe": "| numpy",
+    "model": "effects engine errors laws scene timestep version | llvmlite numpy",
+    "state": "engine errors model scene support | numpy pydantic",
+    "accounts": "engine model observe scene state | numpy",
+    "line": "engine model scene state support | numpy",
+    "stepping": "accounts engine errors model scene state | numpy",
+    "simulation": "accounts engine line model observe scene state stepping | numpy",
+    "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
+    "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
+    "version | numpy rich ruamel",
+    "explain": "effects errors model scene simulation timestep | rich",
+    "plot": "accuracy bag errors line observe scene | matplotlib numpy",
+    "runs": "bag engine errors model observe plot scene simulation support timestep | click numpy rich",
+    "ros": "bag control errors explain line model runs scene simulation support version | builtin_interfaces click "
+    "conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
+    "testing": "bag control engine errors line plot ros scene simulation support | numpy pytest",
+    "cli": "accuracy bag errors explain model ros runs scene support version | click rich",
+}
+"""By room, from the lowest up: the rooms of the project, then the packages of others that it imports."""
+
+LONGEST = 400
+"""Lines of a file."""
+
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 
-def room_of(module: str) -> str | None:
-    """The longest known room that a dotted module below the package lies in."""
-    parts = module.split(".")
-    for length in range(len(parts), 0, -1):
-        if ".".join(parts[:length]) in FLOOR_OF:
-            return ".".join(parts[:length])
-    return None
+def room_of(source: Path) -> str:
+    return source.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def module_of(source: Path) -> str:
+    return ".".join(source.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
 
 
 def imports_of(source: Path) -> Iterator[str]:
-    """Absolute names of all that a file imports, wherever in it."""
+    """Absolute names of all that a file imports, wherever in it and for whatever reason."""
     package = ["conveyor_sim", *source.relative_to(PACKAGE).parent.parts]
     for node in ast.walk(ast.parse(source.read_text())):
         if isinstance(node, ast.Import):
@@ -54,42 +72,66 @@ def imports_of(source: Path) -> Iterator[str]:
             yield from (".".join([*base, alias.name]) for alias in node.names)
 
 
-def module_of(source: Path) -> str:
-    return ".".join(source.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+def test_the_list_has_every_room() -> None:
+    assert list(MAY_IMPORT) == sorted({room_of(source) for source in SOURCES}, key=list(MAY_IMPORT).index)
+    assert set(MAY_IMPORT) == {room_of(source) for source in SOURCES}
 
 
-@pytest.mark.parametrize("source", [path for path in SOURCES if path != PACKAGE / "__init__.py"], ids=module_of)
-def test_imports_point_down(source: Path) -> None:
-    own = room_of(module_of(source))
-    assert own is not None, f"{source.name} is on no floor: add its room to FLOORS"
-    for name in imports_of(source):
-        if name.startswith("conveyor_sim."):
-            other = room_of(name.removeprefix("conveyor_sim."))
-            if other is not None and other.split(".")[0] != own.split(".")[0]:
-                assert FLOOR_OF[other] < FLOOR_OF[own], f"{own} imports {name}, which is not below it"
+def test_rooms_import_downwards_only() -> None:
+    below: set[str] = {"scene", "simulation", "version"}  # what the package itself shows, when it is asked for
+    for room, allowed in MAY_IMPORT.items():
+        assert set(allowed.partition("|")[0].split()) <= below, room
+        below.add(room)
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=module_of)
-def test_heavy_libraries_stay_in_their_rooms(source: Path) -> None:
+def test_a_room_imports_what_it_may(source: Path) -> None:
+    own = room_of(source)
+    rooms, _, packages = MAY_IMPORT[own].partition("|")
     for name in imports_of(source):
-        home = ONLY_IN.get(name.split(".")[0])
-        assert home is None or module_of(source).split(".")[0] == home, f"only {home}/ may import {name}"
+        top, _, rest = name.partition(".")
+        if top == "conveyor_sim":
+            assert rest.split(".")[0] in {own, *rooms.split()}, f"{own} imports {name}"
+        else:
+            assert top in sys.stdlib_module_names or top in packages.split(), f"{own} imports {name}"
 
 
-def test_engine_knows_nothing_of_the_project() -> None:
-    allowed = {"numpy", "numba"}
-    for source in (PACKAGE / "engine").rglob("*.py"):
+def test_no_list_allows_what_nobody_uses() -> None:
+    used: dict[str, set[str]] = {room: set() for room in MAY_IMPORT}
+    for source in SOURCES:
         for name in imports_of(source):
-            top = name.split(".")[0]
-            if top == "conveyor_sim":
-                assert name.startswith("conveyor_sim.engine"), f"{source.name} imports {name}"
-            elif top in {"scipy", "pydantic", "rosbags", "mcap", "rclpy", "matplotlib", "click", "rich", "ruamel"}:
-                assert top in allowed, f"{source.name} imports {name}"
+            top, _, rest = name.partition(".")
+            used[room_of(source)].add(rest.split(".")[0] if top == "conveyor_sim" else top)
+    for room, allowed in MAY_IMPORT.items():
+        assert set(allowed.replace("|", " ").split()) <= used[room], room
 
 
-def test_control_knows_nothing_of_the_project() -> None:
-    """What a PLC programmer reads: the standard library, and no way to the simulation but the process image."""
-    for source in (PACKAGE / "control").rglob("*.py"):
-        for name in imports_of(source):
-            own = name.startswith("conveyor_sim.control")
-            assert own or name.split(".")[0] in sys.stdlib_module_names, f"{source.name} imports {name}"
+def test_no_files_import_each_other_in_a_circle() -> None:
+    """Not inside a room either, nor for the sake of types."""
+    modules = {module_of(source): source for source in SOURCES}
+    graph: dict[str, set[str]] = {}
+    for module, source in modules.items():
+        named = {name.removeprefix("conveyor_sim.") for name in imports_of(source) if name.startswith("conveyor_sim.")}
+        found = {name if name in modules else name.rpartition(".")[0] for name in named}
+        graph[module] = (found & set(modules)) - {module}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(f"these import each other: {' -> '.join(error.args[1])}")
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=module_of)
+def test_no_file_is_too_long(source: Path) -> None:
+    assert len(source.read_text().splitlines()) <= LONGEST
+
+
+def test_the_diagram_shows_every_room_and_no_other() -> None:
+    diagram = PAGE.read_text().partition("```mermaid")[2].partition("```")[0]
+    shown = re.findall(r"^ *(\w+)\[\"(\w+)(?:/|\.py)", diagram, re.MULTILINE)
+    assert {name for name, _ in shown} == {label for _, label in shown} == set(MAY_IMPORT) - {"__init__"}
+
+
+def test_the_diagram_points_as_imports_do() -> None:
+    diagram = PAGE.read_text().partition("```mermaid")[2].partition("```")[0]
+    for start, end in re.findall(r"^ *(\w+) --> (\w+)$", diagram, re.MULTILINE):
+        assert end in MAY_IMPORT[start].partition("|")[0].split(), f"{start} --> {end}"

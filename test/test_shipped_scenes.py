@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.achieved import HARDER, PeakWatch, achieved
+from conveyor_sim.runs.force_check import HARDER, PeakWatch, achieved
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

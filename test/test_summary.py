@@ -13,8 +13,8 @@ from rich.console import Console
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.model import build_model
 from conveyor_sim.model.remedies import step_limit
+from conveyor_sim.runs.summary import render, summarize, write_summary
 from conveyor_sim.scene import Scene, load_scene, parse_scene
-from conveyor_sim.summary import render, summarize, write_summary
 
 TICKS = 100
 

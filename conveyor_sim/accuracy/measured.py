@@ -6,8 +6,8 @@ import json
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import candidates, compared, forbidden
 from conveyor_sim.accuracy.closed_forms import orders
 from conveyor_sim.accuracy.cpu import Meter
@@ -20,9 +20,6 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.support.machine import machine
-
-if TYPE_CHECKING:
-    from conveyor_sim.accuracy.study import Bars
 
 MEASURED = "measured.json"
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Protocol
 
 from conveyor_sim.accuracy.answer import eligible, find_answer, largest_error
+from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import own_setting, softer
 from conveyor_sim.accuracy.equivalence import run_until_decided
 from conveyor_sim.accuracy.files import write_study
@@ -24,17 +23,6 @@ EXACT = 0.1
 
 OTHERS_SHARE = 0.2
 """Of the budget for long runs: for those of the scene's own setting and of softer contacts, which decide no answer."""
-
-
-class Bar(Protocol):
-    """Progress of one stage."""
-
-    def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
-        """Take in what is done, the whole, and the time left (s), where it is known."""
-
-
-Bars = Callable[[str, str], AbstractContextManager[Bar]]
-"""Opens the bar of a stage: what it does, and what is counted."""
 
 
 @dataclass(frozen=True)

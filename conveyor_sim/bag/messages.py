@@ -17,9 +17,9 @@ from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColu
 from conveyor_sim.observe.ledger import Ledger
 
 if TYPE_CHECKING:
-    from conveyor_sim.guard import GuardEvent
     from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.simulation import Simulation
+    from conveyor_sim.stepping.guard import GuardEvent
 
 BOTTLES = "conveyor_msgs/msg/Bottles"
 CONTACTS = "conveyor_msgs/msg/Contacts"

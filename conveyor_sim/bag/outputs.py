@@ -14,12 +14,12 @@ from conveyor_sim.bag.qos import QOS, Qos
 from conveyor_sim.scene.sensor_shapes import sensor_shapes
 
 if TYPE_CHECKING:
-    from conveyor_sim.guard import GuardEvent
     from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.observe.columns import BottleColumns
     from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
     from conveyor_sim.observe.ledger import Ledger
     from conveyor_sim.simulation import Simulation
+    from conveyor_sim.stepping.guard import GuardEvent
 
 
 @dataclass(frozen=True)

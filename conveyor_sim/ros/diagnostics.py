@@ -13,7 +13,8 @@ from conveyor_sim.bag.qos import QOS
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import RosSink, ros_qos
-from conveyor_sim.ros.stepper import State, Stepper
+from conveyor_sim.ros.run_state import State
+from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.support.printable import printable
 
 PERIOD = 1.0  # s of wall time

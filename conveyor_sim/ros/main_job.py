@@ -16,14 +16,14 @@ with while_importing():
     import click
 
     from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.compilation import compiling, seconds_to_compile
     from conveyor_sim.errors import ConveyorError, Interrupted
     from conveyor_sim.model import build_model
-    from conveyor_sim.report import report
     from conveyor_sim.ros.child import Child
     from conveyor_sim.ros.domain import private_domain
     from conveyor_sim.ros.observer import Observer
     from conveyor_sim.ros.stop_request import StopRequest
+    from conveyor_sim.runs.compilation import compiling, seconds_to_compile
+    from conveyor_sim.runs.report import report
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.progress import ProgressBar, told_if_long

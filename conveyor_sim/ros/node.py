@@ -15,8 +15,7 @@ from rclpy.parameter import Parameter
 from conveyor_sim.bag.folder import require_recordable
 from conveyor_sim.bag.outputs import OUTPUTS, photo_eye_outputs
 from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.compilation import Cancelled, Compilation
-from conveyor_sim.explain import setting_line
+from conveyor_sim.explain.choices import setting_line
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
@@ -32,6 +31,7 @@ from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stepper import Stepper
+from conveyor_sim.runs.compilation import Cancelled, Compilation
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path

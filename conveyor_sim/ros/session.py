@@ -6,13 +6,13 @@ import time
 import uuid
 from pathlib import Path
 
-from conveyor_sim.achieved import PeakWatch, achieved
 from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.commands import CommandOutcome, shown
+from conveyor_sim.runs.force_check import PeakWatch, achieved
+from conveyor_sim.runs.stopped import keep_stopped
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stopped import keep_stopped
 from conveyor_sim.support.printable import SENTENCE, printable
 
 

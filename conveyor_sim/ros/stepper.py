@@ -9,46 +9,27 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from enum import IntEnum
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.ros.calls import Calls
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.pacing import Pacer
 from conveyor_sim.ros.reception import Reception
+from conveyor_sim.ros.run_state import Log, State
 from conveyor_sim.ros.session import Session
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")
 IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens
-MOST_CALLS = 100
-"""Requests of services that may wait for the stepping thread at once; a reset that records takes 0.1 s of it."""
 REST = 1.0  # s of wall time without a tick after which the recording is flushed: no tick will do it
-
-
-class State(IntEnum):
-    """As simulation_interfaces/msg/SimulationState."""
-
-    STOPPED = 0
-    PLAYING = 1
-    PAUSED = 2
-    QUITTING = 3
-
-
-class Log(Protocol):
-    """Where the stepper tells what happened; a ROS logger or one of `logging`."""
-
-    def info(self, message: str) -> object: ...
-    def warning(self, message: str) -> object: ...
-    def error(self, message: str) -> object: ...
 
 
 @dataclass
@@ -100,10 +81,7 @@ class Stepper:
         self._advance: _Advance | None = None
         self._ended = False
         self._last_tick_at: float | None = None  # s of wall time; None once the recording has been flushed since
-        self._calls: deque[Callable[[], None]] = deque()
-        self._requests = 0  # of the calls, those of call()
-        self._wake = threading.Condition()
-        self._quit = False
+        self._calls = Calls()
         self._thread = threading.Thread(target=self._run, name="stepper", daemon=True)
 
     @property
@@ -124,9 +102,7 @@ class Stepper:
 
     def shutdown(self) -> None:
         """Finish the tick under way, complete the recording, and return when both are done."""
-        with self._wake:
-            self._quit = True
-            self._wake.notify()
+        self._calls.end()
         if self._thread.is_alive():
             self._thread.join()
         self._close_recording()  # of a run that never began
@@ -136,24 +112,7 @@ class Stepper:
 
         Refused, in the future, if too many wait already.
         """
-        future: Future[T] = Future()
-        with self._wake:
-            full = self._requests >= MOST_CALLS
-            self._requests += not full
-        if full:
-            future.set_exception(Refused(f"{MOST_CALLS} requests wait for their answers already, expected fewer"))
-            return future
-
-        def run() -> None:
-            with self._wake:
-                self._requests -= 1
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
-
-        self._enqueue(run)
-        return future
+        return self._calls.request(function)
 
     def command(self, names: tuple[str, ...], values: tuple[float, ...], source: str, size: int) -> None:
         """Hand a command of so many bytes to the simulation, which applies or refuses it as the next tick starts.
@@ -171,16 +130,11 @@ class Stepper:
             else:
                 self.reception.hand_over(self.session, names, values, source, size)
 
-        self._enqueue(hand_over)
+        self._calls.put(hand_over)
 
     def set_real_time_factor(self, factor: float) -> None:
         """From the next tick on."""
-        self._enqueue(lambda: setattr(self.pacer, "factor", factor))
-
-    def _enqueue(self, function: Callable[[], None]) -> None:
-        with self._wake:
-            self._calls.append(function)
-            self._wake.notify()
+        self._calls.put(lambda: setattr(self.pacer, "factor", factor))
 
     # In the stepping thread, through `call`
 
@@ -338,9 +292,8 @@ class Stepper:
             self.reception.give_up(self.session, "the simulation is shutting down")
 
     def _loop(self) -> None:
-        while not self._quit:
-            while self._calls and not self._quit:
-                self._calls.popleft()()
+        while not self._calls.ended:
+            self._calls.take()
             now = time.monotonic()
             self._tell_of_arrivals(now)
             wait = self._seconds_to_tick(now)
@@ -348,9 +301,7 @@ class Stepper:
                 self._tick()
             else:
                 self._rest(now)
-                with self._wake:
-                    if not self._calls and not self._quit:
-                        self._wake.wait(wait)
+                self._calls.wait(wait)
 
     def _rest(self, now: float) -> None:
         self._beat(self.session.simulation.stamp_ns, now)

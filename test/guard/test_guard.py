@@ -26,9 +26,9 @@ from scenes import (
 )
 
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.guard import GuardEvent
-from conveyor_sim.guard.chatter import EVERY
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.stepping.guard import GuardEvent
+from conveyor_sim.stepping.guard.chatter import EVERY
 
 STOP = {"stop": segment((0.6, -1.0), (0.6, 1.0))}
 

@@ -17,10 +17,10 @@ from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.runner import run_scene
+from conveyor_sim.runs.runner import run_scene
+from conveyor_sim.runs.summary import render, summarize
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.summary import render, summarize
 
 
 def bouncing(speed: float, stiffness: float) -> Scene:

@@ -18,8 +18,8 @@ from worlds import ALONE
 
 from conveyor_sim.engine.integrators import INTEGRATORS as INTEGRATORS_BY_NAME
 from conveyor_sim.engine.integrators import START
-from conveyor_sim.guard.memory import Memory
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.stepping.guard.memory import Memory
 
 INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "rk4"]
 MOVING = INTEGRATORS[:2]

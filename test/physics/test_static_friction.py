@@ -12,10 +12,10 @@ import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, order, rms, scene, segment, simulation
 from test_checkpoint import END, SAVED, everything, queue, run
 
-from conveyor_sim.guard.memory import Memory
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state.world_arrays import changing_arrays
 from conveyor_sim.state.world_checks import indices, ranges
+from conveyor_sim.stepping.guard.memory import Memory
 
 MU, G = 0.4, 9.81
 MOST = MU * MASS * G

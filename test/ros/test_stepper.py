@@ -15,10 +15,11 @@ from ros.line_client import LineClient
 
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.ros.calls import MOST_CALLS
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.session import Session
-from conveyor_sim.ros.stepper import MOST_CALLS, Stepper
+from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

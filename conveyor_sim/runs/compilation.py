@@ -30,7 +30,7 @@ BASE_SECONDS, EFFECT_SECONDS = 6.0, 1.5
 # As it ends, Python looks through all objects for garbage: numba's are so many that it takes half a second.
 atexit.register(gc.freeze)
 
-CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.compilation import child; child()"
+CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.runs.compilation import child; child()"
 
 
 class Cancelled(Exception):

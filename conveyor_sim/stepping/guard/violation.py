@@ -5,11 +5,11 @@ from typing import Literal
 
 import numpy as np
 
-from conveyor_sim.elastic import elastic_energy, rail_entries
+from conveyor_sim.accounts.elastic import elastic_energy, rail_entries
 from conveyor_sim.engine.arrays import ContactLaw, World
 from conveyor_sim.engine.integrators.dormand_prince import MOST
-from conveyor_sim.guard.squeeze import Squeeze
 from conveyor_sim.model import Model
+from conveyor_sim.stepping.guard.squeeze import Squeeze
 
 CAME_FAST = 0.5
 """Of the speed that a contact can stop: above it an overlap is put down to an impact, below to a lasting force."""

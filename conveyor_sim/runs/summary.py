@@ -14,7 +14,7 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from conveyor_sim.achieved import Achieved, Pressed, PressWatch, achieved, pressed
+from conveyor_sim.runs.force_check import Achieved, Pressed, PressWatch, achieved, pressed
 from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.bag.recorded_scene import recorded_scene

@@ -71,7 +71,7 @@ class PriceList:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a remedy (`model/remedies.py`) brings in time: a tick of the scene over a tick with it, from the same state."""
+    """What a remedy (`model/remedies.py`) brings in time: a tick of the scene over one with it, from the same state."""
 
     words: str
     steps: int

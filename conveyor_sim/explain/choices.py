@@ -19,7 +19,7 @@ from conveyor_sim.timestep.bounds import fewest_steps
 from conveyor_sim.timestep.prediction import percent
 
 if TYPE_CHECKING:
-    from conveyor_sim.price import Price, PriceList
+    from conveyor_sim.explain.effect_cost import Price, PriceList
 
 
 def explanation(scene: Scene, model: Model) -> Group:

@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.summary import render, summarize, write_summary
+from conveyor_sim.runs.summary import render, summarize, write_summary
 
 
 def report(bag: Path, wall: float | None) -> None:

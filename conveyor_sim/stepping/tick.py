@@ -12,11 +12,11 @@ from conveyor_sim.engine.crew import Crew
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
 from conveyor_sim.engine.thread_choice import ThreadChoice
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.guard import Guard, GuardEvent, Violation, chatter
-from conveyor_sim.guard.memory import Memory
 from conveyor_sim.model.moving_rails import fastest_rail
 from conveyor_sim.state import State
 from conveyor_sim.state.part_memory import Unchecked, entries, typed
+from conveyor_sim.stepping.guard import Guard, GuardEvent, Violation, chatter
+from conveyor_sim.stepping.guard.memory import Memory
 
 SHORTER = (4, 16, 64)
 """By what factors steps are shortened, one after another, for a tick that the guard objects to."""

@@ -4,7 +4,7 @@
 `chatter.py` hears friction that shakes from step to step. What it looks at in a state is in `engine/watch.py`.
 """
 
-from conveyor_sim.guard.guard import Guard
-from conveyor_sim.guard.violation import GuardEvent, Violation
+from conveyor_sim.stepping.guard.guard import Guard
+from conveyor_sim.stepping.guard.violation import GuardEvent, Violation
 
 __all__ = ["Guard", "GuardEvent", "Violation"]

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.elastic import deepest_overlap
+from conveyor_sim.accounts.elastic import deepest_overlap
 from conveyor_sim.engine.arrays import Bottles, RailContacts, Spin
 from conveyor_sim.engine.compile import entry
 from conveyor_sim.engine.stored_energy import find_stored_energy
 from conveyor_sim.engine.watch import look
-from conveyor_sim.guard.memory import Memory
-from conveyor_sim.guard.squeeze import Squeeze, squeeze_of
-from conveyor_sim.guard.violation import GuardEvent, Violation, Words
 from conveyor_sim.state import State
+from conveyor_sim.stepping.guard.memory import Memory
+from conveyor_sim.stepping.guard.squeeze import Squeeze, squeeze_of
+from conveyor_sim.stepping.guard.violation import GuardEvent, Violation, Words
 
 DEEPEST = 0.75
 """Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""

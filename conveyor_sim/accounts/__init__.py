@@ -1,0 +1,1 @@
+"""Books on a run: the energy ledger, damage, the elastic energy of contacts."""

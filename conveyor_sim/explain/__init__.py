@@ -1,0 +1,1 @@
+"""Why each effect is on, what bounds the time step, and what each costs."""

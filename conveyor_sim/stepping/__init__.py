@@ -1,0 +1,1 @@
+"""One tick: steps on a pool of threads, with the guard before and after."""
