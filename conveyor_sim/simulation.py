@@ -13,9 +13,9 @@ import numpy as np
 
 from conveyor_sim.accounts.damage import DamageAccount
 from conveyor_sim.accounts.energy import EnergyAccount
-from conveyor_sim.engine.arrays import F8
-from conveyor_sim.engine.contact_list import closed_contacts
-from conveyor_sim.engine.footing import refresh_footing
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.observers.contact_list import closed_contacts
+from conveyor_sim.engine.support.footing import refresh_footing
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.line.line import FAULT, Line
 from conveyor_sim.line.process_image import ProcessImage

@@ -1,19 +1,22 @@
 """The version of this package, stated once for Python; package.xml repeats it, and a test compares them."""
 
-import hashlib
 from functools import lru_cache
 from pathlib import Path
 
+from conveyor_sim.engine.compiler.source_hash import source_hash
+
 __version__ = "0.1.0"
+
+DECIDE_BITS = (
+    "accounts", "effects", "laws", "line", "model", "scene", "simulation.py", "state", "stepping", "timestep",
+)  # fmt: skip
+"""Rooms that decide the bits of a run, beside the engine, which has a hash of its own."""
 
 
 @lru_cache(maxsize=1)
 def sources_hash() -> str:
-    """Eight hex digits over what decides a run outside the engine: scene, effects, model, state and line."""
+    """Eight hex digits over what the sources of these rooms do."""
     root = Path(__file__).parent
-    digest = hashlib.blake2b(digest_size=4)
-    for source in sorted(
-        [*root.glob("*.py"), *root.glob("scene/*.py"), *root.glob("effects/*.py"), *root.glob("line/*.py")]
-    ):
-        digest.update(source.relative_to(root).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")
-    return digest.hexdigest()
+    rooms = (root / name for name in DECIDE_BITS)
+    sources = (source for room in rooms for source in (room.rglob("*.py") if room.is_dir() else [room]))
+    return source_hash(root, sources, 4)

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, every_law, kind, line, polyline, scene
 
-from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.errors import CheckpointError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -18,9 +18,9 @@ PAGE = ROOT / "docs" / "architecture.md"
 MAY_IMPORT: Mapping[str, str] = {
     "__init__": "scene simulation version",
     "errors": "",
-    "version": "",
-    "support": "errors | rich",
     "engine": "| llvmlite numba numpy",
+    "version": "engine",
+    "support": "errors | rich",
     "control": "",
     "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel",
     "laws": "engine scene | numpy",

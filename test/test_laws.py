@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import MASS, bottle, contact, kind, line, scene, segment
 
-from conveyor_sim.engine.arrays import ContactLaw
+from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.laws.coefficients import base_radius
 from conveyor_sim.laws.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
 from conveyor_sim.model import Model, build_model

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, line, polyline, scene, segment
 
-from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws.coefficients import base_friction
 from conveyor_sim.model import build_model

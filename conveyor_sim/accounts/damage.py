@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8
-from conveyor_sim.engine.damage_arrays import Damage, Worst, worst_columns
+from conveyor_sim.engine.arrays.damage import Damage, Worst, worst_columns
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.state import State

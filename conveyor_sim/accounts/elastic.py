@@ -3,8 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8, ContactLaw, RailContacts, World
-from conveyor_sim.engine.contact_list import BOTTLE_BOTTLE, closed_contacts
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, closed_contacts
 from conveyor_sim.model import Model
 
 

@@ -5,10 +5,10 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8
-from conveyor_sim.engine.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
-from conveyor_sim.engine.stored_energy import BASE_SPRINGS, SPRINGS, find_stored_energy
-from conveyor_sim.engine.team import members
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.observers.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
+from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, SPRINGS, find_stored_energy
+from conveyor_sim.engine.threads.team import members
 from conveyor_sim.observe.ledger import Ledger, balance
 from conveyor_sim.state import State
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
 from conveyor_sim.simulation import Simulation
 

@@ -6,7 +6,7 @@ import os
 import time
 from contextlib import AbstractContextManager
 
-from conveyor_sim.engine.compile_time import CompileTime
+from conveyor_sim.engine.compiler.compile_time import CompileTime
 
 
 def cpu_time() -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from conveyor_sim.accuracy.energy import BOTTLE_BOTTLE
 from conveyor_sim.accuracy.results import Errors
 from conveyor_sim.accuracy.trajectory import Trajectory
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 
 Ids = NDArray[np.uint64]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from conveyor_sim.accounts.elastic import elastic_energy, rail_entries
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.model import Model
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 

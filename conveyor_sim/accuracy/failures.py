@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.trajectory import Frame, Trajectory
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.model import Model
 from conveyor_sim.observe.columns import BottleColumns
 

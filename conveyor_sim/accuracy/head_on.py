@@ -9,7 +9,7 @@ import numpy as np
 
 from conveyor_sim.accuracy.aside import PHASES, RAIL, corner, phases, pitch, rms, simulation_aside
 from conveyor_sim.accuracy.collision import Collision, damping_ratio, duration, peak_force, rebound
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.simulation import Simulation
 
 STRONG = 3.0

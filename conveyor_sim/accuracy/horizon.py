@@ -17,7 +17,7 @@ from conveyor_sim.accuracy.results import Horizon
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.starts import Start
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from conveyor_sim.accuracy.candidates import forbidden, standard_steps
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

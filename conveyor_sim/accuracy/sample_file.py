@@ -15,7 +15,7 @@ from conveyor_sim.accuracy import jitter, observables, setting, stiffness
 from conveyor_sim.accuracy.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Sample
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.observe import itinerary
 from conveyor_sim.scene import Scene

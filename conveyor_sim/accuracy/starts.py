@@ -12,7 +12,7 @@ from conveyor_sim.accuracy.exercise import Exercise
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.effects.terms import impact_speed, meetings
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -1,6 +1,6 @@
 """The effects: what law each adds, what in a scene calls for it, what it needs, how it bounds the time step.
 
-What no scene asks for is absent: its arrays are None and its branch is not compiled (engine/compile.py). Families of
+What no scene asks for is absent: its arrays are None and its branch is not compiled. Families of
 effects have a file each; `laws/` and `model/` build their arrays, the laws are files in `engine/`.
 """
 

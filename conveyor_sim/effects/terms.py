@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8, ContactLaw
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.laws.coefficients import Laws
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.machines import Source, Spill

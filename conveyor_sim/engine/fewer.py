@@ -6,8 +6,8 @@ to the forces, and what forces alone need is nothing to the lists.
 
 from typing import Any
 
-from .arrays import World
-from .compile import part
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.compile import part
 
 
 def _for_forces(world: World) -> World:

@@ -6,17 +6,17 @@ writes bottles, some at a time. Sums run in a fixed order (pairs by partner, seg
 
 from typing import Any
 
-from .arrays import Member, World
-from .base import add_base_friction
-from .compile import part
-from .footing import check_footing
-from .ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_parts
-from .pairs import find_touching, pack, pair_forces
-from .path import forget_path
-from .rails import add_rail_forces, count_rail_contacts
-from .slots import sum_pair_forces, sum_slots
-from .static_friction import add_static_friction
-from .team import BLOCK, share, wait_for_all
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.pairs import find_touching, pack, pair_forces
+from conveyor_sim.engine.contact.path import forget_path
+from conveyor_sim.engine.contact.slots import sum_pair_forces, sum_slots
+from conveyor_sim.engine.observers.ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_parts
+from conveyor_sim.engine.rails.rails import add_rail_forces, count_rail_contacts
+from conveyor_sim.engine.support.base import add_base_friction
+from conveyor_sim.engine.support.footing import check_footing
+from conveyor_sim.engine.support.static_friction import add_static_friction
+from conveyor_sim.engine.threads.team import BLOCK, share, wait_for_all
 
 
 @part

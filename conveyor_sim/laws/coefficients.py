@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8, I4, ContactLaw, Curves
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
+from conveyor_sim.engine.arrays.types import F8, I4
 from conveyor_sim.laws.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.schema import Floor, Scene

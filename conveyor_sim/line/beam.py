@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.motion import CHORDS, Motion
 from conveyor_sim.scene.geometry import XY

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8
-from conveyor_sim.engine.motion_profile import plan_profile
-from conveyor_sim.engine.moving_arrays import PHASES
+from conveyor_sim.engine.arrays.moving import PHASES
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.rails.motion_profile import plan_profile
 
 _plan: Any = plan_profile.py_func  # type: ignore[attr-defined]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8, I8
+from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.line.device import Now
 
 

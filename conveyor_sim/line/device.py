@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8
-from conveyor_sim.engine.footing import find_carriers
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.process_image import Command, Signal
 from conveyor_sim.state import State
 

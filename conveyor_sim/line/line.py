@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.commands import CommandOutcome, refusal, shown
 from conveyor_sim.line.device import Device, Now

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, Now
 
 CHORDS = 8

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.engine.moving_arrays import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
+from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
 from conveyor_sim.line.course import course_to, later, position_at, resting
 from conveyor_sim.line.device import Device, Now
 from conveyor_sim.line.process_image import Signal, switch

@@ -10,8 +10,12 @@ import numpy as np
 
 from conveyor_sim.effects import EffectChoice, prediction_of
 from conveyor_sim.effects.load import Load, contact_load
-from conveyor_sim.engine.arrays import F8, Arcs, ContactLaw, Curves, Segments, Settings, StaticGrid
-from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
+from conveyor_sim.engine.arrays.lists import StaticGrid
+from conveyor_sim.engine.arrays.rails import Arcs, Segments
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
 from conveyor_sim.laws.coefficients import BaseSprings, Laws

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8, Ends
-from conveyor_sim.engine.joint import FREE
-from conveyor_sim.engine.moving_arrays import OFF_PROFILE, PHASES, UNLIMITED, Actuators, MovingRails
-from conveyor_sim.engine.team import UNIT
+from conveyor_sim.engine.arrays.moving import OFF_PROFILE, PHASES, UNLIMITED, Actuators, MovingRails
+from conveyor_sim.engine.arrays.rails import Ends
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.rails.joint import FREE
+from conveyor_sim.engine.threads.team import UNIT
 from conveyor_sim.scene.moving import MovingShape
 
 

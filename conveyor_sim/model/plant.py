@@ -6,10 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import F8, Arcs, Belts, Ends, Listed, Sectors, Segments, StaticGrid
-from conveyor_sim.engine.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
-from conveyor_sim.engine.static_grid import build_static_grid
-from conveyor_sim.engine.team import UNIT
+from conveyor_sim.engine.arrays.lists import Listed, StaticGrid
+from conveyor_sim.engine.arrays.rails import Arcs, Ends, Segments
+from conveyor_sim.engine.arrays.support import Belts, Sectors
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.lists.static_grid import build_static_grid
+from conveyor_sim.engine.support.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
+from conveyor_sim.engine.threads.team import UNIT
 from conveyor_sim.model.surfaces import Joints, find_joints
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
 
@@ -17,7 +20,7 @@ STRAIGHT = -1
 
 
 def reach_code(span: float) -> int:
-    """How the engine tells angles inside a span from those outside (engine/sector.py)."""
+    """How the engine tells angles inside a span from those outside (engine/support/sector.py)."""
     if is_full_turn(span):
         return FULL_CIRCLE
     return UP_TO_HALF if span <= math.pi else BEYOND_HALF

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.joint import ANSWERS, FREE, SILENT
+from conveyor_sim.engine.rails.joint import ANSWERS, FREE, SILENT
 from conveyor_sim.scene.geometry import Piece
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
 

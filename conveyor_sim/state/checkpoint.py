@@ -19,7 +19,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
-from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import CheckpointError, SceneError
 from conveyor_sim.model.model import versions_here
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.damage_arrays import (
-    F8,
+from conveyor_sim.engine.arrays.damage import (
     MOST_TOUCHES,
     Crushing,
     Damage,
@@ -18,7 +17,8 @@ from conveyor_sim.engine.damage_arrays import (
     Tipping,
     Worst,
 )
-from conveyor_sim.engine.team import UNIT
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.threads.team import UNIT
 from conveyor_sim.model import Model
 from conveyor_sim.scene.geometry import ArcPiece, Piece
 

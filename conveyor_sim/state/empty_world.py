@@ -4,35 +4,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import (
-    F8,
-    Bottles,
-    ContactLaw,
-    Footing,
-    Implicit,
-    Ledger,
-    Load,
-    Near,
-    NearSprings,
-    Neighbourhood,
-    PairParts,
-    Pairs,
-    PairSprings,
-    Peaks,
-    Ring,
-    Slots,
-    Spin,
-    StaticFriction,
-    Surface,
-    Watch,
-    World,
-)
-from conveyor_sim.engine.integrator_arrays import Blocks, Linear, PairTangent, Slopes, Stage, Triple
+from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Implicit, PairParts, Pairs, PairSprings, Slots
+from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
+from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
+from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
+from conveyor_sim.engine.arrays.observers import Ledger, Watch
+from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED
-from conveyor_sim.engine.ledger import BELTS
-from conveyor_sim.engine.moving_arrays import MovingRails, MovingSprings
-from conveyor_sim.engine.slots import WIDTH
-from conveyor_sim.engine.team import UNIT
+from conveyor_sim.engine.observers.ledger import BELTS
+from conveyor_sim.engine.threads.team import UNIT
 from conveyor_sim.model import Model
 from conveyor_sim.model.moving_rails import moving_arrays
 from conveyor_sim.model.plant import belt_arrays, listed

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import Near, NearSprings, PairSprings
-from conveyor_sim.engine.damage_arrays import bin_columns, slot_columns
+from conveyor_sim.engine.arrays.contacts import PairSprings
+from conveyor_sim.engine.arrays.damage import bin_columns, slot_columns
+from conveyor_sim.engine.arrays.lists import Near, NearSprings
+from conveyor_sim.engine.arrays.moving import present
 from conveyor_sim.engine.fewer import lists_of
-from conveyor_sim.engine.moving_arrays import present
-from conveyor_sim.engine.near import drop_near_springs
-from conveyor_sim.engine.neighbours import drop_springs
-from conveyor_sim.engine.rebuild import rebuild
+from conveyor_sim.engine.lists.near import drop_near_springs
+from conveyor_sim.engine.lists.neighbours import drop_springs
+from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.model import Model
 from conveyor_sim.model.moving_rails import for_slots
 from conveyor_sim.scene.geometry import RailShape

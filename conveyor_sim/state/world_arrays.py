@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.arrays.world import World
 
 Arrays = dict[str, NDArray[Any]]
 

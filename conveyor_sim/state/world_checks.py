@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import World
-from conveyor_sim.engine.moving_arrays import HELD, ON_PROFILE
-from conveyor_sim.engine.slots import WIDTH
+from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.model import Model
 from conveyor_sim.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.state.world_arrays import Arrays, changing_arrays

@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import RailContacts
-from conveyor_sim.engine.crew import Crew
+from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
-from conveyor_sim.engine.thread_choice import ThreadChoice
+from conveyor_sim.engine.threads.crew import Crew
+from conveyor_sim.engine.threads.thread_choice import ThreadChoice
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model.moving_rails import fastest_rail
 from conveyor_sim.state import State

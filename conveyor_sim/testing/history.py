@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.control.scan import ALARMS
-from conveyor_sim.engine.arrays import F8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.line.line import FAULT

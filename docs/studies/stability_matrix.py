@@ -20,7 +20,7 @@ from typing import Any
 from hard_cases.case import Case, read_table
 from hard_cases.measures import Outcome, run
 
-from conveyor_sim.engine.compile import ENGINE_HASH
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import STEP_COST

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, arc, base, belt, bottle, contact, kind, line, scene, segment, simulation
 
-from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.model import build_model
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state import State

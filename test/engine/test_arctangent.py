@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.arctangent import arctangent
+from conveyor_sim.engine.contact.arctangent import arctangent
 
 
 def test_it_is_the_arctangent_to_the_last_places() -> None:

@@ -8,8 +8,8 @@ import pytest
 from scenes import base, belt, bottle, scene
 from worlds import FAR, state_of
 
-from conveyor_sim.engine.belts import surface_velocity
-from conveyor_sim.engine.footing import find_carriers
+from conveyor_sim.engine.support.belts import surface_velocity
+from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state import State

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.engine.cache_folder import Unfit, own_folder
+from conveyor_sim.engine.compiler.cache_folder import Unfit, own_folder
 
 NOBODY = 65534
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files of another user")
 
 FORCE = """
 import numpy as np
-from conveyor_sim.engine.arrays import ContactLaw
-from conveyor_sim.engine.contact import contact_force
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.contact.contact import contact_force
 law = ContactLaw(np.array([5000.0]), *[None] * 6, np.array([0.3]), None, None, None)
 print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, None, None)[1])
 """

@@ -12,8 +12,8 @@ import conveyor_sim
 
 FORCE = """
 import numpy as np
-from conveyor_sim.engine.arrays import ContactLaw
-from conveyor_sim.engine.contact import contact_force
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.contact.contact import contact_force
 law = ContactLaw(np.array([5000.0]), *[None] * 6, np.array([0.3]), None, None, None)
 print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, None, None)[1])
 stats = contact_force.stats
@@ -70,13 +70,39 @@ def test_an_edit_in_a_helper_reaches_its_callers(copied: Path) -> None:
     """The cache of `contact.py` would hold, by numba's own rule, when only `friction.py` changes."""
     assert python(copied, FORCE) == ["-3.0", "0", "1"]
     assert python(copied, FORCE) == ["-3.0", "1", "0"]
-    friction = copied / "conveyor_sim" / "engine" / "friction.py"
+    friction = copied / "conveyor_sim" / "engine" / "contact" / "friction.py"
     text = friction.read_text()
     friction.write_text(text.replace("copysign(t * (2.0 - t), slip)", "copysign(2.0, slip)"))
     assert python(copied, FORCE) == ["-6.0", "0", "1"]
     friction.write_text(text)
     assert python(copied, FORCE) == ["-3.0", "1", "0"]
-    assert len(list((copied / "cache" / "conveyor_sim").iterdir())) == 2
+    assert len([folder for folder in (copied / "cache" / "conveyor_sim").iterdir() if folder.name != "sources"]) == 2
+
+
+def hash_of(folder: Path) -> str:
+    """Of the engine's sources in a folder, with what is kept of it left as it is."""
+    return python(folder, "from conveyor_sim.engine.compiler.compile import ENGINE_HASH as h; print(h)")[0]
+
+
+def test_a_better_comment_throws_no_kernels_away(copied: Path) -> None:
+    """The hash is over what the sources do: comments, docstrings and layout are nothing to it."""
+    friction, before = copied / "conveyor_sim" / "engine" / "contact" / "friction.py", hash_of(copied)
+    text = friction.read_text()
+    docstring = text[: text.index("\n\n")]
+    friction.write_text(text.replace(docstring, '"""Better."""', 1).replace("\n\n\n", "\n\n\n# Better.\n", 1))
+    assert friction.read_text() != text
+    assert hash_of(copied) == before
+    friction.write_text(text.replace("copysign(t * (2.0 - t), slip)", "copysign(t * (2.0 - t) * 1.0, slip)"))
+    assert hash_of(copied) != before
+
+
+def test_a_kept_hash_that_is_damaged_is_found_again(copied: Path) -> None:
+    before = hash_of(copied)
+    (kept,) = (copied / "cache" / "conveyor_sim" / "sources").iterdir()
+    for damaged in (b"", before.encode()[:-1], b"\xff" * 16):
+        kept.write_bytes(damaged)
+        assert hash_of(copied) == before
+        assert kept.read_bytes() == before.encode()
 
 
 def test_a_second_process_compiles_nothing(copied: Path) -> None:
@@ -100,7 +126,9 @@ def test_without_a_cache_kernels_come_from_a_process_of_their_own(copied: Path) 
 
 def test_where_the_cache_is(copied: Path) -> None:
     """NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else the home's cache; a temporary folder if that can't be written."""
-    code = "from conveyor_sim.engine.compile import ENGINE_HASH, KERNELS; print(KERNELS.path.parent, ENGINE_HASH)"
+    code = (
+        "from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS; print(KERNELS.path.parent, ENGINE_HASH)"
+    )
     numba, digest = python(copied, code)
     assert numba == str(copied / "cache" / "conveyor_sim")
     assert len(digest) == 16

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.arrays import ContactLaw, Curves
-from conveyor_sim.engine.contact import carried, contact_force, spring_after
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
+from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after
 
 K, C, MU, LIMIT = 5000.0, 2.0, 0.3, 0.01
 K_HERTZ = 3e6

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.arrays import Curves
-from conveyor_sim.engine.curve import curve_force
+from conveyor_sim.engine.arrays.contacts import Curves
+from conveyor_sim.engine.contact.curve import curve_force
 
 OVERLAP = np.array([0.0, 0.001, 0.002, 0.005, 0.0, 0.004])
 FORCE = np.array([0.0, 2.0, 10.0, 70.0, 0.0, 20.0])

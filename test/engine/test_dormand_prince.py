@@ -29,7 +29,7 @@ from scenes import (
 from scipy.integrate import solve_ivp
 from worlds import ALONE, FAR, evaluate, state_of
 
-from conveyor_sim.engine.arrays import World
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene

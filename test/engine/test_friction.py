@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from conveyor_sim.engine.friction import (
+from conveyor_sim.engine.contact.friction import (
     friction_share,
     implicit_regularisation,
     implicit_share,

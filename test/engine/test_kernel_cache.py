@@ -9,7 +9,7 @@ from typing import Any
 import numba
 import pytest
 
-from conveyor_sim.engine.kernel_cache import (
+from conveyor_sim.engine.compiler.kernel_cache import (
     CHECKSUM,
     MAGIC,
     KernelCache,

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import Belts, Listed, Sectors, Surface
-from conveyor_sim.engine.ring import POINTS, ring_means, ring_share, straddling_ring
+from conveyor_sim.engine.arrays.lists import Listed
+from conveyor_sim.engine.arrays.support import Belts, Sectors, Surface
+from conveyor_sim.engine.support.ring import POINTS, ring_means, ring_share, straddling_ring
 
 LIMIT = 0.01
 FINE = 1 << 16

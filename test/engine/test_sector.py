@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.sector import span_distance
+from conveyor_sim.engine.support.sector import span_distance
 from conveyor_sim.model.plant import reach_code
 
 RANDOM = np.random.default_rng(5)

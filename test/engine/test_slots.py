@@ -6,7 +6,7 @@ import numpy as np
 from scenes import bottle, contact, kind, scene
 from worlds import FAR, evaluate, state_of
 
-from conveyor_sim.engine.slots import WIDTH
+from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.state import State
 
 STIFFNESS = 5000.0

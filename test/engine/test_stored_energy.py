@@ -8,7 +8,7 @@ import pytest
 from scenes import NO_FLOOR, RADIUS, bottle, contact, kind, polyline, scene
 from worlds import ALONE, FAR, rail_forces, rail_scene, state_of
 
-from conveyor_sim.engine.stored_energy import ELASTIC, KINETIC, SPRINGS, find_stored_energy
+from conveyor_sim.engine.observers.stored_energy import ELASTIC, KINETIC, SPRINGS, find_stored_energy
 from conveyor_sim.state import State
 
 DEEP = 0.004

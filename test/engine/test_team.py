@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scenes import base, belt, contact, kind, polyline, scene
 
-from conveyor_sim.engine.crew import Crew
-from conveyor_sim.engine.team import BLOCK
+from conveyor_sim.engine.threads.crew import Crew
+from conveyor_sim.engine.threads.team import BLOCK
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

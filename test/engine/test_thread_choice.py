@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from conveyor_sim.engine.thread_choice import LEAST_WORK, ThreadChoice
+from conveyor_sim.engine.threads.thread_choice import LEAST_WORK, ThreadChoice
 
 ONE = 3e-3
 """s, a tick on one thread."""

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from numba import uint64
 
-from conveyor_sim.engine.arrays import ContactLaw
-from conveyor_sim.engine.contact import contact_force, spring_after
-from conveyor_sim.engine.friction import implicit_regularisation, regularisation
-from conveyor_sim.engine.ring import ring_means, ring_share
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.contact.contact import contact_force, spring_after
+from conveyor_sim.engine.contact.friction import implicit_regularisation, regularisation
+from conveyor_sim.engine.support.ring import ring_means, ring_share
 
 pytestmark = pytest.mark.skipif(
     platform.machine().lower() not in ("x86_64", "amd64"), reason="packed instructions go by other names"

@@ -7,9 +7,9 @@ uninterrupted tick. Every member of a team calls it alike (`team.py`).
 
 from collections.abc import Callable
 
-from ..arrays import Member, World
-from . import dormand_prince, linearly_implicit, rk4, semi_implicit_euler, velocity_verlet
-from .phase import RESUME, START
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.integrators import dormand_prince, linearly_implicit, rk4, semi_implicit_euler, velocity_verlet
+from conveyor_sim.engine.integrators.phase import RESUME, START
 
 __all__ = ["INTEGRATORS", "RESUME", "START", "Advance"]
 

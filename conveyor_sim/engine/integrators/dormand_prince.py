@@ -26,17 +26,27 @@ from typing import Any
 import numpy as np
 from numba import uint64
 
-from ..arrays import Bottles, Member, World
-from ..compile import kernel, part
-from ..damage import note_damage
-from ..fewer import for_forces
-from ..forces import bottle_forces, pack_all, pair_phase
-from ..ledger import book_stages, note_powers
-from ..motion import lists_hold, note_moved, watch_rebuilt
-from ..pairs import pack
-from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
-from ..team import BLOCK, share, wait_for_all
-from .phase import RESUME
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.pairs import pack
+from conveyor_sim.engine.fewer import for_forces
+from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
+from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, watch_rebuilt
+from conveyor_sim.engine.integrators.phase import RESUME
+from conveyor_sim.engine.integrators.runge_kutta import (
+    add_impulses,
+    come_to_rest,
+    go_to,
+    keep_slopes,
+    keep_state,
+    note_peaks,
+    turn,
+    ways_of,
+)
+from conveyor_sim.engine.observers.damage import note_damage
+from conveyor_sim.engine.observers.ledger import book_stages, note_powers
+from conveyor_sim.engine.threads.team import BLOCK, share, wait_for_all
 
 STAGES = 7
 LAST = STAGES - 1

@@ -16,23 +16,32 @@ from typing import Any
 
 from numba import uint64
 
-from ..arrays import Bottles, Member, World
-from ..base import add_base_friction
-from ..compile import kernel, part
-from ..conjugate_gradients import LEAST, RELATIVE, begin_search, factor, kick_with_rest, largest_kick, search
-from ..damage import note_damage
-from ..fewer import for_forces
-from ..footing import check_footing
-from ..forces import bottle_forces, pack_all, pair_phase
-from ..integrator_arrays import Blocks, Linear
-from ..ledger import book, note_powers
-from ..motion import accumulate_peaks, lists_hold, settle, watch_rebuilt
-from ..rebuild import moved_too_far
-from ..slots import sum_pair_forces
-from ..tangent_base import resist_base
-from ..tangent_pairs import add_pair_blocks, linear_pairs, stiffest_pairs
-from ..tangent_rails import linear_rails, stiffest_rails
-from ..team import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.integrators import Blocks, Linear
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.slots import sum_pair_forces
+from conveyor_sim.engine.fewer import for_forces
+from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
+from conveyor_sim.engine.integrators.conjugate_gradients import (
+    LEAST,
+    RELATIVE,
+    begin_search,
+    factor,
+    kick_with_rest,
+    largest_kick,
+    search,
+)
+from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, settle, watch_rebuilt
+from conveyor_sim.engine.integrators.tangent_base import resist_base
+from conveyor_sim.engine.integrators.tangent_pairs import add_pair_blocks, linear_pairs, stiffest_pairs
+from conveyor_sim.engine.integrators.tangent_rails import linear_rails, stiffest_rails
+from conveyor_sim.engine.lists.rebuild import moved_too_far
+from conveyor_sim.engine.observers.damage import note_damage
+from conveyor_sim.engine.observers.ledger import book, note_powers
+from conveyor_sim.engine.support.base import add_base_friction
+from conveyor_sim.engine.support.footing import check_footing
+from conveyor_sim.engine.threads.team import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
 
 PASSES = 10
 """Of a step longer than a contact, at most; what is left of the impulses then is kept, so that momentum is."""

@@ -18,18 +18,27 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Member, World
-from ..compile import kernel
-from ..damage import note_damage
-from ..fewer import for_forces
-from ..forces import bottle_forces, pack_all, pair_phase
-from ..ledger import book_stages, note_powers
-from ..motion import lists_hold, note_moved, watch_rebuilt
-from ..pairs import pack
-from ..path import forget_path, note_stage
-from ..runge_kutta import add_impulses, come_to_rest, go_to, keep_slopes, keep_state, note_peaks, turn, ways_of
-from ..team import BLOCK, share
-from .phase import RESUME, START
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import kernel
+from conveyor_sim.engine.contact.pairs import pack
+from conveyor_sim.engine.contact.path import forget_path, note_stage
+from conveyor_sim.engine.fewer import for_forces
+from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
+from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, watch_rebuilt
+from conveyor_sim.engine.integrators.phase import RESUME, START
+from conveyor_sim.engine.integrators.runge_kutta import (
+    add_impulses,
+    come_to_rest,
+    go_to,
+    keep_slopes,
+    keep_state,
+    note_peaks,
+    turn,
+    ways_of,
+)
+from conveyor_sim.engine.observers.damage import note_damage
+from conveyor_sim.engine.observers.ledger import book_stages, note_powers
+from conveyor_sim.engine.threads.team import BLOCK, share
 
 STAGES = 4
 TIMES = np.array([0.0, 0.5, 0.5, 1.0, 1.0])

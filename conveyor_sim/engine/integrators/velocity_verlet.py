@@ -15,20 +15,21 @@ from typing import Any
 
 from numba import uint64
 
-from ..arrays import Bottles, Load, Member, World
-from ..compile import kernel, part
-from ..damage import note_damage
-from ..fewer import for_forces
-from ..forces import bottle_forces, evaluate_forces, pack_all, pair_phase
-from ..integrator_arrays import Stage
-from ..ledger import book_kick
-from ..motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
-from ..moving import pass_step, place_rails
-from ..pairs import pack_row
-from ..path import note_path
-from ..static_friction import carry_anchors
-from ..team import BLOCK, share
-from .phase import START
+from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.integrators import Stage
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.pairs import pack_row
+from conveyor_sim.engine.contact.path import note_path
+from conveyor_sim.engine.fewer import for_forces
+from conveyor_sim.engine.forces import bottle_forces, evaluate_forces, pack_all, pair_phase
+from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
+from conveyor_sim.engine.integrators.phase import START
+from conveyor_sim.engine.observers.damage import note_damage
+from conveyor_sim.engine.observers.ledger import book_kick
+from conveyor_sim.engine.rails.moving import pass_step, place_rails
+from conveyor_sim.engine.support.static_friction import carry_anchors
+from conveyor_sim.engine.threads.team import BLOCK, share
 
 
 @kernel

@@ -6,7 +6,8 @@ change sign at every step then, and only then: an impact bends a velocity for so
 
 import numpy as np
 
-from conveyor_sim.engine.arrays import F8, World
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
 
 EXPLICIT = frozenset({"leapfrog", "semi_implicit_euler", "velocity_verlet", "rk4"})
 """The integrators that chatter; the others solve for friction, or look at their errors."""

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.accounts.elastic import deepest_overlap
-from conveyor_sim.engine.arrays import Bottles, RailContacts, Spin
-from conveyor_sim.engine.compile import entry
-from conveyor_sim.engine.stored_energy import find_stored_energy
-from conveyor_sim.engine.watch import look
+from conveyor_sim.engine.arrays.bodies import Bottles, Spin
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.compiler.compile import entry
+from conveyor_sim.engine.observers.stored_energy import find_stored_energy
+from conveyor_sim.engine.observers.watch import look
 from conveyor_sim.state import State
 from conveyor_sim.stepping.guard.memory import Memory
 from conveyor_sim.stepping.guard.squeeze import Squeeze, squeeze_of

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import World
-from conveyor_sim.engine.damage_arrays import bin_columns, slot_columns
-from conveyor_sim.engine.moving_arrays import present
+from conveyor_sim.engine.arrays.damage import bin_columns, slot_columns
+from conveyor_sim.engine.arrays.moving import present
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.state import State
 
 

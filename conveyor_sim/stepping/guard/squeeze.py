@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays import RailContacts, World
-from conveyor_sim.engine.contact_list import BOTTLE_BOTTLE, BOTTLE_RAIL, closed_contacts
-from conveyor_sim.engine.moving_arrays import MovingRails
+from conveyor_sim.engine.arrays.moving import MovingRails
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, BOTTLE_RAIL, closed_contacts
 from conveyor_sim.model import Model
 from conveyor_sim.scene.moving import MovingShape
 

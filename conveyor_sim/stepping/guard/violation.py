@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 
 from conveyor_sim.accounts.elastic import elastic_energy, rail_entries
-from conveyor_sim.engine.arrays import ContactLaw, World
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.integrators.dormand_prince import MOST
 from conveyor_sim.model import Model
 from conveyor_sim.stepping.guard.squeeze import Squeeze

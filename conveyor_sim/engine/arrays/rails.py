@@ -1,0 +1,70 @@
+"""Rails at rest, and the contacts of one bottle with rails."""
+
+from typing import NamedTuple
+
+from conveyor_sim.engine.arrays.types import F8, I1, I8, U4
+
+
+class Ends(NamedTuple):
+    """Both ends of each rail piece, (pieces, 2): start, end."""
+
+    x: F8
+    y: F8
+    joint: I1
+    """0 free end, 1 joined and the piece that answers for the joint, 2 joined and the other one."""
+    neighbour_x: F8
+    """Unit vector from a joint into the neighbouring piece."""
+    neighbour_y: F8
+
+
+class Segments(NamedTuple):
+    """Straight rail pieces, (G,)."""
+
+    x: F8
+    y: F8
+    tx: F8
+    """Unit tangent from start to end."""
+    ty: F8
+    length: F8
+    ends: Ends
+    material: U4
+    rail: U4
+    surface: U4
+    """Pieces of one surface push a bottle together, not each on its own."""
+
+
+class Arcs(NamedTuple):
+    """Arc rail pieces, (A,)."""
+
+    x: F8
+    """Centre."""
+    y: F8
+    radius: F8
+    start_x: F8
+    """Unit vector from the centre to where the span starts; the span runs counter-clockwise."""
+    start_y: F8
+    end_x: F8
+    end_y: F8
+    reach: I1
+    """0 a span up to pi, 1 beyond pi, 2 the full circle."""
+    ends: Ends
+    material: U4
+    rail: U4
+    surface: U4
+
+
+class RailContacts(NamedTuple):
+    """Scratch: the contacts of one bottle with rails, (MOST_CONTACTS,)."""
+
+    nx: F8
+    ny: F8
+    overlap: F8
+    share: F8
+    """Effective over geometric overlap where pieces of one surface push together."""
+    material: U4
+    rail: U4
+    surface: U4
+    entry: I8
+    """Of the Near list of segments; -1 - entry for one of arcs; from MOVING on a rail that moves."""
+    solution: F8
+    """Effective overlaps while they are solved for."""

@@ -1,0 +1,237 @@
+"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10; physics.md's additions).
+
+Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b
+its negative. The laws of a pair of materials add up; what a pair does not have is 0 in its column, what no pair of the
+scene has is None and not in the machine code.
+
+No branches: a loop over pairs is vectorised, and pairs apart get exactly 0. Only a curve breaks that.
+"""
+
+import math
+from typing import Any
+
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.curve import curve_energy, curve_force
+from conveyor_sim.engine.contact.friction import friction_share, implicit_share
+
+
+@kernel
+def contact_force(
+    law: ContactLaw,
+    e: int,
+    curves: Any,
+    slip_limit: float,
+    atan: Any,
+    overlap: float,
+    share: float,
+    closing: float,
+    slip: float,
+    spring: Any,
+    implicit: Any,
+) -> tuple[float, float]:
+    """Return (N, T) in N by entry e of the law; both 0 for an overlap (m) of 0 or less.
+
+    share: effective over geometric overlap, 1 for a contact on its own; it scales the law as a whole.
+    closing: m/s, relative velocity (a less b) along n. slip: m/s, relative velocity of the contact points along t.
+    atan: which friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None.
+    implicit: (dt/m_t times `Settings.ahead`, s/kg, `Settings.at_once`) for implicit friction, or None.
+    """
+    depth = 0.0 if overlap < 0.0 else overlap
+    normal = elastic_force(law.stiffness, law.hertz, law.curve, curves, e, depth)
+    normal = _damped(normal, law.damping_normal, law.damping_tsuji, law.damping_onset, e, depth, closing)
+    normal = share * _dragged(normal, law.damping_paper, e, depth, closing)
+    tangential = _tangential(
+        law.friction,
+        law.tangential_stiffness,
+        law.tangential_mindlin,
+        law.tangential_damping,
+        e,
+        slip_limit,
+        atan,
+        depth,
+        share,
+        # Coulomb's law needs a pressing contact: paper damping may pull at the end of a rebound.
+        0.0 if normal < 0.0 else normal,
+        slip,
+        spring,
+        implicit,
+    )
+    return normal, _dragged(tangential, law.damping_paper, e, depth, -slip * share)
+
+
+@part
+def elastic_force(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
+    """k delta (23) + k_h delta^1.5 + table, N; depth: m, not negative."""
+    normal = 0.0
+    if stiffness is not None:
+        normal += stiffness[e] * depth
+    if hertz is not None:
+        normal += hertz[e] * (depth * math.sqrt(depth))
+    if curve is not None:
+        normal += curve_force(curves, curve[e], depth)
+    return normal
+
+
+@part
+def _damped(elastic: float, normal: Any, tsuji: Any, onset: Any, e: int, depth: float, closing: float) -> float:
+    """With c v_n, c delta^0.25 v_n (Tsuji et al. 1992) or N lambda v_n (Hunt and Crossley 1975), never pulling."""
+    total = elastic
+    if onset is not None:
+        total += elastic * (onset[e] * closing)
+    if tsuji is not None:
+        total += tsuji[e] * math.sqrt(math.sqrt(depth)) * closing
+    if normal is not None:
+        total += (normal[e] if depth > 0.0 else 0.0) * closing
+    return _clamped(total, normal, tsuji, onset)
+
+
+@part
+def _clamped(total: float, normal: Any, tsuji: Any, onset: Any) -> float:
+    if normal is None:
+        if tsuji is None:
+            if onset is None:
+                return total
+    return 0.0 if total < 0.0 else total
+
+
+@part
+def _dragged(force: float, coefficient: Any, e: int, depth: float, velocity: float) -> float:
+    """With c v (22), not without contact: a dashpot alone does not know that the surfaces are apart."""
+    if coefficient is None:
+        return force
+    return force + (coefficient[e] if depth > 0.0 else 0.0) * velocity
+
+
+@part
+def _tangential(
+    friction: Any,
+    stiffness: Any,
+    mindlin: Any,
+    damping: Any,
+    e: int,
+    slip_limit: float,
+    atan: Any,
+    depth: float,
+    share: float,
+    pressing: float,
+    slip: float,
+    spring: Any,
+    implicit: Any,
+) -> float:
+    """Coulomb friction, by its regularised curve or, where the pair has one, by its tangential spring."""
+    if friction is None:
+        return 0.0
+    most = friction[e] * pressing
+    sliding = -most * _curve_share(most, slip, slip_limit, atan, implicit)
+    if spring is None:
+        return sliding
+    stiff = _tangential_stiffness(stiffness, mindlin, e, depth)
+    held = -share * _add_damping(stiff * spring, damping, e, slip)
+    held = -most if -most > held else held
+    held = most if held > most else held
+    return held if stiff > 0.0 else sliding
+
+
+@part
+def _tangential_stiffness(stiffness: Any, mindlin: Any, e: int, depth: float) -> float:
+    """N/m, of the tangential spring at an overlap: as given, or 8 G* sqrt(R* delta) (Mindlin 1949)."""
+    if mindlin is None:
+        return stiffness[e]
+    return stiffness[e] + mindlin[e] * math.sqrt(depth)
+
+
+@part
+def _curve_share(most: float, slip: float, slip_limit: float, atan: Any, implicit: Any) -> float:
+    if implicit is None:
+        return friction_share(slip, slip_limit, atan)
+    ease, at_once = implicit
+    b = most * ease * (1.0 / slip_limit) - at_once
+    return implicit_share(slip, 0.0 if b < 0.0 else b, slip_limit, atan)
+
+
+@part
+def _add_damping(force: float, damping: Any, e: int, slip: float) -> float:
+    if damping is None:
+        return force
+    return force + damping[e] * slip
+
+
+@part
+def elastic_energy(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
+    """What those laws have stored, J: k delta^2 / 2 + 2/5 k_h delta^2.5 + the area under the table."""
+    energy = 0.0
+    if stiffness is not None:
+        energy += 0.5 * stiffness[e] * depth * depth
+    if hertz is not None:
+        energy += 0.4 * hertz[e] * (depth * depth * math.sqrt(depth))
+    if curve is not None:
+        energy += curve_energy(curves, curve[e], depth)
+    return energy
+
+
+@part
+def drag_force(law: ContactLaw, e: int, overlap: float, velocity: float) -> float:
+    """What paper damping alone adds to a force along a velocity (m/s), N."""
+    return _dragged(0.0, law.damping_paper, e, overlap, velocity)
+
+
+@part
+def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float:
+    """What a tangential spring of some elongation (m), or None, has stored at an overlap (m), J."""
+    if spring is None:
+        return 0.0
+    depth = 0.0 if overlap < 0.0 else overlap
+    return 0.5 * _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth) * spring * spring
+
+
+@kernel
+def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, way: float) -> Any:
+    """Elongation (m), or None, of a spring at an overlap (m) that is by so much deeper (m) than where it was kept.
+
+    A spring that has become stiffer keeps its force, for what joins a contact joins it without load; one that has
+    become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by itself.
+    way: m, by which it is to be drawn out from there; one that has become stiffer meets that with its mean stiffness.
+    """
+    if spring is None:
+        return None
+    return spring - _loss(law.tangential_mindlin, e, spring + 0.5 * way, 0.0 if overlap < 0.0 else overlap, deeper)
+
+
+@part
+def _loss(mindlin: Any, e: int, middle: float, depth: float, deeper: float) -> float:
+    """Elongation (m) that a spring loses as it stiffens; middle: m, its elongation on the way."""
+    if mindlin is None:
+        return 0.0
+    before = depth - deeper
+    before = 0.0 if before < 0.0 else before
+    before = depth if before > depth else before
+    share = 1.0 - math.sqrt(before / (depth if depth > 0.0 else 1.0))
+    return (share if mindlin[e] > 0.0 else 0.0) * middle
+
+
+@part
+def stretched(spring: Any, slip: float, dt: float) -> Any:
+    """Elongation (m) with which a step acts, or None: with that of its own slip, or the spring would pump energy."""
+    if spring is None:
+        return None
+    return spring + dt * slip
+
+
+@kernel
+def spring_after(
+    law: ContactLaw, e: int, spring: float, overlap: float, slip: float, dt: float, normal: float, share: float
+) -> float:
+    """Elongation (m) of the tangential spring after dt (s) of slip (m/s), cut to mu N (Cundall and Strack 1979).
+
+    overlap: m. normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
+    """
+    depth = 0.0 if overlap < 0.0 else overlap
+    stiffness = _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth)
+    longer = spring + dt * slip
+    most = law.friction[e] * (0.0 if normal < 0.0 else normal)  # type: ignore[index]
+    # The force is that of the share of a spring, as is N.
+    scaled = share * stiffness
+    cut = math.copysign(most, longer) / (scaled if scaled > 0.0 else 1.0)
+    kept = cut if scaled * abs(longer) > most else longer
+    return kept if stiffness > 0.0 else 0.0

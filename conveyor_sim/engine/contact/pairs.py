@@ -1,0 +1,318 @@
+"""Contact of two bottles: overlap delta = R_i + R_j - |r_i - r_j|, for all listed pairs, block by block.
+
+The fast layout, once round. Pairs p = 0, 1, ... are listed by (i, j); a block is some of them:
+
+    packed   | x y vx vy | x y vx vy | x y vx vy | ...          one row a bottle, made anew before every evaluation
+                  i            j                                 1. gather: row j less row i, one packed load each
+    gathered | dx dy du dv | dx dy du dv | ...                   of this block only: it stays in the first cache
+                  v v v v v v v v                                2. law: eight pairs at a time, no branches; a pair
+    pairs.fx | on i: 0 .. P-1 | on j: P .. 2P-1 | 0 |               apart gets 0. Written twice, once a partner:
+                  ^     ^            ^                               nobody adds to what another wrote
+    slots    | 2  5  P+1  -  -  - | ...                          3. sum (slots.py): each bottle adds its own entries,
+                                                                    six to a row; "-" is the entry that stays 0
+
+Steps 1 and 2 write by pair, step 3 by bottle: no two threads write to one place, and every sum has one order, that of
+the partners. A scatter to both bottles would need neither copies nor slots, but races, and does not vectorise.
+"""
+
+import math
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
+from conveyor_sim.engine.arrays.world import Member, Settings
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
+from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
+from conveyor_sim.engine.threads.team import BLOCK, share
+
+# Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
+_1, _2, _3, _4 = uint64(1), uint64(2), uint64(3), uint64(4)
+
+
+@part
+def pack(bottles: Bottles, first: int, end: int) -> None:
+    """Copy positions and velocities of bottles first to end into rows."""
+    for i in range(uint64(first), uint64(end)):
+        pack_row(bottles.packed, i, bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i])
+
+
+@part
+def pack_row(packed: Any, i: int, x: float, y: float, vx: float, vy: float) -> None:
+    """Write the row of bottle i, an unsigned index."""
+    row = i * _4
+    packed[row] = x
+    packed[row + _1] = y
+    packed[row + _2] = vx
+    packed[row + _3] = vy
+
+
+@part
+def pair_forces(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    path: Any,
+    pairs: Any,
+    curves: Any,
+    implicit: Any,
+    member: Member,
+    spring_dt: float,
+) -> None:
+    """Find the forces and moments of this member's share of the pairs, from `bottles.packed` and `spin.omega`.
+
+    path, spring_dt: how far the tangential springs are taken along (`pair_phase`).
+    """
+    if pairs is None:
+        return
+    begin, stop = share(member, pairs.used[0])
+    for start in range(begin, stop, BLOCK):
+        first: Any = uint64(start)
+        count: Any = uint64(min(BLOCK, stop - start))
+        _gather(bottles.packed, spin, pairs, pairs.reach, first, count, member.gathered)
+        _gather_ease(implicit, pairs, first, count, member.gathered.ease)
+        _gather_ways(path, pairs, pairs.reach, first, count, member.gathered.way)
+        _law(
+            settings,
+            settings.atan,
+            spin,
+            path,
+            pairs,
+            pairs.reach,
+            pairs.moment,
+            pairs.normal,
+            pairs.spring,
+            curves,
+            implicit,
+            member.gathered,
+            first,
+            count,
+            spring_dt,
+        )
+
+
+@part
+def _gather(packed: Any, spin: Any, pairs: Pairs, reach: Any, first: int, count: int, gathered: Any) -> None:
+    difference, turn = gathered.difference, gathered.turn
+    for c in range(count):
+        a, b = uint64(pairs.i[first + c]), uint64(pairs.j[first + c])
+        i, j = a * _4, b * _4
+        # All loads before all stores, or they can't be joined.
+        dx = packed[j] - packed[i]
+        dy = packed[j + _1] - packed[i + _1]
+        dvx = packed[j + _2] - packed[i + _2]
+        dvy = packed[j + _3] - packed[i + _3]
+        row = c * _4
+        difference[row] = dx
+        difference[row + _1] = dy
+        difference[row + _2] = dvx
+        difference[row + _3] = dvy
+        if spin is not None:
+            turn[c] = spin.omega[a] + spin.omega[b]
+    _gather_rims(spin, pairs, reach, first, count, gathered.rim)
+
+
+@part
+def _gather_rims(spin: Any, pairs: Pairs, reach: Any, first: int, count: int, rim: Any) -> None:
+    if reach is not None:
+        if spin is not None:
+            for c in range(count):
+                p = first + c
+                radius = pairs.radius_i[p]  # type: ignore[index]
+                rim[c] = radius * spin.omega[pairs.i[p]] + (reach[p] - radius) * spin.omega[pairs.j[p]]
+
+
+@part
+def _gather_ease(implicit: Any, pairs: Pairs, first: int, count: int, ease: Any) -> None:
+    if implicit is None:
+        return
+    for c in range(count):
+        ease[c] = implicit.ease[pairs.i[first + c]] + implicit.ease[pairs.j[first + c]]
+
+
+@part
+def _gather_ways(path: Any, pairs: Pairs, reach: Any, first: int, count: int, way: Any) -> None:
+    if path is None:
+        return
+    for c in range(count):
+        p, row = first + c, c * _4
+        i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
+        way[row] = path.x[j] - path.x[i]
+        way[row + _1] = path.y[j] - path.y[i]
+        way[row + _2] = path.turn[i] + path.turn[j]
+        way[row + _3] = 0.0 if reach is None else _rim_way(path, pairs, reach, p)
+
+
+@part
+def _rim_way(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
+    radius = pairs.radius_i[p]  # type: ignore[index]
+    return radius * path.turn[pairs.i[p]] + (reach[p] - radius) * path.turn[pairs.j[p]]
+
+
+@part
+def normal_and_overlap(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
+    """Overlap (m; 0 or less: apart) and unit normal of two circles, (dx, dy) being the way from axis to axis."""
+    distance = math.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / distance if distance > 0.0 else 0.0
+    # Coincident centres have no normal of their own: any will part them, the same one every time.
+    return reach - distance, dx * inverse if distance > 0.0 else 1.0, dy * inverse
+
+
+@part
+def _law(
+    settings: Settings,
+    atan: Any,
+    spin: Any,
+    path: Any,
+    pairs: Pairs,
+    reach: Any,
+    moment: Any,
+    normals: Any,
+    springs: Any,
+    curves: Any,
+    implicit: Any,
+    gathered: Any,
+    first: int,
+    count: int,
+    spring_dt: float,
+) -> None:
+    difference, other = gathered.difference, first + uint64(pairs.i.size)
+    half = 0.5 * settings.lever
+    for c in range(count):
+        row, p, q = c * _4, first + c, other + c
+        dvx, dvy = difference[row + _2], difference[row + _3]
+        overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
+        closing = -(dvx * nx + dvy * ny)
+        slip = dvx * ny - dvy * nx + _rim_slip(settings, spin, reach, gathered, c, half * overlap)
+        kept, deeper, slipped = elongation(springs, p), closing * spring_dt, slip * spring_dt
+        spring = _drawn_out(settings, pairs.law, path, reach, gathered, c, p, kept, overlap, deeper, slipped, nx, ny)
+        slip_time = slip_time_of(path, spring_dt)
+        normal, tangential = contact_force(
+            pairs.law,
+            p,
+            curves,
+            settings.slip_limit,
+            atan,
+            overlap,
+            1.0,
+            closing,
+            slip,
+            stretched(spring, slip, slip_time),
+            _ease(settings, implicit, gathered, c),
+        )
+        fx = -normal * nx - tangential * ny
+        fy = tangential * nx - normal * ny
+        pairs.fx[p] = fx
+        pairs.fy[p] = fy
+        pairs.fx[q] = -fx
+        pairs.fy[q] = -fy
+        if moment is not None:
+            radius_i, radius_j = _radii(settings, pairs, reach, p)
+            moment[p] = (radius_i - half * overlap) * tangential
+            moment[q] = (radius_j - half * overlap) * tangential
+        if normals is not None:
+            normals[p] = normal
+            normals[q] = normal
+        if springs is not None:
+            after = spring_after(pairs.law, p, spring, overlap, slip, slip_time, normal, 1.0)
+            springs.elongation[p] = after if spring_dt > 0.0 else springs.elongation[p]
+
+
+@part
+def _reach(settings: Settings, reach: Any, p: int) -> float:
+    if reach is None:
+        return settings.reach
+    return reach[p]
+
+
+@part
+def _radii(settings: Settings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
+    if reach is None:
+        return 0.5 * settings.reach, 0.5 * settings.reach
+    return pairs.radius_i[p], reach[p] - pairs.radius_i[p]  # type: ignore[index]
+
+
+@part
+def _rim_slip(settings: Settings, spin: Any, reach: Any, gathered: Any, c: int, shorter: float) -> float:
+    """Slip of the rims, m/s: omega_i arm_i + omega_j arm_j, arms shorter than the radii by half the overlap."""
+    if spin is None:
+        return 0.0
+    if reach is None:
+        return (0.5 * settings.reach - shorter) * gathered.turn[c]
+    return gathered.rim[c] - shorter * gathered.turn[c]
+
+
+@part
+def elongation(springs: Any, p: int) -> Any:
+    """Elongation (m) of the tangential spring of pair p, or None."""
+    if springs is None:
+        return None
+    return springs.elongation[p]
+
+
+@part
+def _drawn_out(
+    settings: Settings,
+    law: ContactLaw,
+    path: Any,
+    reach: Any,
+    gathered: Any,
+    c: int,
+    p: int,
+    spring: Any,
+    overlap: float,
+    deeper: float,
+    slipped: float,
+    nx: float,
+    ny: float,
+) -> Any:
+    """Elongation (m) of a spring, or None, after what its bottles have gone since it was kept.
+
+    Without a path: of one that is yet to be drawn out by what has slipped (m), at an overlap (m) that is by so much
+    deeper (m).
+    """
+    if spring is None:
+        return None
+    if path is None:
+        return carried(law, p, spring, overlap, deeper, slipped)
+    way: Any = gathered.way
+    row: Any = c * _4
+    approach = -(way[row] * nx + way[row + _1] * ny)
+    # The normal turns on the way, and its mean is that of half of it: |r| n of its end over |r| of its middle.
+    distance = _reach(settings, reach, p) - overlap
+    along = (way[row] * ny - way[row + _1] * nx) * (distance / (distance + 0.5 * approach))
+    shorter = 0.5 * settings.lever * (overlap - 0.5 * approach)
+    further = way_in_touch(along + _rims_way(settings, reach, way, row, shorter), approach, overlap)
+    return carried(law, p, spring, overlap, approach, further) + further
+
+
+@part
+def _rims_way(settings: Settings, reach: Any, way: Any, row: int, shorter: float) -> float:
+    if reach is None:
+        return (0.5 * settings.reach - shorter) * way[row + _2]
+    return way[row + _3] - shorter * way[row + _2]
+
+
+@part
+def _ease(settings: Settings, implicit: Any, gathered: Any, c: int) -> Any:
+    if implicit is None:
+        return None
+    return gathered.ease[c], settings.at_once
+
+
+@part
+def find_touching(settings: Settings, bottles: Bottles, pairs: Any, member: Member) -> None:
+    """Note in `pairs.touch` which of this member's share of the pairs are closed; for the implicit solver."""
+    if pairs is None:
+        return
+    begin, stop = share(member, pairs.used[0])
+    for p in range(uint64(begin), uint64(stop)):
+        i, j = uint64(pairs.i[p]) * _4, uint64(pairs.j[p]) * _4
+        dx = bottles.packed[j] - bottles.packed[i]
+        dy = bottles.packed[j + _1] - bottles.packed[i + _1]
+        reach = _reach(settings, pairs.reach, p)
+        closed = 1.0 if dx * dx + dy * dy < reach * reach else 0.0
+        pairs.touch[p] = closed
+        pairs.touch[p + uint64(pairs.i.size)] = closed

@@ -1,0 +1,89 @@
+"""How far bottles have gone since the tangential springs were last kept: what integrators draw springs out by.
+
+Semi-implicit Euler draws a spring out by dt times the slip that it takes forces at. The others take forces at
+velocities that are not those which move the bottles: there, springs follow the ways that bottles have gone
+(`World.path`), and are as exact as positions are.
+"""
+
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.integrators import Stage
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import Member
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.threads.team import share
+
+
+@part
+def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
+    """Bottles first to end have just gone on for dt (s) at the velocities kept in `stage`."""
+    if path is None:
+        return
+    for i in range(uint64(first), uint64(end)):
+        path.x[i] = dt * stage.vx[i]
+        path.y[i] = dt * stage.vy[i]
+        path.turn[i] = dt * stage.omega[i]
+
+
+@part
+def note_stage(
+    path: Any, bottles: Bottles, spin: Any, slopes: Any, times: F8, ways: F8, s: int, h: float, first: int, end: int
+) -> None:
+    """Bottles first to end are where row s of a tableau has them in a step of h (s); see `runge_kutta.py`."""
+    if path is None:
+        return
+    for i in range(uint64(first), uint64(end)):
+        path.x[i] = bottles.x[i] - slopes.x[i]
+        path.y[i] = bottles.y[i] - slopes.y[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            path.turn[i] = h * times[s] * slopes.omega[i]
+        for stage in range(s):
+            j: Any = uint64(stage)
+            for i in range(uint64(first), uint64(end)):
+                path.turn[i] += h * h * ways[s, stage] * slopes.alpha[j, i]
+
+
+@part
+def forget_path(path: Any, moving: Any, member: Member) -> None:
+    """Springs are as long as they were kept. Seen by all after the next `wait_for_all`."""
+    if path is None:
+        return
+    begin, stop = share(member, path.x.size)
+    for i in range(begin, stop):
+        path.x[i] = path.y[i] = path.turn[i] = 0.0
+    if member.rank == 0:
+        _forget_rails(moving)
+
+
+@part
+def _forget_rails(moving: Any) -> None:
+    if moving is None:
+        return
+    _clear(moving.springs)
+
+
+@part
+def _clear(springs: Any) -> None:
+    if springs is None:
+        return
+    for q in range(springs.path.size):
+        springs.path[q] = 0.0
+
+
+@part
+def slip_time_of(path: Any, spring_dt: float) -> float:
+    """Time (s) of slip by which springs are drawn out; 0 where they follow a path."""
+    if path is None:
+        return spring_dt
+    return 0.0
+
+
+@part
+def way_in_touch(way: float, approach: float, overlap: float) -> float:
+    """What of a way (m) along a contact was gone in touch. approach: m, how much the overlap (m) has grown by it."""
+    depth = 0.0 if overlap < 0.0 else overlap
+    return way * (depth / approach) if depth < approach else way

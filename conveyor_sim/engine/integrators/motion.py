@@ -1,0 +1,83 @@
+"""The parts that integrators are made of: kick (velocities), and what follows every step.
+
+Each works on bottles first to end.
+"""
+
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.fewer import for_lists
+from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
+from conveyor_sim.engine.observers.watch import watch_overlaps
+from conveyor_sim.engine.threads.team import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
+
+TINY = 1e-100
+"""m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
+
+
+@part
+def settle(speed: float) -> float:
+    """The speed, or 0 for one below TINY; what is not a number stays so, and is found."""
+    return 0.0 if abs(speed) <= TINY else speed
+
+
+@part
+def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: int) -> None:
+    """v += dt a and omega += dt alpha, with a = F/m, alpha = M/J (paper eqs. 1, 5)."""
+    for i in range(uint64(first), uint64(end)):
+        bottles.vx[i] = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
+        bottles.vy[i] = settle(bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i]))
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            spin.omega[i] = settle(spin.omega[i] + dt * (spin.moment[i] * spin.inverse_inertia[i]))
+
+
+@part
+def accumulate_peaks(load: Load, peaks: Any, dt: float, first: int, end: int) -> None:
+    """Note the largest normal force (N) and the impulse of all normal forces (N s) of each bottle."""
+    if peaks is None:
+        return
+    _accumulate(load.normal_max, load.normal_sum, peaks, dt, first, end)
+
+
+@part
+def _accumulate(largest: Any, sums: Any, peaks: Any, dt: float, first: int, end: int) -> None:
+    for i in range(uint64(first), uint64(end)):
+        peaks.force[i] = largest[i] if largest[i] > peaks.force[i] else peaks.force[i]
+        peaks.impulse[i] += dt * sums[i]
+
+
+@part
+def note_moved(world: World, member: Member, first: int, end: int) -> None:
+    """Raise the flag MOVED if a bottle of first to end has left the range for which the lists hold."""
+    if moved_too_far(world.bottles, world.neighbourhood, world.settings.skin, first, end):
+        raise_flag(member, MOVED)
+
+
+@part
+def lists_hold(world: World, member: Member) -> bool:
+    """Wait for all; rebuild the lists if a bottle has moved too far; False if they did not fit and must be grown."""
+    wait_for_all(member)
+    if flag_raised(member, MOVED):
+        wait_for_all(member)
+        if member.rank == 0:
+            lower_flag(member, MOVED)
+            rebuild(for_lists(world))
+            world.watch.due[0] = 1
+        wait_for_all(member)
+    return world.neighbourhood.stale[0] == 0
+
+
+@part
+def watch_rebuilt(world: World, member: Member) -> None:
+    """At the end of a step: look at the overlaps if the lists were made anew since the last look (`watch.py`)."""
+    if world.watch.due[0] != 0:
+        wait_for_all(member)
+        if member.rank == 0:
+            watch_overlaps(for_lists(world), member.found)
+            world.watch.due[0] = 0
+        wait_for_all(member)

@@ -1,0 +1,111 @@
+"""One contact as the linearly implicit method has it: its force ahead, and how it resists a change of velocity.
+
+A step of h from (r, v) changes v by dv and takes forces at r + lean h (v + lean dv) and v + lean dv, made linear in dv:
+    (M + lean^2 h^2 K + lean h C) dv = h F(r + lean h v, v)
+with K and C symmetric and nowhere negative: of each contact its stiffness along the normal, its damping, and the slope
+of its friction. The turning of normals and the change of friction with the normal force are left out; they are of a
+higher order. Slopes are differences of `contact_force`, so every law has them, and no law is written twice.
+
+In steps longer than a contact, lean > 1/2, three things differ, by `late` = 2 lean - 1:
+- A contact that was closed before the step and is open ahead is held on to, or a packing at rest would come loose.
+- Friction takes the normal force from before the step: ahead, deep in each other, the bottles would press far too hard.
+- Friction and damping resist by their secant to rest, force over slip, where a step could otherwise turn a slip round.
+"""
+
+from typing import Any
+
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.contact import contact_force
+
+DIFFERENCE = 1e-6
+"""Share of an overlap, or of v_lim, over which slopes are taken."""
+
+CONTACTS = 12.0
+"""Of a bottle that may act together: six in a hexagonal packing, and six more for its base."""
+
+
+@part
+def linear_contact(
+    law: ContactLaw,
+    e: int,
+    curves: Any,
+    slip_limit: float,
+    atan: Any,
+    before: float,
+    ahead: float,
+    share: float,
+    closing: float,
+    closing_ahead: float,
+    slip: float,
+    mobility: float,
+    rim_mobility: float,
+    dt: float,
+    lean: float,
+    hold: bool,
+) -> tuple[float, float, float, float, float]:
+    """Return N and T (N) ahead, what resists dv along n and t (kg), and N before the step.
+
+    before, ahead: m, overlaps; 0 or less: apart. share, closing, slip: as in `contact_force`. mobility, rim_mobility:
+    1/kg, what closing speed and slip gain from a unit of impulse. dt: s, of the step.
+    """
+    late = 2.0 * lean - 1.0
+    least = DIFFERENCE * slip_limit
+    speed = abs(slip) if abs(slip) > least else least
+    faster = speed + least
+    normal, drag = contact_force(law, e, curves, slip_limit, atan, ahead, share, closing_ahead, speed, None, None)
+    _, drag_faster = contact_force(law, e, curves, slip_limit, atan, ahead, share, closing_ahead, faster, None, None)
+    normal_before, old = contact_force(law, e, curves, slip_limit, atan, before, share, closing, speed, None, None)
+    _, old_faster = contact_force(law, e, curves, slip_limit, atan, before, share, closing, faster, None, None)
+    held = hold and normal <= 0.0
+    depth = ahead
+    if held:
+        depth = before if before > 1e-9 else 1e-9
+    stiffness, damping, elastic = _slopes(law, e, curves, slip_limit, atan, depth, share)
+    if held:
+        normal = elastic + stiffness * (ahead - depth) + damping * closing_ahead
+    acts = 1.0 if normal != 0.0 else 0.0
+    drag += late * (old - drag)
+    drag_faster += late * (old_faster - drag_faster)
+    along = dt * dt * lean * lean * stiffness + resistance(dt * damping, dt * damping, lean, CONTACTS * mobility)
+    across = resistance(dt * (drag - drag_faster) / least, -dt * drag / speed, lean, CONTACTS * rim_mobility)
+    return normal, drag * (slip / speed), acts * along, across, normal_before
+
+
+@part
+def resistance(slope: float, secant: float, lean: float, mobility: float) -> float:
+    """What resists (kg), from a force's slope over velocity and its quotient by velocity, both times dt (kg).
+
+    Of the slope lean, the method's own, but so much of the secant that the step does not turn the velocity round.
+    mobility: 1/kg, what the velocity gains from a unit of impulse, times the contacts that may act together.
+    """
+    return lean * slope + firmness(secant * mobility) * (secant - lean * slope)
+
+
+@part
+def firmness(turns: float) -> float:
+    """Share of the secant that is needed, by what the force alone would change in a step, over the velocity."""
+    return 1.0 - 1.0 / turns if turns > 1.0 else 0.0
+
+
+@part
+def contact_stiffness(
+    law: ContactLaw, e: int, curves: Any, slip_limit: float, atan: Any, depth: float, share: float
+) -> float:
+    """Slope of the elastic force over the overlap, N/m, at a depth in m; 0 apart."""
+    stiffness, _, _ = _slopes(law, e, curves, slip_limit, atan, depth, share)
+    return stiffness
+
+
+@part
+def _slopes(
+    law: ContactLaw, e: int, curves: Any, slip_limit: float, atan: Any, depth: float, share: float
+) -> tuple[float, float, float]:
+    """Slope of N over overlap at rest (N/m), over closing speed (kg/s), where nothing is clamped, and N at rest (N)."""
+    if not depth > 0.0:
+        return 0.0, 0.0, 0.0
+    step = DIFFERENCE * depth
+    rest, _ = contact_force(law, e, curves, slip_limit, atan, depth, share, 0.0, 0.0, None, None)
+    deeper, _ = contact_force(law, e, curves, slip_limit, atan, depth + step, share, 0.0, 0.0, None, None)
+    closing, _ = contact_force(law, e, curves, slip_limit, atan, depth, share, slip_limit, 0.0, None, None)
+    return (deeper - rest) / step, (closing - rest) / slip_limit, rest

@@ -1,0 +1,230 @@
+"""The contacts of bottle pairs for the linearly implicit method (`tangent.py`)."""
+
+import math
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.integrators import Blocks, Linear
+from conveyor_sim.engine.arrays.world import Member, Settings
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.pairs import normal_and_overlap
+from conveyor_sim.engine.contact.slots import WIDTH
+from conveyor_sim.engine.integrators.tangent import contact_stiffness, linear_contact
+from conveyor_sim.engine.threads.team import UNIT, share
+
+
+@part
+def stiffest_pairs(
+    settings: Settings, bottles: Bottles, linear: Linear, pairs: Any, curves: Any, member: Member
+) -> None:
+    """Write to `pairs.tangent.most`, for each unit, the largest stiffness times mobility (1/s^2) of closed contacts.
+
+    Closed now, that is at `bottles.x`, or before the step.
+    """
+    if pairs is None:
+        return
+    begin, stop = share(member, pairs.used[0])
+    for first in range(begin, stop, UNIT):
+        most = 0.0
+        for p in range(uint64(first), uint64(min(first + UNIT, stop))):
+            i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
+            ahead, before, _, _ = _overlaps(bottles, linear, i, j)
+            depth = ahead if ahead > before else before
+            if depth > 0.0:
+                stiffness = contact_stiffness(pairs.law, p, curves, settings.slip_limit, settings.atan, depth, 1.0)
+                rate = stiffness * (bottles.inverse_mass[i] + bottles.inverse_mass[j])
+                most = rate if rate > most else most
+        pairs.tangent.most[first // UNIT] = most
+
+
+@part
+def linear_pairs(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    linear: Linear,
+    pairs: Any,
+    curves: Any,
+    member: Member,
+    dt: float,
+    lean: float,
+    again: int,
+) -> None:
+    """Find forces and moments ahead, and `pairs.tangent`, of this member's share of the pairs.
+
+    Normal forces, for peaks, are those before the step.
+    """
+    if pairs is None:
+        return
+    begin, stop = share(member, pairs.used[0])
+    for p in range(uint64(begin), uint64(stop)):
+        i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
+        ahead, before, nx, ny = _overlaps(bottles, linear, i, j)
+        hold = lean > 0.5 and (before > 0.0 or (again > 0 and pairs.tangent.normal[p] > 0.0))
+        if ahead > 0.0 or before > 0.0 or hold:
+            _close(settings, bottles, spin, linear, pairs, curves, p, i, j, ahead, before, nx, ny, dt, lean, hold)
+        else:
+            _write(pairs, pairs.moment, pairs.normal, p, 0.0, 0.0, 0.0, 0.0, 0.0)
+            pairs.tangent.normal[p] = 0.0
+            pairs.tangent.tangential[p] = 0.0
+
+
+@part
+def _overlaps(bottles: Bottles, linear: Linear, i: int, j: int) -> tuple[float, float, float, float]:
+    """Overlaps (m) ahead and before, and the normal ahead."""
+    reach = bottles.radius[i] + bottles.radius[j]
+    ahead, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
+    dx, dy = linear.x[j] - linear.x[i], linear.y[j] - linear.y[i]
+    return ahead, reach - math.sqrt(dx * dx + dy * dy), nx, ny
+
+
+@part
+def _close(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    linear: Linear,
+    pairs: Any,
+    curves: Any,
+    p: int,
+    i: int,
+    j: int,
+    ahead: float,
+    before: float,
+    nx: float,
+    ny: float,
+    dt: float,
+    lean: float,
+    hold: bool,
+) -> None:
+    change = linear.change
+    vx, vy = bottles.vx[i] - bottles.vx[j], bottles.vy[i] - bottles.vy[j]
+    dvx, dvy = change.x[i] - change.x[j], change.y[i] - change.y[j]
+    slip, slip_change = vy * nx - vx * ny, dvy * nx - dvx * ny
+    mobility = rim_mobility = bottles.inverse_mass[i] + bottles.inverse_mass[j]
+    arm_i = arm_j = 0.0
+    if spin is not None:
+        shorter = 0.5 * settings.lever * ahead
+        arm_i, arm_j = bottles.radius[i] - shorter, bottles.radius[j] - shorter
+        slip += spin.omega[i] * arm_i + spin.omega[j] * arm_j
+        slip_change += change.turn[i] * arm_i + change.turn[j] * arm_j
+        rim_mobility += arm_i * arm_i * spin.inverse_inertia[i] + arm_j * arm_j * spin.inverse_inertia[j]
+    normal, tangential, along, across, normal_before = linear_contact(
+        pairs.law,
+        p,
+        curves,
+        settings.slip_limit,
+        settings.atan,
+        before,
+        ahead,
+        1.0,
+        vx * nx + vy * ny,
+        (vx + lean * dvx) * nx + (vy + lean * dvy) * ny,
+        slip,
+        mobility,
+        rim_mobility,
+        dt,
+        lean,
+        hold,
+    )
+    tangential -= across * slip_change / dt
+    tangent = pairs.tangent
+    tangent.nx[p] = nx
+    tangent.ny[p] = ny
+    tangent.arm_i[p] = arm_i
+    tangent.arm_j[p] = arm_j
+    tangent.normal[p] = along
+    tangent.tangential[p] = across
+    fx, fy = -normal * nx - tangential * ny, tangential * nx - normal * ny
+    _write(pairs, pairs.moment, pairs.normal, p, fx, fy, arm_i * tangential, arm_j * tangential, normal_before)
+
+
+@part
+def _write(
+    pairs: Any,
+    moment: Any,
+    normals: Any,
+    p: int,
+    fx: float,
+    fy: float,
+    moment_i: float,
+    moment_j: float,
+    normal: float,
+) -> None:
+    q = p + uint64(pairs.i.size)
+    pairs.fx[p] = fx
+    pairs.fy[p] = fy
+    pairs.fx[q] = -fx
+    pairs.fy[q] = -fy
+    if moment is not None:
+        moment[p] = moment_i
+        moment[q] = moment_j
+    if normals is not None:
+        normals[p] = normal
+        normals[q] = normal
+
+
+@part
+def resist_pairs(pairs: Any, way: Any, old: Any, beta: float, member: Member) -> None:
+    """Write the impulses with which this member's pairs resist the velocities way + beta old, both Triples, by pair."""
+    if pairs is None:
+        return
+    begin, stop = share(member, pairs.used[0])
+    for p in range(uint64(begin), uint64(stop)):
+        _resist(pairs, pairs.tangent, pairs.moment, way, old, beta, p)
+
+
+@part
+def _resist(pairs: Any, tangent: Any, moment: Any, way: Any, old: Any, beta: float, p: int) -> None:
+    i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
+    nx, ny = tangent.nx[p], tangent.ny[p]
+    vx = (way.x[i] + beta * old.x[i]) - (way.x[j] + beta * old.x[j])
+    vy = (way.y[i] + beta * old.y[i]) - (way.y[j] + beta * old.y[j])
+    slip = vy * nx - vx * ny
+    arm_i, arm_j = tangent.arm_i[p], tangent.arm_j[p]
+    if moment is not None:
+        slip += (way.turn[i] + beta * old.turn[i]) * arm_i + (way.turn[j] + beta * old.turn[j]) * arm_j
+    along, across = tangent.normal[p] * (vx * nx + vy * ny), tangent.tangential[p] * slip
+    _write(
+        pairs, moment, None, p, along * nx - across * ny, along * ny + across * nx, across * arm_i, across * arm_j, 0.0
+    )
+
+
+@part
+def add_pair_blocks(pairs: Any, slots: Any, blocks: Blocks, first: int, end: int) -> None:
+    """Add to the blocks of bottles first to end what their pairs resist their own velocities with."""
+    if pairs is None:
+        return
+    for i in range(first, end):
+        for place in range(i * WIDTH, (i + 1) * WIDTH):
+            _add_pair_block(pairs, slots.entry[place], blocks, i)
+    for place in range(slots.more_start[first], slots.more_start[end]):
+        _add_pair_block(pairs, slots.more_entry[place], blocks, slots.more_bottle[place])
+
+
+@part
+def _add_pair_block(pairs: Any, entry: int, blocks: Blocks, i: int) -> None:
+    count = pairs.i.size
+    if entry == 2 * count:
+        return
+    tangent = pairs.tangent
+    first = entry < count
+    p = entry if first else entry - count
+    # The second of a pair sees the normal from the other side.
+    nx, ny = (tangent.nx[p], tangent.ny[p]) if first else (-tangent.nx[p], -tangent.ny[p])
+    add_block(
+        blocks, i, tangent.normal[p], tangent.tangential[p], nx, ny, tangent.arm_i[p] if first else tangent.arm_j[p]
+    )
+
+
+@part
+def add_block(blocks: Blocks, i: int, along: float, across: float, nx: float, ny: float, arm: float) -> None:
+    """Add to the block of bottle i what resists (kg) along a normal away from it, and across at an arm (m)."""
+    blocks.xx[i] += along * nx * nx + across * ny * ny
+    blocks.xy[i] += (along - across) * nx * ny
+    blocks.yy[i] += along * ny * ny + across * nx * nx
+    blocks.xt[i] -= across * ny * arm
+    blocks.yt[i] += across * nx * arm
+    blocks.tt[i] += across * arm * arm

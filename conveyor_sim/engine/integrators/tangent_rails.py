@@ -1,0 +1,232 @@
+"""The contacts of bottles with rails for the linearly implicit method (`tangent.py`)."""
+
+from typing import Any
+
+from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.integrators import Linear
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.integrators.tangent import contact_stiffness, linear_contact
+from conveyor_sim.engine.integrators.tangent_pairs import add_block
+from conveyor_sim.engine.rails.arc import arc_contact
+from conveyor_sim.engine.rails.rails import find_rail_contacts, law_entry, rail_arm
+from conveyor_sim.engine.rails.segment import segment_contact
+from conveyor_sim.engine.threads.team import UNIT, units
+
+
+@part
+def stiffest_rails(
+    settings: Settings,
+    bottles: Bottles,
+    linear: Linear,
+    segments: Any,
+    near_segments: Any,
+    arcs: Any,
+    near_arcs: Any,
+    railed: Any,
+    law: Any,
+    curves: Any,
+    found: RailContacts,
+    first: int,
+    end: int,
+) -> None:
+    """Write to `linear.most`, for each unit of bottles first to end, the largest stiffness over mass (1/s^2).
+
+    Of the contacts with rails that are closed now, at `bottles.x`.
+    """
+    begin, stop = units(first, end)
+    for unit in range(begin, stop):
+        linear.most[unit] = 0.0
+    if railed is None:
+        return
+    for place in range(railed.first[begin], railed.first[stop]):
+        i = railed.bottle[place]
+        most = linear.most[i // UNIT]
+        for c in range(find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)):
+            entry = law_entry(settings, bottles, found, c, i)
+            stiffness = contact_stiffness(
+                law, entry, curves, settings.slip_limit, settings.atan, found.overlap[c], found.share[c]
+            )
+            rate = stiffness * bottles.inverse_mass[i]
+            most = rate if rate > most else most
+        linear.most[i // UNIT] = most
+
+
+@part
+def linear_rails(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    load: Load,
+    linear: Linear,
+    segments: Any,
+    near_segments: Any,
+    arcs: Any,
+    near_arcs: Any,
+    railed: Any,
+    law: Any,
+    curves: Any,
+    found: RailContacts,
+    dt: float,
+    lean: float,
+    first: int,
+    end: int,
+) -> None:
+    """Add what rails exert ahead on bottles first to end to `load` and `spin.moment`, and resist to `linear.own`."""
+    if railed is None:
+        return
+    begin, stop = units(first, end)
+    for place in range(railed.first[begin], railed.first[stop]):
+        i = railed.bottle[place]
+        x, y, radius = bottles.x[i], bottles.y[i], bottles.radius[i]
+        old_x, old_y = linear.x[i], linear.y[i]
+        # Contacts that are closed ahead; then those that were before the step, of surfaces that are not touched ahead.
+        for earlier in range(2 if lean > 0.5 else 1):
+            if earlier:
+                bottles.x[i], bottles.y[i] = old_x, old_y
+            count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)
+            bottles.x[i], bottles.y[i] = x, y
+            for c in range(count):
+                overlap = found.overlap[c]
+                if earlier:
+                    away = found.nx[c] * (x - old_x) + found.ny[c] * (y - old_y)
+                    before, ahead = overlap, min(overlap + away, 0.0)
+                else:
+                    entry = found.entry[c]
+                    before = _overlap(segments, near_segments, arcs, near_arcs, entry, old_x, old_y, radius)
+                    ahead = overlap
+                seen_to = earlier and _touched(
+                    segments, near_segments, arcs, near_arcs, found.surface[c], i, x, y, radius
+                )
+                if found.share[c] > 0.0 and not seen_to:
+                    _add_contact(
+                        settings,
+                        bottles,
+                        spin,
+                        load,
+                        linear,
+                        law,
+                        curves,
+                        found,
+                        c,
+                        i,
+                        before,
+                        ahead,
+                        dt,
+                        lean,
+                        earlier > 0,
+                    )
+
+
+@part
+def _overlap(
+    segments: Any, near_segments: Any, arcs: Any, near_arcs: Any, entry: int, x: float, y: float, radius: float
+) -> float:
+    """Overlap (m) of a circle with the piece at an entry of the lists (`RailContacts.entry`)."""
+    if entry >= 0:
+        return _segment_overlap(segments, near_segments, entry, x, y, radius)
+    return _arc_overlap(arcs, near_arcs, -1 - entry, x, y, radius)
+
+
+@part
+def _segment_overlap(segments: Any, near: Any, entry: int, x: float, y: float, radius: float) -> float:
+    if segments is None:
+        return 0.0
+    overlap, _, _ = segment_contact(segments, near.piece[entry], x, y, radius)
+    return overlap
+
+
+@part
+def _arc_overlap(arcs: Any, near: Any, entry: int, x: float, y: float, radius: float) -> float:
+    if arcs is None:
+        return 0.0
+    overlap, _, _ = arc_contact(arcs, near.piece[entry], x, y, radius)
+    return overlap
+
+
+@part
+def _touched(
+    segments: Any,
+    near_segments: Any,
+    arcs: Any,
+    near_arcs: Any,
+    surface: int,
+    i: int,
+    x: float,
+    y: float,
+    radius: float,
+) -> bool:
+    """Whether bottle i at (x, y) touches a rail surface."""
+    touched = False
+    if segments is not None:
+        for entry in range(near_segments.start[i], near_segments.start[i + 1]):
+            if segments.surface[near_segments.piece[entry]] == surface:
+                touched = touched or _segment_overlap(segments, near_segments, entry, x, y, radius) > 0.0
+    if arcs is not None:
+        for entry in range(near_arcs.start[i], near_arcs.start[i + 1]):
+            if arcs.surface[near_arcs.piece[entry]] == surface:
+                touched = touched or _arc_overlap(arcs, near_arcs, entry, x, y, radius) > 0.0
+    return touched
+
+
+@part
+def _add_contact(
+    settings: Settings,
+    bottles: Bottles,
+    spin: Any,
+    load: Load,
+    linear: Linear,
+    law: Any,
+    curves: Any,
+    found: RailContacts,
+    c: int,
+    i: int,
+    before: float,
+    ahead: float,
+    dt: float,
+    lean: float,
+    hold: bool,
+) -> None:
+    nx, ny = found.nx[c], found.ny[c]
+    closing, slip = bottles.vx[i] * nx + bottles.vy[i] * ny, bottles.vy[i] * nx - bottles.vx[i] * ny
+    closing_change = linear.change.x[i] * nx + linear.change.y[i] * ny
+    mobility = rim_mobility = bottles.inverse_mass[i]
+    arm = 0.0
+    if spin is not None:
+        arm = rail_arm(ahead, bottles.radius[i], settings.lever)
+        slip += spin.omega[i] * arm
+        rim_mobility += arm * arm * spin.inverse_inertia[i]
+    normal, tangential, along, across, normal_before = linear_contact(
+        law,
+        law_entry(settings, bottles, found, c, i),
+        curves,
+        settings.slip_limit,
+        settings.atan,
+        before,
+        ahead,
+        found.share[c],
+        closing,
+        closing + lean * closing_change,
+        slip,
+        mobility,
+        rim_mobility,
+        dt,
+        lean,
+        hold,
+    )
+    # The block, which holds this contact, will take that off again.
+    normal -= along * closing_change / dt
+    load.fx[i] += -normal * nx - tangential * ny
+    load.fy[i] += tangential * nx - normal * ny
+    if spin is not None:
+        spin.moment[i] += arm * tangential
+    _note_normal(load.normal_sum, load.normal_max, i, normal_before)
+    add_block(linear.own, i, along, across, nx, ny, arm)
+
+
+@part
+def _note_normal(sums: Any, largest: Any, i: int, normal: float) -> None:
+    if sums is not None:
+        sums[i] += normal
+        largest[i] = normal if normal > largest[i] else largest[i]

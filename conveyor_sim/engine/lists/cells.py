@@ -1,0 +1,35 @@
+"""Hashed cells: bottles sorted by the square cell they are in, so that neighbours are found in nine cells."""
+
+import math
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.lists import Neighbourhood
+from conveyor_sim.engine.compiler.compile import part
+
+
+@part
+def bucket_of(cx: int, cy: int, buckets: int) -> int:
+    """Bucket of a cell; different cells may share one, so a member's own cell must still be compared."""
+    return (cx * 73856093 ^ cy * 19349663) & (buckets - 1)
+
+
+@part
+def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
+    """Counting sort of the occupied slots by hashed cell."""
+    buckets = hood.bucket.size - 1
+    hood.bucket[:] = 0
+    for i in range(bottles.x.size):
+        if bottles.id[i] >= 0:
+            hood.cell[i, 0] = math.floor(bottles.x[i] / cell)
+            hood.cell[i, 1] = math.floor(bottles.y[i] / cell)
+            hood.bucket[bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)] += 1
+    total = 0
+    for b in range(buckets + 1):
+        total += hood.bucket[b]
+        hood.bucket[b] = total
+    # Backwards, so that each bucket ends up at its start and in the order of slots.
+    for i in range(bottles.x.size - 1, -1, -1):
+        if bottles.id[i] >= 0:
+            b = bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)
+            hood.bucket[b] -= 1
+            hood.order[hood.bucket[b]] = i

@@ -1,0 +1,149 @@
+"""Which rail pieces are near each bottle, within its radius and half the skin; made at each rebuild.
+
+Tangential springs at rails are kept by piece: a bottle that goes from one piece of a surface to the next, over a joint,
+starts a new spring there.
+"""
+
+import math
+from typing import Any
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.lists import Listed, Near
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.lists.static_grid import static_cell
+from conveyor_sim.engine.rails.moving import near_sweep
+from conveyor_sim.engine.threads.team import UNIT
+
+
+@part
+def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, margin: float) -> int:
+    """List the straight rail pieces within radius + margin of each bottle; return how many entries that takes."""
+    if segments is None:
+        return 0
+    _keep_springs(near, near.springs)
+    count = 0
+    for i in range(bottles.x.size):
+        near.start[i] = min(count, near.piece.size)
+        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        if home < 0:
+            continue
+        reach = bottles.radius[i] + margin
+        for entry in range(grid.segment_start[home], grid.segment_start[home + 1]):
+            g = grid.segment[entry]
+            dx = bottles.x[i] - segments.x[g]
+            dy = bottles.y[i] - segments.y[g]
+            along = dx * segments.tx[g] + dy * segments.ty[g]
+            along = min(max(along, 0.0), segments.length[g])
+            dx -= along * segments.tx[g]
+            dy -= along * segments.ty[g]
+            if dx * dx + dy * dy <= reach * reach:
+                if count < near.piece.size:
+                    near.piece[count] = g
+                count += 1
+    near.start[bottles.x.size] = min(count, near.piece.size)
+    if count <= near.piece.size:
+        _put_springs_back(near, near.springs)
+    return count
+
+
+@part
+def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: float) -> int:
+    """List the arcs within radius + margin of each bottle; return how many entries that takes."""
+    if arcs is None:
+        return 0
+    _keep_springs(near, near.springs)
+    count = 0
+    for i in range(bottles.x.size):
+        near.start[i] = min(count, near.piece.size)
+        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        if home < 0:
+            continue
+        reach = bottles.radius[i] + margin
+        for entry in range(grid.arc_start[home], grid.arc_start[home + 1]):
+            k = grid.arc[entry]
+            dx = bottles.x[i] - arcs.x[k]
+            dy = bottles.y[i] - arcs.y[k]
+            # The whole circle stands for the arc here: never too few candidates.
+            if abs(math.sqrt(dx * dx + dy * dy) - arcs.radius[k]) <= reach:
+                if count < near.piece.size:
+                    near.piece[count] = k
+                count += 1
+    near.start[bottles.x.size] = min(count, near.piece.size)
+    if count <= near.piece.size:
+        _put_springs_back(near, near.springs)
+    return count
+
+
+@part
+def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, moving: Any, railed: Any, margin: float) -> None:
+    """List the bottles that have any rail near, within radius + margin (m), by unit."""
+    if railed is None:
+        return
+    count = 0
+    for i in range(bottles.x.size):
+        if i % UNIT == 0:
+            railed.first[i // UNIT] = count
+        if _has_near(near_segments, i) or _has_near(near_arcs, i) or near_sweep(moving, bottles, i, margin):
+            railed.bottle[count] = i
+            count += 1
+    end_list(railed, bottles.x.size, count)
+
+
+@part
+def end_list(listed: Listed, bottles: int, count: int) -> None:
+    """Close a list by unit that holds `count` of all bottles."""
+    for unit in range((bottles + UNIT - 1) // UNIT, listed.first.size):
+        listed.first[unit] = count
+
+
+@part
+def _has_near(near: Any, i: int) -> bool:
+    if near is None:
+        return False
+    return near.start[i] < near.start[i + 1]
+
+
+@part
+def _keep_springs(near: Near, springs: Any) -> None:
+    """Copy the springs by bottle and piece, unless that was done and the list then turned out too short."""
+    if springs is None:
+        return
+    if springs.kept_count[0] >= 0:
+        return
+    kept = 0
+    for i in range(near.start.size - 1):
+        for entry in range(near.start[i], near.start[i + 1]):
+            if springs.elongation[entry] != 0.0:
+                springs.kept_bottle[kept] = i
+                springs.kept_piece[kept] = near.piece[entry]
+                springs.kept[kept] = springs.elongation[entry]
+                kept += 1
+    springs.kept_count[0] = kept
+
+
+@part
+def _put_springs_back(near: Near, springs: Any) -> None:
+    """Give entries that are still listed their springs; both lists are by bottle."""
+    if springs is None:
+        return
+    k, kept = 0, springs.kept_count[0]
+    for i in range(near.start.size - 1):
+        while k < kept and springs.kept_bottle[k] < i:
+            k += 1
+        for entry in range(near.start[i], near.start[i + 1]):
+            springs.elongation[entry] = 0.0
+            same = k
+            while same < kept and springs.kept_bottle[same] == i:
+                if springs.kept_piece[same] == near.piece[entry]:
+                    springs.elongation[entry] = springs.kept[same]
+                same += 1
+    springs.kept_count[0] = -1
+
+
+@kernel
+def drop_near_springs(near: Any, springs: Any, slot: int) -> None:
+    """Forget the springs of a bottle that is taken away."""
+    if springs is None:
+        return
+    for entry in range(near.start[slot], near.start[slot + 1]):
+        springs.elongation[entry] = 0.0

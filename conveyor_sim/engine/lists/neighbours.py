@@ -1,0 +1,131 @@
+"""The Verlet list of bottle pairs: who may touch whom, valid until a bottle has moved by half the skin.
+
+Sorted by slot, so that sums over it, and hence the bits of a run, do not depend on when it was made.
+"""
+
+from typing import Any
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
+from conveyor_sim.engine.arrays.lists import Neighbourhood
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
+
+
+@part
+def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell: float, skin: float) -> int:
+    """Fill the pair list, sorted by (i, j), i < j; return the number of pairs, which may exceed its capacity.
+
+    law: by type. What is by pair (coefficients, radii, tangential springs) is filled or carried over too.
+    """
+    if pairs is None:
+        return 0
+    _keep_springs(pairs, pairs.spring)
+    sort_into_cells(bottles, hood, cell)
+    buckets = hood.bucket.size - 1
+    capacity = pairs.i.size
+    count = 0
+    for i in range(bottles.x.size):
+        if bottles.id[i] < 0:
+            continue
+        first = count
+        for cx in range(hood.cell[i, 0] - 1, hood.cell[i, 0] + 2):
+            for cy in range(hood.cell[i, 1] - 1, hood.cell[i, 1] + 2):
+                b = bucket_of(cx, cy, buckets)
+                for entry in range(hood.bucket[b], hood.bucket[b + 1]):
+                    j = hood.order[entry]
+                    if j <= i or hood.cell[j, 0] != cx or hood.cell[j, 1] != cy:
+                        continue
+                    dx = bottles.x[j] - bottles.x[i]
+                    dy = bottles.y[j] - bottles.y[i]
+                    reach = bottles.radius[i] + bottles.radius[j] + skin
+                    if dx * dx + dy * dy < reach * reach:
+                        if count < capacity:
+                            k = count
+                            while k > first and pairs.j[k - 1] > j:
+                                pairs.j[k] = pairs.j[k - 1]
+                                k -= 1
+                            pairs.j[k] = j
+                            pairs.i[count] = i
+                        count += 1
+    pairs.used[0] = min(count, capacity)
+    _fill_laws(pairs, pairs.law, law, bottles)
+    _fill_radii(pairs, pairs.reach, bottles)
+    if count <= capacity:
+        _put_springs_back(pairs, pairs.spring)
+    return count
+
+
+@part
+def _fill_laws(pairs: Pairs, columns: ContactLaw, tables: ContactLaw, bottles: Bottles) -> None:
+    _fill(columns.stiffness, tables.stiffness, pairs, bottles)
+    _fill(columns.hertz, tables.hertz, pairs, bottles)
+    _fill(columns.curve, tables.curve, pairs, bottles)
+    _fill(columns.damping_paper, tables.damping_paper, pairs, bottles)
+    _fill(columns.damping_normal, tables.damping_normal, pairs, bottles)
+    _fill(columns.damping_tsuji, tables.damping_tsuji, pairs, bottles)
+    _fill(columns.damping_onset, tables.damping_onset, pairs, bottles)
+    _fill(columns.friction, tables.friction, pairs, bottles)
+    _fill(columns.tangential_stiffness, tables.tangential_stiffness, pairs, bottles)
+    _fill(columns.tangential_mindlin, tables.tangential_mindlin, pairs, bottles)
+    _fill(columns.tangential_damping, tables.tangential_damping, pairs, bottles)
+
+
+@part
+def _fill(column: Any, table: Any, pairs: Pairs, bottles: Bottles) -> None:
+    if column is None:
+        return
+    types = round(table.size**0.5)
+    for p in range(pairs.used[0]):
+        column[p] = table[bottles.type[pairs.i[p]] * types + bottles.type[pairs.j[p]]]
+
+
+@part
+def _fill_radii(pairs: Pairs, reach: Any, bottles: Bottles) -> None:
+    if reach is None:
+        return
+    for p in range(pairs.used[0]):
+        pairs.radius_i[p] = bottles.radius[pairs.i[p]]  # type: ignore[index]
+        reach[p] = bottles.radius[pairs.i[p]] + bottles.radius[pairs.j[p]]
+
+
+@part
+def _keep_springs(pairs: Pairs, springs: Any) -> None:
+    """Copy the springs by pair, unless that was done and the list then turned out too short."""
+    if springs is None:
+        return
+    if springs.kept_count[0] >= 0:
+        return
+    kept = 0
+    for p in range(pairs.used[0]):
+        if springs.elongation[p] != 0.0:
+            springs.kept_i[kept] = pairs.i[p]
+            springs.kept_j[kept] = pairs.j[p]
+            springs.kept[kept] = springs.elongation[p]
+            kept += 1
+    springs.kept_count[0] = kept
+
+
+@part
+def _put_springs_back(pairs: Pairs, springs: Any) -> None:
+    """Give pairs that are still listed their springs; both lists are sorted by (i, j)."""
+    if springs is None:
+        return
+    k, kept = 0, springs.kept_count[0]
+    for p in range(pairs.used[0]):
+        i, j = pairs.i[p], pairs.j[p]
+        while k < kept and (springs.kept_i[k] < i or (springs.kept_i[k] == i and springs.kept_j[k] < j)):
+            k += 1
+        found = k < kept and springs.kept_i[k] == i and springs.kept_j[k] == j
+        springs.elongation[p] = springs.kept[k] if found else 0.0
+    springs.kept_count[0] = -1
+
+
+@kernel
+def drop_springs(pairs: Any, springs: Any, slot: int) -> None:
+    """Forget the springs of a bottle that is taken away: its slot may be another's before the next rebuild."""
+    if springs is None:
+        return
+    for p in range(pairs.used[0]):
+        if pairs.i[p] == slot or pairs.j[p] == slot:
+            springs.elongation[p] = 0.0

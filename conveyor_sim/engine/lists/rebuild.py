@@ -1,0 +1,82 @@
+"""Neighbour lists with a skin: made anew once a bottle has moved by half of it, all at the same time.
+
+When that is follows from the state alone, never from how a run is divided into calls.
+"""
+
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.lists import Neighbourhood
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.compile import copy, kernel, part
+from conveyor_sim.engine.contact.slots import fill_slots
+from conveyor_sim.engine.lists.near import list_near_arcs, list_near_segments, list_railed
+from conveyor_sim.engine.lists.neighbours import list_pairs
+from conveyor_sim.engine.support.belts import list_belts
+from conveyor_sim.engine.support.footing import refresh_footing
+
+
+@kernel
+def rebuild(world: World) -> tuple[int, int, int, int, int]:
+    """Make all lists anew; return the entries that pairs, slots, segments, arcs and belts need.
+
+    Where that is more than a list holds, the lists are incomplete and `neighbourhood.stale` is set: grow, call again.
+    """
+    bottles, hood = world.bottles, world.neighbourhood
+    skin = world.settings.skin
+    pairs = list_pairs(bottles, hood, world.pairs, world.pair_law, world.settings.cell, skin)
+    more = fill_slots(world.pairs, world.slots)
+    segments = list_near_segments(bottles, world.grid, world.segments, world.near_segments, 0.5 * skin)
+    arcs = list_near_arcs(bottles, world.grid, world.arcs, world.near_arcs, 0.5 * skin)
+    list_railed(bottles, world.near_segments, world.near_arcs, world.moving, world.railed, 0.5 * skin)
+    belts = list_belts(bottles, world.grid, world.belts, world.ring, _floor(world.surface), 0.5 * skin)
+    copy(bottles.x, hood.x)
+    copy(bottles.y, hood.y)
+    fits = _fits_pairs(pairs, more, world.pairs, world.slots) and _fits_near(segments, world.near_segments)
+    fits = fits and _fits_near(arcs, world.near_arcs) and _fits_belts(belts, world.belts)
+    hood.stale[0] = 0 if fits else 1
+    if fits:
+        refresh_footing(bottles, world.belts, world.surface, world.footing, world.ring)
+    return pairs, more, segments, arcs, belts
+
+
+@part
+def _floor(surface: Any) -> int:
+    if surface is None:
+        return 0
+    return surface.ux.size - 1
+
+
+@part
+def _fits_pairs(needed: int, more: int, pairs: Any, slots: Any) -> bool:
+    if pairs is None:
+        return True
+    return needed <= pairs.i.size and more <= slots.more_entry.size
+
+
+@part
+def _fits_near(needed: int, near: Any) -> bool:
+    if near is None:
+        return True
+    return needed <= near.piece.size
+
+
+@part
+def _fits_belts(needed: int, belts: Any) -> bool:
+    if belts is None:
+        return True
+    return needed <= belts.candidate.size
+
+
+@kernel
+def moved_too_far(bottles: Bottles, hood: Neighbourhood, skin: float, first: int, end: int) -> bool:
+    """Whether some bottle of first to end has moved by more than half the skin since the last rebuild."""
+    limit = 0.25 * skin * skin
+    far = 0
+    for i in range(uint64(first), uint64(end)):
+        dx = bottles.x[i] - hood.x[i]
+        dy = bottles.y[i] - hood.y[i]
+        far |= dx * dx + dy * dy > limit
+    return far != 0

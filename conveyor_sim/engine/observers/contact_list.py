@@ -1,0 +1,163 @@
+"""All closed contacts as columns, by the same functions that make the forces; read-only."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.contact import contact_force
+from conveyor_sim.engine.contact.pairs import elongation, normal_and_overlap
+from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
+
+BOTTLE_BOTTLE, BOTTLE_RAIL = 0, 1
+
+
+@kernel
+def list_contacts(world: World, found: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
+    """Write the contacts of the present state; return how many there are, which may exceed the columns' length.
+
+    found: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m),
+    N, T (N). The neighbour lists must hold. Friction that is solved implicitly is told as the explicit law has it.
+    """
+    count = _pair_contacts(world.settings, world.bottles, world.spin, world.pairs, world.curves, kind, a, b, values)
+    return _rail_contacts(world, world.bottles, world.spin, world.rail_law, found, kind, a, b, values, count)
+
+
+@part
+def _pair_contacts(
+    settings: Any, bottles: Any, spin: Any, pairs: Any, curves: Any, kind: NDArray[np.uint8], a: I8, b: I8, values: F8
+) -> int:
+    if pairs is None:
+        return 0
+    count = 0
+    for p in range(pairs.used[0]):
+        i, j = pairs.i[p], pairs.j[p]
+        reach = bottles.radius[i] + bottles.radius[j]
+        overlap, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
+        if overlap > 0.0:
+            if count < kind.size:
+                normal, tangential, _ = pair_contact(
+                    settings, bottles, spin, pairs, pairs.spring, curves, p, overlap, nx, ny
+                )
+                kind[count] = BOTTLE_BOTTLE
+                a[count] = i
+                b[count] = j
+                arm = bottles.radius[i] - 0.5 * overlap
+                _write(values, count, bottles.x[i], bottles.y[i], arm, nx, ny, overlap, normal, tangential)
+            count += 1
+    return count
+
+
+@part
+def pair_contact(
+    settings: Any,
+    bottles: Any,
+    spin: Any,
+    pairs: Any,
+    springs: Any,
+    curves: Any,
+    p: int,
+    overlap: float,
+    nx: float,
+    ny: float,
+) -> tuple[float, float, float]:
+    """N and T (N) on the first bottle of pair p, and its slip (m/s); the normal is that from the first to the other."""
+    i, j = pairs.i[p], pairs.j[p]
+    vx = bottles.vx[i] - bottles.vx[j]
+    vy = bottles.vy[i] - bottles.vy[j]
+    slip = -vx * ny + vy * nx
+    if spin is not None:
+        shorter = 0.5 * settings.lever * overlap
+        slip += spin.omega[i] * (bottles.radius[i] - shorter) + spin.omega[j] * (bottles.radius[j] - shorter)
+    closing = vx * nx + vy * ny
+    limit, atan = settings.slip_limit, settings.atan
+    spring = elongation(springs, p)
+    normal, tangential = contact_force(pairs.law, p, curves, limit, atan, overlap, 1.0, closing, slip, spring, None)
+    return normal, tangential, slip
+
+
+@part
+def _rail_contacts(
+    world: World,
+    bottles: Any,
+    spin: Any,
+    law: Any,
+    found: Any,
+    kind: NDArray[np.uint8],
+    a: I8,
+    b: I8,
+    values: F8,
+    count: int,
+) -> int:
+    if law is None:
+        return count
+    for i in range(bottles.x.size):
+        here = find_rail_contacts(
+            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
+        )
+        for c in range(here):
+            if found.share[c] > 0.0:
+                if count < kind.size:
+                    spring = rail_elongation(
+                        law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, i, found.entry[c]
+                    )
+                    normal, tangential, _, _ = rail_contact(
+                        c,
+                        i,
+                        world.settings,
+                        world.settings.atan,
+                        bottles,
+                        spin,
+                        world.moving,
+                        found,
+                        law,
+                        world.curves,
+                        spring,
+                        0.0,
+                        None,
+                    )
+                    nx, ny, overlap = found.nx[c], found.ny[c], found.overlap[c]
+                    kind[count] = BOTTLE_RAIL
+                    a[count] = i
+                    b[count] = found.rail[c]
+                    arm = bottles.radius[i] - overlap
+                    _write(values, count, bottles.x[i], bottles.y[i], arm, nx, ny, overlap, normal, tangential)
+                count += 1
+    return count
+
+
+@part
+def _write(
+    values: F8,
+    c: int,
+    x: float,
+    y: float,
+    arm: float,
+    nx: float,
+    ny: float,
+    overlap: float,
+    normal: float,
+    tangential: float,
+) -> None:
+    values[0, c] = x + arm * nx
+    values[1, c] = y + arm * ny
+    values[2, c] = nx
+    values[3, c] = ny
+    values[4, c] = overlap
+    values[5, c] = normal
+    values[6, c] = tangential
+
+
+def closed_contacts(world: World, found: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
+    """Every closed contact of the present state as `list_contacts` has it: kind (C,), ends (2, C), values (7, C)."""
+    room = 64
+    while True:
+        kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
+        count = list_contacts(world, found, kind, ends[0], ends[1], values)
+        if count <= room:
+            return kind[:count], ends[:, :count], values[:, :count]
+        room = count

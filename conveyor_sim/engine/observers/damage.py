@@ -1,0 +1,348 @@
+"""What bottles and rails bear in every step: scuffing, crushing, impacts, tipping (physics.md). Changes no force.
+
+A look at the state between two steps: each bottle lists its closed contacts, with the forces that the laws exert
+there, and adds up its own; what it shares with another both add up. So no bottle writes to what is another's, no sum
+runs over bottles of several threads, and it is the same for every integrator. Nothing is noted within a step.
+
+Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a rail
+that moves.
+"""
+
+import math
+from typing import Any
+
+from conveyor_sim.engine.arrays.bodies import Bottles, Load, Spin
+from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, Borne, RailBins, Worst
+from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.pairs import normal_and_overlap
+from conveyor_sim.engine.contact.slots import WIDTH
+from conveyor_sim.engine.observers.contact_list import pair_contact
+from conveyor_sim.engine.rails.moving import moves, surface_velocity
+from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
+from conveyor_sim.engine.support.base import add_base_friction
+from conveyor_sim.engine.support.footing import check_footing
+from conveyor_sim.engine.support.static_friction import add_static_friction
+from conveyor_sim.engine.threads.team import BLOCK, UNIT, share, wait_for_all
+
+
+@part
+def note_damage(world: World, member: Member, dt: float) -> None:
+    """Note what all bottles bear in the present state, for a step of dt seconds; lists hold and bottles are in place.
+
+    Every member calls it; on return all have read what they need.
+    """
+    _note(world, world.damage, member, dt)
+
+
+@part
+def _note(world: World, damage: Any, member: Member, dt: float) -> None:
+    if damage is None:
+        return
+    # Velocity Verlet has just given bottles their velocities, each member those of its own.
+    wait_for_all(member)
+    begin, stop = share(member, world.bottles.x.size)
+    for first in range(begin, stop, BLOCK):
+        end = min(first + BLOCK, stop)
+        _find_base(world, world.bottles, world.spin, damage.tipping, dt, first, end)
+        for i in range(first, end):
+            if world.bottles.id[i] >= 0:
+                count = _list_pairs(i, world, world.pairs, world.slots, damage.impacts, member.borne)
+                count = _list_rails(i, world, world.rail_law, damage, member, count)
+                _scuff(i, damage.scuffing, member.borne, count, dt)
+                _crush(i, damage.crushing, member.borne, count)
+                _hit(i, damage.impacts, member.borne, count)
+                _tip(i, world.bottles, damage.tipping, member.borne, count, dt)
+    wait_for_all(member)
+    _keep_velocities(world.bottles, damage.impacts, begin, stop)
+
+
+@part
+def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, borne: Borne) -> int:
+    """Write the closed contacts of bottle i with others to `borne`; return how many."""
+    if pairs is None:
+        return 0
+    count = 0
+    for place in range(int(slots.filled[i])):
+        # In one loop, or all of the law would be compiled twice.
+        further = int(slots.more_start[i]) + place - WIDTH
+        entry = slots.entry[i * WIDTH + place] if place < WIDTH else slots.more_entry[further]
+        count = _list_pair(i, int(entry), world, pairs, impacts, borne, count)
+    return count
+
+
+@part
+def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne: Borne, count: int) -> int:
+    bottles = world.bottles
+    p = entry if entry < pairs.i.size else entry - pairs.i.size
+    j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
+    reach = bottles.radius[i] + bottles.radius[j]
+    dx, dy = bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i]
+    if dx * dx + dy * dy >= reach * reach or count == MOST_BORNE:
+        return count
+    overlap, nx, ny = normal_and_overlap(dx, dy, reach)
+    # The law is that of i and j in the order of the pair.
+    sign = 1.0 if entry < pairs.i.size else -1.0
+    normal, tangential, slip = pair_contact(
+        world.settings, bottles, world.spin, pairs, pairs.spring, world.curves, p, overlap, sign * nx, sign * ny
+    )
+    approach = _approach(impacts, i, nx, ny) - _approach(impacts, j, nx, ny)
+    _write(borne, count, nx, ny, normal, tangential, slip, approach, bottles.id[j] + 1, -1)
+    return count + 1
+
+
+@part
+def _list_rails(i: int, world: World, law: Any, damage: Any, member: Member, count: int) -> int:
+    if law is None:
+        return count
+    bottles, found = world.bottles, member.found
+    here = find_rail_contacts(
+        i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
+    )
+    for c in range(here):
+        # What pushes through another piece of its surface counts there.
+        if found.share[c] > 0.0 and count < MOST_BORNE:
+            entry = found.entry[c]
+            spring = rail_elongation(
+                law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, i, entry
+            )
+            normal, tangential, slip, _ = rail_contact(
+                c,
+                i,
+                world.settings,
+                world.settings.atan,
+                bottles,
+                world.spin,
+                world.moving,
+                found,
+                law,
+                world.curves,
+                spring,
+                0.0,
+                None,
+            )
+            nx, ny = found.nx[c], found.ny[c]
+            arm = bottles.radius[i] - found.overlap[c]
+            x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
+            if moves(world.moving, entry):
+                # Work on a rail that moves belongs to no place of the line.
+                key, place = -entry, -1
+            else:
+                key = _rail_key(world.near_segments, world.near_arcs, entry)
+                place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
+            ux, uy = surface_velocity(world.moving, found, c, bottles, i)
+            approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
+            _write(member.borne, count, nx, ny, normal, tangential, slip, approach, key, place)
+            count += 1
+    return count
+
+
+@part
+def _write(
+    borne: Borne,
+    c: int,
+    nx: float,
+    ny: float,
+    normal: float,
+    tangential: float,
+    slip: float,
+    approach: float,
+    key: int,
+    place: int,
+) -> None:
+    borne.nx[c] = nx
+    borne.ny[c] = ny
+    # Paper damping may pull at the end of a rebound.
+    borne.normal[c] = normal if normal > 0.0 else 0.0
+    borne.tangential[c] = tangential
+    borne.slip[c] = slip
+    borne.approach[c] = approach
+    borne.key[c] = key
+    borne.place[c] = place
+
+
+@part
+def _approach(impacts: Any, i: int, nx: float, ny: float) -> float:
+    """Speed of bottle i along a normal at the last look, m/s."""
+    if impacts is None:
+        return 0.0
+    return impacts.vx[i] * nx + impacts.vy[i] * ny
+
+
+@part
+def _rail_key(near_segments: Any, near_arcs: Any, entry: int) -> int:
+    if entry >= 0:
+        return -1 - 2 * _piece(near_segments, entry)
+    return -2 - 2 * _piece(near_arcs, -1 - entry)
+
+
+@part
+def _piece(near: Any, entry: int) -> int:
+    if near is None:
+        return 0
+    return int(near.piece[entry])
+
+
+@part
+def _bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
+    """Bin of the rail piece of a key at a point (m); -1 where nobody asks."""
+    if scuffing is None:
+        return -1
+    if key % 2 != 0:
+        return _segment_bin(scuffing.bins, segments, (-1 - key) // 2, x, y)
+    return _arc_bin(scuffing.bins, arcs, (-2 - key) // 2, x, y)
+
+
+@part
+def _segment_bin(bins: RailBins, segments: Any, g: int, x: float, y: float) -> int:
+    if segments is None:
+        return -1
+    along = (x - segments.x[g]) * segments.tx[g] + (y - segments.y[g]) * segments.ty[g]
+    return _bin_at(int(bins.segment_first[g]), int(bins.segment_first[g + 1]), along / segments.length[g])
+
+
+@part
+def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
+    if arcs is None:
+        return -1
+    dx, dy = x - arcs.x[k], y - arcs.y[k]
+    start_x, start_y = arcs.start_x[k], arcs.start_y[k]
+    angle = math.atan2(start_x * dy - start_y * dx, start_x * dx + start_y * dy)
+    # From half the gap before the start on.
+    span = bins.arc_span[k]
+    if angle < 0.5 * span - math.pi:
+        angle += 2.0 * math.pi
+    return _bin_at(int(bins.arc_first[k]), int(bins.arc_first[k + 1]), angle / span)
+
+
+@part
+def _bin_at(first: int, end: int, way: float) -> int:
+    """Which of the bins first to end lies at a share of the way along them."""
+    return first + min(max(math.floor(way * (end - first)), 0), end - first - 1)
+
+
+@part
+def _scuff(i: int, scuffing: Any, borne: Borne, count: int, dt: float) -> None:
+    """Add |T s| dt to the bottle, and to the rail where it slides."""
+    if scuffing is None:
+        return
+    for c in range(count):
+        work = dt * abs(borne.tangential[c] * borne.slip[c])
+        scuffing.work[i] += work
+        _wear(scuffing.bins, i // UNIT, borne.place[c], work, dt * borne.normal[c])
+
+
+@part
+def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None:
+    if bins is None:
+        return
+    if place >= 0:
+        bins.work[unit, place] += work
+        bins.impulse[unit, place] += impulse
+
+
+@part
+def _crush(i: int, crushing: Any, borne: Borne, count: int) -> None:
+    """Note the sum of normal forces, and the largest min(N_a, N_b) |cos| of two that oppose each other."""
+    if crushing is None:
+        return
+    total = opposed = 0.0
+    for a in range(count):
+        total += borne.normal[a]
+        for b in range(a):
+            cosine = borne.nx[a] * borne.nx[b] + borne.ny[a] * borne.ny[b]
+            opposed = max(opposed, -cosine * min(borne.normal[a], borne.normal[b]))
+    _raise(crushing.total, i, total)
+    _raise(crushing.opposed, i, opposed)
+
+
+@part
+def _hit(i: int, impacts: Any, borne: Borne, count: int) -> None:
+    """Note the largest force of one contact, and the speed at which those closed that were open at the last look."""
+    if impacts is None:
+        return
+    before = 0
+    while before < MOST_TOUCHES and impacts.touching[i, before] != 0:
+        impacts.touched[i, before] = impacts.touching[i, before]
+        before += 1
+    for c in range(count):
+        _raise(impacts.force, i, borne.normal[c])
+        known = before == MOST_TOUCHES
+        for place in range(before):
+            known = known or impacts.touched[i, place] == borne.key[c]
+        if not known:
+            _raise(impacts.speed, i, borne.approach[c])
+        if c < MOST_TOUCHES:
+            impacts.touching[i, c] = borne.key[c]
+    if count < MOST_TOUCHES:
+        impacts.touching[i, count] = 0
+
+
+@part
+def _raise(worst: Worst, i: int, value: float) -> None:
+    if value > worst.tick[i]:
+        worst.tick[i] = value
+
+
+@part
+def _keep_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> None:
+    if impacts is None:
+        return
+    for i in range(begin, stop):
+        impacts.vx[i] = bottles.vx[i]
+        impacts.vy[i] = bottles.vy[i]
+
+
+@part
+def _find_base(world: World, bottles: Bottles, spin: Any, tipping: Any, dt: float, first: int, end: int) -> None:
+    """Find the friction under bottles first to end, N."""
+    if tipping is None:
+        return
+    for i in range(first, end):
+        tipping.fx[i] = tipping.fy[i] = tipping.moment[i] = 0.0
+    load = Load(tipping.fx, tipping.fy, None, None)
+    check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
+    add_base_friction(
+        world.settings,
+        bottles,
+        _apart(spin, tipping.moment),
+        load,
+        world.belts,
+        world.surface,
+        world.footing,
+        world.ring,
+        None,
+        None,
+        dt,
+        first,
+        end,
+    )
+    lag = world.settings.lag * dt
+    add_static_friction(bottles, load, world.footing, world.static_friction, lag, False, first, end)
+
+
+@part
+def _apart(spin: Any, moment: Any) -> Any:
+    """The spins, with another place for moments."""
+    if spin is None:
+        return None
+    return Spin(spin.theta, spin.omega, spin.inverse_inertia, moment)
+
+
+@part
+def _tip(i: int, bottles: Bottles, tipping: Any, borne: Borne, count: int, dt: float) -> None:
+    """Note |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed: a blow is over before a bottle can tip."""
+    if tipping is None:
+        return
+    if bottles.weight[i] <= 0.0:
+        return
+    kind = bottles.type[i]
+    fx = fy = 0.0
+    for c in range(count):
+        fx -= borne.normal[c] * borne.nx[c] + borne.tangential[c] * borne.ny[c]
+        fy += borne.tangential[c] * borne.nx[c] - borne.normal[c] * borne.ny[c]
+    along, under = tipping.contact_lever[kind] / bottles.weight[i], tipping.base_lever[kind] / bottles.weight[i]
+    weight = dt / (dt + tipping.delay[kind])
+    tipping.mean_x[i] += weight * (along * fx - under * tipping.fx[i] - tipping.mean_x[i])
+    tipping.mean_y[i] += weight * (along * fy - under * tipping.fy[i] - tipping.mean_y[i])
+    _raise(tipping.ratio, i, math.sqrt(tipping.mean_x[i] ** 2 + tipping.mean_y[i] ** 2))

@@ -1,0 +1,204 @@
+"""Parts of the forces for the energy ledger (`ledger.py`): what dissipates, and what belts do, in an evaluation.
+
+Beside the sum of forces on a bottle stay those of the damping in its contacts, of the friction in them, and of what it
+stands on. Damping is all along the normal that the elastic law does not exert, and the paper's drag across it; friction
+is the rest across, tangential springs and the dashpots beside them included. Nothing here changes a force.
+"""
+
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.integrators import Triple
+from conveyor_sim.engine.arrays.observers import Ledger
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.world import Member, Settings
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.contact import drag_force, elastic_force
+from conveyor_sim.engine.contact.pairs import normal_and_overlap
+from conveyor_sim.engine.contact.slots import sum_slots
+from conveyor_sim.engine.rails.moving import add_rail_power
+from conveyor_sim.engine.threads.team import UNIT, share, units
+
+
+@part
+def find_pair_parts(
+    settings: Settings, bottles: Bottles, spin: Any, pairs: Any, ledger: Any, curves: Any, member: Member
+) -> None:
+    """Take the forces just found for this member's share of the pairs apart, into `pairs.parts`."""
+    if ledger is None:
+        return
+    if pairs is None:
+        return
+    begin, stop = share(member, pairs.used[0])
+    for p in range(uint64(begin), uint64(stop)):
+        i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
+        reach = bottles.radius[i] + bottles.radius[j]
+        dx, dy = bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i]
+        nx = ny = along = drag = across = arm_i = arm_j = 0.0
+        if dx * dx + dy * dy < reach * reach:
+            overlap, nx, ny = normal_and_overlap(dx, dy, reach)
+            vx, vy = bottles.vx[i] - bottles.vx[j], bottles.vy[i] - bottles.vy[j]
+            slip = vy * nx - vx * ny
+            if spin is not None:
+                shorter = 0.5 * settings.lever * overlap
+                arm_i, arm_j = bottles.radius[i] - shorter, bottles.radius[j] - shorter
+                slip += spin.omega[i] * arm_i + spin.omega[j] * arm_j
+            drag = drag_force(pairs.law, p, overlap, -slip)
+            along = -(pairs.fx[p] * nx + pairs.fy[p] * ny) - _elastic(pairs.law, p, curves, overlap)
+            across = pairs.fy[p] * nx - pairs.fx[p] * ny - drag
+        _write(pairs.parts.damping, p, uint64(pairs.i.size), along, drag, nx, ny, arm_i, arm_j)
+        _write(pairs.parts.friction, p, uint64(pairs.i.size), 0.0, across, nx, ny, arm_i, arm_j)
+
+
+@part
+def _elastic(law: ContactLaw, e: int, curves: Any, overlap: float) -> float:
+    return elastic_force(law.stiffness, law.hertz, law.curve, curves, e, overlap)
+
+
+@part
+def _write(
+    force: Triple,
+    p: int,
+    pairs: int,
+    normal: float,
+    tangential: float,
+    nx: float,
+    ny: float,
+    arm_i: float,
+    arm_j: float,
+) -> None:
+    q = p + pairs
+    fx, fy = -normal * nx - tangential * ny, tangential * nx - normal * ny
+    force.x[p] = fx
+    force.y[p] = fy
+    force.x[q] = -fx
+    force.y[q] = -fy
+    force.turn[p] = arm_i * tangential
+    force.turn[q] = arm_j * tangential
+
+
+@part
+def sum_pair_parts(pairs: Any, slots: Any, ledger: Any, first: int, end: int) -> None:
+    """Set the parts of bottles first to end to what their pairs exert."""
+    if ledger is None:
+        return
+    if pairs is None:
+        _clear(ledger.damping, first, end)
+        _clear(ledger.friction, first, end)
+        return
+    _sum(slots, pairs.parts.damping, ledger.damping, first, end)
+    _sum(slots, pairs.parts.friction, ledger.friction, first, end)
+
+
+@part
+def _clear(force: Triple, first: int, end: int) -> None:
+    for i in range(first, end):
+        force.x[i] = force.y[i] = force.turn[i] = 0.0
+
+
+@part
+def _sum(slots: Any, by_pair: Triple, force: Triple, first: int, end: int) -> None:
+    sum_slots(slots, by_pair.x, first, end, force.x)
+    sum_slots(slots, by_pair.y, first, end, force.y)
+    sum_slots(slots, by_pair.turn, first, end, force.turn)
+
+
+@part
+def add_rail_parts(
+    ledger: Ledger,
+    law: ContactLaw,
+    curves: Any,
+    e: int,
+    moving: Any,
+    found: RailContacts,
+    c: int,
+    bottles: Bottles,
+    i: int,
+    arm: float,
+    normal: float,
+    tangential: float,
+    slip: float,
+) -> None:
+    """Take N and T (N) of contact c of bottle i with a rail apart; arm in m, slip in m/s."""
+    nx, ny, overlap, shared = found.nx[c], found.ny[c], found.overlap[c], found.share[c]
+    drag = shared * drag_force(law, e, overlap, -slip)
+    along = normal - shared * _elastic(law, e, curves, overlap)
+    across = tangential - drag
+    damping, friction = ledger.damping, ledger.friction
+    damping.x[i] += -along * nx - drag * ny
+    damping.y[i] += drag * nx - along * ny
+    damping.turn[i] += arm * drag
+    friction.x[i] -= across * ny
+    friction.y[i] += across * nx
+    friction.turn[i] += arm * across
+    add_rail_power(ledger, moving, found, c, bottles, i, normal, tangential, along, drag, across)
+
+
+@part
+def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
+    """Keep what the contacts exert on bottles first to end, and clear what belts do: before base friction is added."""
+    if ledger is None:
+        return
+    begin, stop = units(first, end)
+    for unit in range(begin, stop):
+        for h in range(ledger.belt_power.shape[1]):
+            ledger.belt_power[unit, h] = 0.0
+    for i in range(uint64(first), uint64(end)):
+        ledger.base.x[i] = load.fx[i]
+        ledger.base.y[i] = load.fy[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            ledger.base.turn[i] = spin.moment[i]
+
+
+@part
+def find_base_parts(
+    bottles: Bottles,
+    spin: Any,
+    load: Load,
+    belts: Any,
+    footing: Any,
+    ring: Any,
+    ledger: Any,
+    first: int,
+    end: int,
+) -> None:
+    """Find what base friction has added to the load of bottles first to end, and the power of each belt."""
+    if ledger is None:
+        return
+    base = ledger.base
+    for i in range(uint64(first), uint64(end)):
+        base.x[i] = load.fx[i] - base.x[i]
+        base.y[i] = load.fy[i] - base.y[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            base.turn[i] = spin.moment[i] - base.turn[i]
+    if footing is not None:
+        for i in range(uint64(first), uint64(end)):
+            # A ring that may straddle belts was booked point by point.
+            if not _by_points(belts, ring, i):
+                power = _belt_power(bottles, footing, footing.turn, base, i)
+                ledger.belt_power[i // uint64(UNIT), footing.carrier[i]] += power
+
+
+@part
+def _by_points(belts: Any, ring: Any, i: int) -> bool:
+    if ring is None:
+        return False
+    if belts is None:
+        return False
+    return belts.certain[i] < 0 and ring.radius[i] > 0.0
+
+
+@part
+def _belt_power(bottles: Bottles, footing: Any, turn: Any, base: Triple, i: int) -> float:
+    """F u + M Omega (W): a belt's velocity field is that of a rigid body, so u at the axis and its turn are enough."""
+    ux, uy, moment = footing.ux[i], footing.uy[i], 0.0
+    if turn is not None:
+        ux -= turn[i] * bottles.y[i]
+        uy += turn[i] * bottles.x[i]
+        moment = base.turn[i] * turn[i]
+    return base.x[i] * ux + base.y[i] * uy + moment

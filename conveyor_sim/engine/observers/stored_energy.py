@@ -1,0 +1,73 @@
+"""The energy that a state holds: kinetic, in contacts, in tangential springs, in springs under the bottles."""
+
+from typing import Any
+
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.contact import elastic_energy, spring_energy
+from conveyor_sim.engine.contact.pairs import elongation, normal_and_overlap
+from conveyor_sim.engine.rails.rails import find_rail_contacts, law_entry, rail_elongation
+from conveyor_sim.engine.support.static_friction import anchor_energy
+
+KINETIC, ELASTIC, SPRINGS, BASE_SPRINGS = 0, 1, 2, 3
+
+
+@kernel
+def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
+    """Write the energy (J) of all bottles to energy, (4,). found: scratch. The neighbour lists must hold.
+
+    Pieces of a rail's surface that push together hold their share of a contact's: with a linear law that is exactly
+    what they give back.
+    """
+    energy[:] = 0.0
+    _kinetic(world.bottles, world.spin, energy)
+    _in_pairs(world.bottles, world.pairs, world.curves, energy)
+    _at_rails(world, world.rail_law, found, energy)
+    anchor_energy(world.bottles, world.static_friction, energy, BASE_SPRINGS)
+
+
+@part
+def _kinetic(bottles: Any, spin: Any, energy: F8) -> None:
+    for i in range(bottles.x.size):
+        if bottles.inverse_mass[i] > 0.0:
+            vx, vy = bottles.vx[i], bottles.vy[i]
+            energy[KINETIC] += 0.5 * (vx * vx + vy * vy) / bottles.inverse_mass[i]
+    if spin is not None:
+        for i in range(bottles.x.size):
+            if spin.inverse_inertia[i] > 0.0:
+                energy[KINETIC] += 0.5 * spin.omega[i] * spin.omega[i] / spin.inverse_inertia[i]
+
+
+@part
+def _in_pairs(bottles: Any, pairs: Any, curves: Any, energy: F8) -> None:
+    if pairs is None:
+        return
+    for p in range(pairs.used[0]):
+        i, j = pairs.i[p], pairs.j[p]
+        reach = bottles.radius[i] + bottles.radius[j]
+        overlap, _, _ = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
+        if overlap > 0.0:
+            energy[ELASTIC] += _elastic(pairs.law, p, curves, overlap)
+            energy[SPRINGS] += spring_energy(pairs.law, p, elongation(pairs.spring, p), overlap)
+
+
+@part
+def _at_rails(world: World, law: Any, found: RailContacts, energy: F8) -> None:
+    if law is None:
+        return
+    bottles, near_segments, near_arcs, moving = world.bottles, world.near_segments, world.near_arcs, world.moving
+    for i in range(bottles.x.size):
+        count = find_rail_contacts(i, bottles, world.segments, near_segments, world.arcs, near_arcs, moving, found)
+        for c in range(count):
+            e = law_entry(world.settings, bottles, found, c, i)
+            spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
+            energy[ELASTIC] += found.share[c] * _elastic(law, e, world.curves, found.overlap[c])
+            energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring, found.overlap[c])
+
+
+@part
+def _elastic(law: ContactLaw, e: int, curves: Any, overlap: float) -> float:
+    return elastic_energy(law.stiffness, law.hertz, law.curve, curves, e, overlap)

@@ -1,0 +1,92 @@
+"""What the guard looks at: bottles that are not finite, the fastest one, kinetic energy, the deepest overlaps.
+
+Overlaps are looked at at the end of a step after which the lists were made anew, that is before a bottle has moved by
+more than a tenth of the smallest radius, so that none passes through another or through a rail between two looks.
+"""
+
+import math
+from typing import Any
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.observers import Watch
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.contact.pairs import normal_and_overlap
+from conveyor_sim.engine.rails.rails import find_rail_contacts
+from conveyor_sim.engine.threads.team import units
+
+
+@kernel
+def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
+    """Return the first slot whose bottle is not finite (-1: none), the slot of the fastest bottle (-1: no bottle), the
+    square of its speed (m^2/s^2), the weight of all (N), and their kinetic energy (J).
+    """
+    bad, fastest, square, weight, energy = -1, -1, -1.0, 0.0, 0.0
+    for i in range(bottles.x.size):
+        if bottles.id[i] >= 0:
+            weight += bottles.weight[i]
+            speed = bottles.vx[i] ** 2 + bottles.vy[i] ** 2
+            energy += 0.5 * speed / bottles.inverse_mass[i] + _turning_energy(spin, i)
+            if not math.isfinite(bottles.x[i] + bottles.y[i] + speed + _turn(spin, i)):
+                if bad < 0:
+                    bad = i
+            elif speed > square:
+                fastest, square = i, speed
+    return bad, fastest, square, weight, energy
+
+
+@part
+def watch_overlaps(world: World, found: RailContacts) -> None:
+    """Note the deepest overlaps in `world.watch`; the lists must hold."""
+    _watch_pairs(world.bottles, world.pairs, world.watch)
+    _watch_rails(world, world.railed, world.watch, found)
+
+
+@part
+def _turn(spin: Any, i: int) -> float:
+    if spin is None:
+        return 0.0
+    return spin.theta[i] + spin.omega[i]
+
+
+@part
+def _turning_energy(spin: Any, i: int) -> float:
+    if spin is None:
+        return 0.0
+    return 0.5 * spin.omega[i] ** 2 / spin.inverse_inertia[i]
+
+
+@part
+def _watch_pairs(bottles: Bottles, pairs: Any, watch: Watch) -> None:
+    if pairs is None:
+        return
+    for p in range(pairs.used[0]):
+        i, j = pairs.i[p], pairs.j[p]
+        reach = bottles.radius[i] + bottles.radius[j]
+        overlap, _, _ = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
+        if overlap > 0.0:
+            _note(watch, 0, overlap / min(bottles.radius[i], bottles.radius[j]), i, j)
+
+
+@part
+def _watch_rails(world: World, railed: Any, watch: Watch, found: RailContacts) -> None:
+    if railed is None:
+        return
+    bottles = world.bottles
+    begin, stop = units(0, bottles.x.size)
+    for place in range(railed.first[begin], railed.first[stop]):
+        i = railed.bottle[place]
+        count = find_rail_contacts(
+            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
+        )
+        for c in range(count):
+            _note(watch, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
+
+
+@part
+def _note(watch: Watch, place: int, depth: float, bottle: int, other: int) -> None:
+    if depth > watch.depth[place]:
+        watch.depth[place] = depth
+        watch.bottle[place] = bottle
+        watch.other[place] = other

@@ -1,0 +1,1 @@
+"""Contacts of bottles with rails, at rest and moving."""

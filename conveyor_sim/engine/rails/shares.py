@@ -1,0 +1,80 @@
+"""One surface pushes once: how pieces of one rail surface that touch a bottle together share the push.
+
+Two pieces with normals at an angle of cosine c would push twice near a shallow joint: a bump of a doubled force. The
+surface as a whole pushes with k times the shortest displacement d that clears all its overlaps, n_a . d >= delta_a.
+That is d = sum lambda_a n_a with G lambda = delta, lambda >= 0 and G the cosines between normals. Collinear pieces then
+push as one, pieces at a right angle as two walls, and nothing jumps in between. Obtuse pairs (c < 0, a wedge) keep
+their own push: clearing both would call for a force without bound.
+"""
+
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.compiler.compile import part
+
+SWEEPS = 64
+
+IN_LINE = 1e-10
+"""Square of the sine between normals, below which two pieces are one and the same: rounding would be divided by it."""
+
+
+@part
+def share_overlaps(contacts: RailContacts, count: int) -> None:
+    """Set `share` = lambda / delta of the first `count` contacts of one bottle; each surface for itself."""
+    for a in range(count):
+        contacts.share[a] = 1.0
+    for a in range(count):
+        first = True
+        members = 1
+        other = a
+        for b in range(count):
+            if b != a and contacts.surface[b] == contacts.surface[a]:
+                first = first and b > a
+                other = b
+                members += 1
+        if members == 2 and first:
+            _share_two(contacts, a, other)
+        elif members > 2 and first:
+            _share_many(contacts, a, count)
+
+
+@part
+def _share_two(contacts: RailContacts, a: int, b: int) -> None:
+    """In closed form."""
+    cosine = contacts.nx[a] * contacts.nx[b] + contacts.ny[a] * contacts.ny[b]
+    if cosine <= 0.0:
+        return
+    over_a, over_b = contacts.overlap[a], contacts.overlap[b]
+    if over_b <= cosine * over_a:
+        contacts.share[b] = 0.0
+        return
+    if over_a <= cosine * over_b:
+        contacts.share[a] = 0.0
+        return
+    # 1 - cosine^2, without its cancellation where the pieces are nearly in line.
+    sine = contacts.nx[a] * contacts.ny[b] - contacts.ny[a] * contacts.nx[b]
+    rest = sine * sine
+    if rest < IN_LINE:
+        contacts.share[a if over_a < over_b else b] = 0.0
+    else:
+        contacts.share[a] = (over_a - cosine * over_b) / (rest * over_a)
+        contacts.share[b] = (over_b - cosine * over_a) / (rest * over_b)
+
+
+@part
+def _share_many(contacts: RailContacts, first: int, count: int) -> None:
+    """Three or more pieces at once, which is rare: projected Gauss-Seidel."""
+    surface = contacts.surface[first]
+    for a in range(first, count):
+        contacts.solution[a] = 0.0
+    for _ in range(SWEEPS):
+        for a in range(first, count):
+            if contacts.surface[a] == surface:
+                rest = contacts.overlap[a]
+                for b in range(first, count):
+                    if b != a and contacts.surface[b] == surface:
+                        cosine = contacts.nx[a] * contacts.nx[b] + contacts.ny[a] * contacts.ny[b]
+                        if cosine > 0.0:
+                            rest -= cosine * contacts.solution[b]
+                contacts.solution[a] = rest if rest > 0.0 else 0.0
+    for a in range(first, count):
+        if contacts.surface[a] == surface:
+            contacts.share[a] = contacts.solution[a] / contacts.overlap[a]

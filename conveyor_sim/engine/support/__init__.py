@@ -1,0 +1,1 @@
+"""What bottles stand on: which belt carries, and its friction."""

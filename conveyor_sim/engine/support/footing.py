@@ -1,0 +1,72 @@
+"""What each bottle stands on: the velocity field of its belt, kept beside it until it may have left the belt.
+
+At a rebuild each bottle's belt is either certain, wherever it moves within the skin, or tested anew at every force
+evaluation. Only the latter are visited then.
+"""
+
+from typing import Any
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.support import Footing, Surface
+from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.support.belts import carrier
+from conveyor_sim.engine.threads.team import units
+
+
+@part
+def stand_on(footing: Footing, surface: Surface, bottles: Bottles, ring: Any, i: int, h: int, alone: bool) -> None:
+    """Put bottle i on belt (or floor) h. alone: no other belt is under its ring."""
+    footing.carrier[i] = h
+    footing.ux[i] = surface.ux[h]
+    footing.uy[i] = surface.uy[h]
+    _turn_with(footing.turn, surface.turn, i, h)
+    footing.pull[i] = surface.friction[h, bottles.type[i]] * bottles.weight[i]
+    if ring is not None:
+        if not alone and ring.radius[i] > 0.0:
+            footing.pull[i] = 0.0
+
+
+@part
+def _turn_with(footing_turn: Any, surface_turn: Any, i: int, h: int) -> None:
+    if surface_turn is not None:
+        footing_turn[i] = surface_turn[h]
+
+
+@kernel
+def refresh_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any) -> None:
+    """Put every bottle on its belt: after commands, supply and rebuilds."""
+    if surface is None:
+        return
+    floor = surface.ux.size - 1
+    for i in range(bottles.x.size):
+        h = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
+        stand_on(footing, surface, bottles, ring, i, h, _certain(belts, i))
+
+
+@part
+def _certain(belts: Any, i: int) -> bool:
+    if belts is None:
+        return True
+    return belts.certain[i] >= 0
+
+
+@part
+def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring: Any, first: int, end: int) -> None:
+    """Put those of bottles first to end that may have changed belts on the one under their axes."""
+    if belts is None:
+        return
+    floor = surface.ux.size - 1
+    begin, stop = units(first, end)
+    for entry in range(belts.uncertain.first[begin], belts.uncertain.first[stop]):
+        i = belts.uncertain.bottle[entry]
+        h = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
+        if h != footing.carrier[i]:
+            stand_on(footing, surface, bottles, ring, i, h, False)
+
+
+@kernel
+def find_carriers(bottles: Bottles, belts: Any, surface: Surface, carriers: Any) -> None:
+    """Write the belt (or floor) under each bottle's axis now; the state stays as it is."""
+    floor = surface.ux.size - 1
+    for i in range(bottles.x.size):
+        carriers[i] = carrier(i, belts, floor, bottles.x[i], bottles.y[i])

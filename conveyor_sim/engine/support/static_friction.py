@@ -1,0 +1,88 @@
+"""Static friction with memory: a spring from each base to a point of its belt (Cundall and Strack 1979).
+
+The point, the anchor, is carried with the belt's surface, so on a turning belt the spring turns with it. The spring
+pulls with k e + c v, e from the anchor to the axis, v the velocity relative to the belt; at most with mu m g. Drawn out
+to mu m g / k, the base slides, and drags the anchor after it. On another belt the spring begins anew, slack.
+
+Anchors are kept, not elongations: a spring is exactly as long as the bottle is away, whatever the integrator.
+"""
+
+import math
+from typing import Any
+
+from numba import uint64
+
+from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.support.base import relative_velocity
+
+
+@part
+def add_static_friction(
+    bottles: Bottles, load: Load, footing: Any, static: Any, lag: float, drags: bool, first: int, end: int
+) -> None:
+    """Add the pull of the springs to `load` of bottles first to end; `footing` must be that of now.
+
+    lag: s, as in `relative_velocity`. drags: set anchors where there are none, and drag them where the base slides;
+    False for a look at the forces.
+    """
+    if static is None:
+        return
+    for i in range(uint64(first), uint64(end)):
+        h = footing.carrier[i]
+        entry = uint64(h) * uint64(static.types) + uint64(bottles.type[i])
+        stiffness, most = static.stiffness[entry], static.friction[entry] * bottles.weight[i]
+        tied = static.belt[i] == h
+        ex = bottles.x[i] - static.x[i] if tied else 0.0
+        ey = bottles.y[i] - static.y[i] if tied else 0.0
+        drawn = stiffness * math.sqrt(ex * ex + ey * ey)
+        kept = most / drawn if drawn > most else 1.0
+        ex *= kept
+        ey *= kept
+        vx, vy = relative_velocity(bottles, footing, footing.turn, lag, i)
+        fx = stiffness * ex + static.damping[entry] * vx
+        fy = stiffness * ey + static.damping[entry] * vy
+        total = math.sqrt(fx * fx + fy * fy)
+        held = most / total if total > most else 1.0
+        load.fx[i] -= held * fx
+        load.fy[i] -= held * fy
+        if drags:
+            stays = tied and kept == 1.0
+            static.x[i] = static.x[i] if stays else bottles.x[i] - ex
+            static.y[i] = static.y[i] if stays else bottles.y[i] - ey
+            static.belt[i] = h
+
+
+@part
+def carry_anchors(footing: Any, static: Any, dt: float, first: int, end: int) -> None:
+    """Take the anchors of bottles first to end along with their belts for dt seconds."""
+    if static is None:
+        return
+    for i in range(uint64(first), uint64(end)):
+        dx, dy = _carried(footing.ux[i], footing.uy[i], footing.turn, static, dt, i)
+        static.x[i] += dx
+        static.y[i] += dy
+
+
+@part
+def _carried(ux: float, uy: float, turn: Any, static: Any, dt: float, i: int) -> tuple[float, float]:
+    """Way of an anchor in dt, m; on a turning belt by Cayley's rotation, which keeps it on its circle."""
+    if turn is None:
+        return dt * ux, dt * uy
+    half = 0.5 * dt * turn[i]
+    vx, vy = ux - turn[i] * static.y[i], uy + turn[i] * static.x[i]
+    scale = dt / (1.0 + half * half)
+    return scale * (vx - half * vy), scale * (vy + half * vx)
+
+
+@part
+def anchor_energy(bottles: Bottles, static: Any, energy: F8, account: int) -> None:
+    """Add what the springs under the bottles hold (J) to an account of `energy`."""
+    if static is None:
+        return
+    for i in range(bottles.x.size):
+        if static.belt[i] >= 0:
+            entry = uint64(static.belt[i]) * uint64(static.types) + uint64(bottles.type[i])
+            ex, ey = bottles.x[i] - static.x[i], bottles.y[i] - static.y[i]
+            energy[account] += 0.5 * static.stiffness[entry] * (ex * ex + ey * ey)

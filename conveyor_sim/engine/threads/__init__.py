@@ -1,0 +1,1 @@
+"""Threads that step together, to the same bits as one."""
