@@ -44,7 +44,6 @@ def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
         "100 steps a tick, given in the scene; 3 x beyond the bound of stability by contact friction",
         "accuracy given, 100 steps a tick",
         "% in the peak force of impacts: impact of two bottles, ",
-        "% in creep on curved belts: 25.5 steps in v_lim / (mu g)",
         "normal_damping off: no contact with damping law normal",
         "arc_rails on: belts.turn.rails.inner",
     ):
@@ -104,7 +103,7 @@ def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     assert "; predicted error: " in setting
     assert "0.10 s simulated in" in result.output
     assert peak.startswith("peak force ")
-    assert steps.startswith("100 steps a tick are given in the scene; base slip needs ")
+    assert steps.startswith("100 steps a tick are given in the scene; contact friction needs ")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -90,7 +90,7 @@ def test_a_recording_is_told_the_errors_of_the_steps_it_ran_with(bag: Path, tmp_
 def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
     def wrong(topic: str, message: Any) -> None:
         if topic == "line":
-            message.integrator = "leapfrog"
+            message.integrator = "half_explicit_euler"
 
     summary = summarize(edited(bag, tmp_path / "foreign", wrong))
     assert summary.predicted is None

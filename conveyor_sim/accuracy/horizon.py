@@ -25,8 +25,8 @@ from conveyor_sim.simulation import Simulation
 NUDGE = 1e-12
 """m, of every bottle, in a random direction; rounding moves bottles by 1e-14 over ten thousand steps."""
 
-GROWTH = 10.0
-"""Amplification that ends a horizon."""
+GROWTH = 2.0
+"""Amplification that ends a horizon: an error is then that of the steps, not what later impacts have made of it."""
 
 JUMP = 1e3
 """Growth of one bottle's difference within a tick that no scatterer makes: the nudge has decided whether two things

@@ -51,7 +51,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Horizon:
-    """How long trajectories from one state can be compared: until a nudge has grown tenfold."""
+    """How long trajectories from one state can be compared: until a nudge has doubled."""
 
     start: float
     """s, simulated time of the state."""
@@ -60,7 +60,7 @@ class Horizon:
     contacts: int
     """Closed in it."""
     by_nudge: float
-    """s after the start at which a nudge of 1e-12 m had grown tenfold; inf: not in the time looked at."""
+    """s after the start at which a nudge of 1e-12 m had doubled; inf: not in the time looked at."""
     by_error: float
     """s at which a coarse setting's own early error had; inf likewise."""
     length: float

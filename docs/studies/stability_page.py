@@ -28,6 +28,7 @@ from conveyor_sim.simulation import Simulation
 Line = Mapping[str, str]
 
 SHORT = {
+    "leapfrog": "leapfrog",
     "semi_implicit_euler": "Euler",
     "velocity_verlet": "Verlet",
     "rk4": "RK4",

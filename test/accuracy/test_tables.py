@@ -191,7 +191,7 @@ def test_orders_stand_in_groups_with_what_was_expected() -> None:
 
 def test_horizons_tell_what_was_not_seen_and_the_references_doubt() -> None:
     horizons = block(study(), "How long")
-    assert column(horizons, "a nudge grows\ntenfold in, s") == ["0.37", "0.18", "not seen"]
+    assert column(horizons, "a nudge\ndoubles in, s") == ["0.37", "0.18", "not seen"]
     assert "in doubt by 0.0034 % in peak force" in horizons.notes[0]
 
 

@@ -97,10 +97,12 @@ def field(speeds: list[float], friction: list[float], turn: Any = None) -> Surfa
     return Surface(ux, np.zeros(len(ux)), turn, np.array([*friction, 0.1])[:, None].copy())
 
 
-def drag(belts: Belts, surface: Surface, x: float, y: float, vx: float, vy: float, omega: float) -> NDArray[np.float64]:
-    """Force over mu m g, and moment over mu m g R_b."""
+def drag(
+    belts: Belts, surface: Surface, x: float, y: float, vx: float, vy: float, omega: float, lag: float = 0.0
+) -> NDArray[np.float64]:
+    """Force over mu m g, and moment over mu m g R_b; lag: s by which velocities are older than positions."""
     floor = len(surface.ux) - 1
-    force = straddling_ring(0, belts, surface, floor, x, y, vx, vy, omega, RADIUS, WEIGHT, 0, LIMIT, None)
+    force = straddling_ring(0, belts, surface, floor, x, y, vx, vy, omega, RADIUS, WEIGHT, 0, LIMIT, lag, None)
     return np.array(force) / (MU * WEIGHT) / [1.0, 1.0, RADIUS]
 
 
@@ -178,3 +180,6 @@ def test_on_a_belt_that_turns_a_ring_turns_with_it() -> None:
     with_it = drag(belts, surface, 1.0, 0.5, -2.0 * 0.5, 2.0 * 1.0, 2.0)
     assert with_it == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
     assert drag(belts, surface, 1.0, 0.5, -2.0 * 0.5, 2.0 * 1.0, 0.0)[2] > 0.5
+    # It has moved on for 10 ms since its velocity was that of the belt.
+    moved = drag(belts, surface, 1.0 - 0.01, 0.5 + 0.02, -2.0 * 0.5, 2.0 * 1.0, 2.0, lag=0.01)
+    assert moved == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
