@@ -174,7 +174,8 @@ def _promises(rows: Sequence[Mapping[str, str]]) -> str:
             lines.append(f"| {row['scene']} | | | | | | | | {row['failure']} |")
         elif row["integrator"] == "leapfrog":
             cells = [row["scene"], row["preset"], row["steps"], _percent(row["promised"])]
-            cells += [_percent(row[key]) for key in ("impacts_predicted", "impacts", "resting_predicted", "resting")]
+            cells += [_percent(row["impacts_predicted"]), _percent(row["impacts"] if _touched(row) else "")]
+            cells += [_percent(row["resting_predicted"] if row["resting"] else ""), _percent(row["resting"])]
             lines.append(f"| {' | '.join(cells)} | {_verdict(row)} |")
     return "\n".join(lines)
 
@@ -182,8 +183,15 @@ def _promises(rows: Sequence[Mapping[str, str]]) -> str:
 def _verdict(row: Mapping[str, str]) -> str:
     if row["failure"]:
         return row["failure"]
+    if not _touched(row) and not row["resting"]:
+        return "nothing touches"
     kept = all(not row[key] or float(row[key]) <= float(row["promised"]) for key in ("impacts", "resting"))
     return "kept" if kept else "**not kept**"
+
+
+def _touched(row: Mapping[str, str]) -> bool:
+    """Whether there was a force to err in; bottles on a line in good order do not touch."""
+    return bool(row["impacts"]) and float(row["impacts"]) > 0.0
 
 
 def _percent(value: str) -> str:
@@ -208,9 +216,9 @@ def _default(rows: Sequence[Mapping[str, str]]) -> str:
 
 
 def _ratio(other: Mapping[str, str] | None, ours: Mapping[str, str] | None) -> str:
-    if other is None or ours is None or not ours["cost"] or _verdict(ours) != "kept":
+    if other is None or ours is None or not ours["cost"] or "not kept" in _verdict(ours):
         return "-"
-    if not other["cost"] or _verdict(other) != "kept":
+    if not other["cost"] or "not kept" in _verdict(other):
         return "not kept"
     return f"{float(other['cost']) / float(ours['cost']):.2g}"
 
