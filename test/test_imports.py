@@ -38,7 +38,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "version | numpy rich ruamel",
     "explain": "effects errors model scene simulation timestep | rich",
     "plot": "accuracy bag errors line observe scene | matplotlib numpy",
-    "runs": "bag engine errors model observe plot scene simulation support timestep | click numpy rich",
+    "runs": "bag engine errors line model observe plot scene simulation support timestep | click numpy rich",
     "ros": "bag control errors explain line model runs scene simulation support version | builtin_interfaces click "
     "conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control engine errors line plot ros scene simulation support | numpy pytest",

@@ -148,6 +148,16 @@ def test_to_and_fro_between_two_belts_is_no_loop(tmp_path: Path) -> None:
     assert summary.belts["a"].per_minute == pytest.approx(600.0)
 
 
+def test_bottles_of_machines_count_too(tmp_path: Path) -> None:
+    """A source and a sink; sums go by what a signal counts, not by its name."""
+    buffer_lane = Path(__file__).parents[1] / "config" / "scenarios" / "buffer_lane.yaml"
+    simulation = record(load_scene(buffer_lane, {"duration": 5.0}), tmp_path / "bag", 500)
+    summary = summarize(tmp_path / "bag")
+    assert (summary.fed, summary.removed) == (simulation.counts.fed, simulation.counts.removed)
+    assert min(simulation.counts.fed, simulation.counts.removed) > 5
+    assert summary.rejected == 0
+
+
 def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
     record(load_scene(SMALL_LINE, {"outputs": {"signals": 0}}), tmp_path / "bag", 10)
     summary = summarize(tmp_path / "bag")

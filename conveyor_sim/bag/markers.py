@@ -34,6 +34,7 @@ BOTTLE_COLOURS: tuple[Colour, ...] = (
 SENSOR_LOOKS: dict[str, tuple[float, float, Colour]] = {
     "photo_eye": (0.06, 0.008, (1.0, 0.45, 0.10, 1.0)),
     "counter": (0.04, 0.008, (0.72, 0.55, 1.0, 1.0)),
+    "inspection": (0.08, 0.012, (0.35, 0.80, 1.0, 1.0)),
     "zone": (0.01, 0.006, (0.80, 0.90, 0.30, 1.0)),
 }
 """By kind: height above the belts, m; thickness, m; colour. All are bright, as the belts are dark."""

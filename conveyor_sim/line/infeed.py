@@ -26,7 +26,7 @@ class InfeedDevice(Device):
     def __init__(self, name: str, infeed: Infeed, entry: Entry, quality: Quality, random: np.random.Generator) -> None:
         """random: for the jitter."""
         place = f"infeeds/{name}"
-        super().__init__(place, [Signal(f"{place}/fed", "1", "count"), Signal(f"{place}/blocked", "1", "bool")])
+        super().__init__(place, [Signal(f"{place}/fed", "1", "count", "fed"), Signal(f"{place}/blocked", "1", "bool")])
         self._infeed, self._entry, self._radius = infeed, entry, entry.radius
         self._direction = (math.cos(infeed.direction), math.sin(infeed.direction))
         self.random = random

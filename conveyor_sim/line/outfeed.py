@@ -14,7 +14,7 @@ class OutfeedDevice(Device):
     """One outfeed while it runs."""
 
     def __init__(self, name: str, outfeed: Outfeed) -> None:
-        super().__init__(f"outfeeds/{name}", [Signal(f"outfeeds/{name}/removed", "1", "count")])
+        super().__init__(f"outfeeds/{name}", [Signal(f"outfeeds/{name}/removed", "1", "count", "removed")])
         self._corners = np.array(outfeed.region)
         self.removed = 0
 

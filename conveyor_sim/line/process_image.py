@@ -7,6 +7,9 @@ from typing import Literal
 Kind = Literal["bool", "count", "number"]
 """bool: 0 or 1; count: a whole number."""
 
+Role = Literal["", "fed", "removed", "rejected"]
+"""What a count adds to: bottles put onto the line, taken off it, thrown out of it; "" to nothing."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -16,6 +19,7 @@ class Signal:
     unit: str
     """ "1" where it has no dimension."""
     type: Kind
+    role: Role = ""
 
 
 @dataclass(frozen=True)

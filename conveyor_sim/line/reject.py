@@ -20,7 +20,8 @@ class RejectDevice(Device):
     def __init__(self, name: str, reject: Reject) -> None:
         place = f"machines/{name}"
         names = ("rejected_bad", "rejected_good", "missed")
-        signals = [Signal(f"{place}/{what}", "1", "count") for what in ("rejected", *names)]
+        signals = [Signal(f"{place}/rejected", "1", "count", "rejected")]
+        signals += [Signal(f"{place}/{what}", "1", "count") for what in names]
         super().__init__(place, signals, [switch(f"{place}/fire")], [switch(f"{place}/stop")])
         self._reject = reject
         self._corners = np.array(reject.region)

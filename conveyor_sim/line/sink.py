@@ -20,7 +20,7 @@ class SinkDevice(MachineDevice):
     def __init__(self, name: str, sink: Sink) -> None:
         place = f"machines/{name}"
         signals = [
-            Signal(f"{place}/taken", "1", "count"),
+            Signal(f"{place}/taken", "1", "count", "removed"),
             Signal(f"{place}/taken_bad", "1", "count"),
             Signal(f"{place}/starved", "1", "bool"),
             Signal(f"{place}/starved_time", "s", "number"),

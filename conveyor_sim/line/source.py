@@ -15,7 +15,7 @@ class SourceDevice(MachineDevice):
     def __init__(self, name: str, source: Source, entry: Entry, quality: Quality) -> None:
         place = f"machines/{name}"
         signals = [
-            Signal(f"{place}/produced", "1", "count"),
+            Signal(f"{place}/produced", "1", "count", "fed"),
             Signal(f"{place}/blocked", "1", "bool"),
             Signal(f"{place}/blocked_time", "s", "number"),
         ]

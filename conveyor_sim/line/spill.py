@@ -14,7 +14,7 @@ class SpillDevice(Device):
 
     def __init__(self, name: str, spill: Spill, entry: Entry) -> None:
         place = f"spills/{name}"
-        super().__init__(place, [Signal(f"{place}/dropped", "1", "count")], faults=[switch(f"{place}/drop")])
+        super().__init__(place, [Signal(f"{place}/dropped", "1", "count", "fed")], faults=[switch(f"{place}/drop")])
         self._spill, self._entry = spill, entry
         self.drop = RisingEdge()
         self.due = 0

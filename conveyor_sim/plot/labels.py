@@ -89,7 +89,7 @@ def mark_labels(plant: Plant) -> list[Label]:
 
 
 def sensor_labels(plant: Plant) -> list[Label]:
-    """Names of photo-eyes, counters and zones: off the ends of a line, on the sides of a zone."""
+    """Names of photo-eyes, counters, inspections and zones: off the ends of a line, on the sides of a zone."""
     labels = []
     for sensor in plant.sensors:
         word, colour = sensor_look(sensor.kind)

@@ -16,6 +16,7 @@ Z_LINE: Final = 6.0
 _LOOKS: Final = {
     "photo_eye": ("eye", style.PHOTO_EYE),
     "counter": ("counter", style.COUNTER),
+    "inspection": ("inspection", style.INSPECTION),
     "zone": ("zone", style.ZONE),
 }
 
@@ -26,9 +27,12 @@ def sensor_look(kind: str) -> tuple[str, str]:
 
 
 def draw_sensors(ax: Axes, plant: Plant, size: float) -> None:
-    """Beams dashed between two squares; counters full, with an arrow of `size` m forward; zones dotted around."""
+    """Beams dashed between two squares; counters full, with an arrow of `size` m forward; inspections full between two
+    diamonds; zones dotted around.
+    """
     beams = [sensor.points for sensor in plant.sensors if sensor.kind == "photo_eye"]
     counters = [sensor.points for sensor in plant.sensors if sensor.kind == "counter"]
+    inspections = [sensor.points for sensor in plant.sensors if sensor.kind == "inspection"]
     zones = [sensor.points for sensor in plant.sensors if sensor.kind == "zone"]
     if beams:
         lines = LineCollection(
@@ -40,6 +44,12 @@ def draw_sensors(ax: Axes, plant: Plant, size: float) -> None:
     if counters:
         shapes = [*counters, *(_arrow(line, size) for line in counters)]
         ax.add_collection(LineCollection(shapes, colors=style.COUNTER, linewidths=1.5, zorder=Z_LINE, gid="counters"))
+    if inspections:
+        colour = style.INSPECTION
+        lines = LineCollection(inspections, colors=colour, linewidths=1.5, zorder=Z_LINE, gid="inspections")
+        ax.add_collection(lines)
+        x, y = np.concatenate(inspections).T
+        ax.scatter(x, y, s=24.0, marker="D", color=colour, edgecolors="white", linewidths=0.5, zorder=Z_LINE)
     if zones:
         outlines = PolyCollection(
             zones,

@@ -28,6 +28,7 @@ INFEED: Final = "#00735c"
 OUTFEED: Final = "#a3447f"
 PHOTO_EYE: Final = "#c2410c"
 COUNTER: Final = "#5b21b6"
+INSPECTION: Final = "#0e5a8a"
 ZONE: Final = "#4d5f0a"
 # Okabe and Ito's palette without its yellow, which is too faint for lines on white.
 SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")

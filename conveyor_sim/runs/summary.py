@@ -19,6 +19,8 @@ from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.errors import ConveyorError, SceneError
+from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.process_image import Role
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.model.step_choice import choose_steps
@@ -110,7 +112,11 @@ class Summary:
     wall: float | None
     """s"""
     fed: int | None
+    """By infeeds, sources and spills; None if this version refuses the recorded scene."""
     removed: int | None
+    """By outfeeds, sinks and rejects."""
+    rejected: int | None
+    """By rejects."""
     present: int
     """Bottles on the line at the end."""
     on_floor: int
@@ -223,13 +229,15 @@ class _Tally:
         belt = np.zeros(0, dtype=np.int32) if self._bottles is None else self._bottles.belt
         peak = None if self._unknown else float(forces.max(initial=0.0))
         line, model = self._bag.line, _model(self._bag.line)
+        roles = None if model is None else _roles(line, model)
         return Summary(
             scene=printable(line.scene_name),
             bag=printable(self._bag.path, SENTENCE),
             simulated=self._bag.time(max(0, self._last_tick - int(line.tick))),
             wall=wall,
-            fed=self._signal_sum("infeeds/", "/fed"),
-            removed=self._signal_sum("outfeeds/", "/removed"),
+            fed=self._counted(roles, "fed"),
+            removed=self._counted(roles, "removed", "rejected"),
+            rejected=self._counted(roles, "rejected"),
             present=len(belt),
             on_floor=int(np.count_nonzero(belt < 0)),
             belts=self._belts(belt),
@@ -252,9 +260,12 @@ class _Tally:
             topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},
         )
 
-    def _signal_sum(self, prefix: str, suffix: str) -> int | None:
+    def _counted(self, roles: dict[str, Role] | None, *wanted: Role) -> int | None:
+        """The sum of the signals of some roles at the end."""
+        if roles is None:
+            return None
         names = self._bag.line.signal_names
-        chosen = [index for index, name in enumerate(names) if name.startswith(prefix) and name.endswith(suffix)]
+        chosen = [index for index, name in enumerate(names) if roles.get(name) in wanted]
         if not chosen:
             return 0
         return None if self._signals is None else int(self._signals[chosen].sum())
@@ -290,6 +301,12 @@ def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
         turnover=ledger.turnover,
         rails=dict(zip(moving, ledger.rail_work.tolist(), strict=True)),
     )
+
+
+def _roles(line: Any, model: Model) -> dict[str, Role]:
+    """What the signals of a recorded scene count, by name."""
+    devices = build_devices(recorded_scene(line, line.scene_name), model)
+    return {signal.name: signal.role for device in devices for signal in device.signals}
 
 
 def _model(line: Any) -> Model | None:
@@ -332,6 +349,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
     wall, factor = summary.wall, summary.real_time_factor
     fed = "not recorded" if summary.fed is None else str(summary.fed)
     removed = "not recorded" if summary.removed is None else str(summary.removed)
+    out = f" ({summary.rejected} rejected)" if summary.rejected else ""
     force = "not recorded"
     if summary.peak_force is not None:
         force = f"peak {summary.peak_force:.2f} N, 99th percentile of peaks {summary.peak_force_99:.2f} N"
@@ -347,7 +365,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("simulated", f"{summary.simulated:.2f} s"),
         ("wall time", "not known" if wall is None else f"{wall:.2f} s"),
         ("real-time factor", "not known" if factor is None else f"{factor:.2f}"),
-        ("bottles", f"{fed} fed, {removed} removed, {summary.present} present ({summary.on_floor} on no belt)"),
+        ("bottles", f"{fed} fed, {removed} removed{out}, {summary.present} present ({summary.on_floor} on no belt)"),
         ("loop", loop),
         ("contact force", force),
         ("setting", summary.setting),

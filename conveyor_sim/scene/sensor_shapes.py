@@ -6,22 +6,28 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.scene.machines import Inspection
 from conveyor_sim.scene.schema import Scene
 
 
 @dataclass(frozen=True)
 class SensorShape:
-    """A beam or a counter's line from its `from` to its `to`, or the corners of a zone: `points` (k, 2) in m."""
+    """The line of a beam, a counter or an inspection, or the corners of a zone: `points` (k, 2) in m."""
 
-    kind: Literal["photo_eye", "zone", "counter"]
+    kind: Literal["photo_eye", "zone", "counter", "inspection"]
     name: str
     points: NDArray[np.float64]
 
 
 def sensor_shapes(scene: Scene) -> list[SensorShape]:
-    """Photo-eyes, zones and counters, in listing order."""
+    """Photo-eyes, zones, counters and inspections, in listing order."""
     return [
         *(SensorShape("photo_eye", name, np.array([eye.from_, eye.to])) for name, eye in scene.photo_eyes.items()),
         *(SensorShape("zone", name, np.array(zone.region)) for name, zone in scene.zones.items()),
         *(SensorShape("counter", name, np.array([line.from_, line.to])) for name, line in scene.counters.items()),
+        *(
+            SensorShape("inspection", name, np.array([machine.from_, machine.to]))
+            for name, machine in scene.machines.items()
+            if isinstance(machine, Inspection)
+        ),
     ]
