@@ -7,7 +7,7 @@ import pytest
 from scenes import MASS, NO_FLOOR, PEAKS, RADIUS, base, belt, bottle, contact, kind, scene, segment, simulation
 
 from conveyor_sim.model import build_model
-from conveyor_sim.runs.force_check import Achieved, PeakWatch, achieved, pressed
+from conveyor_sim.runs.force_check import ForceCheck, PeakWatch, achieved, pressed
 
 K = 5e3
 TWO: dict[str, Any] = {"contacts": [contact(K)], "bottles": [bottle(0.0, 0.0, 1.0), bottle(1.0, 0.0)], **NO_FLOOR}
@@ -15,7 +15,7 @@ PEAK = math.sqrt(K * MASS / 2)
 """N, of the two head on at 1 m/s."""
 
 
-def reached(peak_force: float, **fields: Any) -> Achieved:
+def reached(peak_force: float, **fields: Any) -> ForceCheck:
     found = achieved(build_model(scene(**{**TWO, **fields})), peak_force)
     assert found is not None
     return found

@@ -11,7 +11,7 @@ from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.forces import evaluate_forces
-from conveyor_sim.engine.threads.team import members
+from conveyor_sim.engine.threads.workers import members
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.state import State

@@ -8,7 +8,7 @@ import numpy as np
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.observers.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
 from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, SPRINGS, find_stored_energy
-from conveyor_sim.engine.threads.team import members
+from conveyor_sim.engine.threads.workers import workers
 from conveyor_sim.observe.ledger import Ledger, balance
 from conveyor_sim.state import State
 
@@ -19,7 +19,7 @@ class EnergyAccount:
     def __init__(self, state: State) -> None:
         """Open the books with the energy of the bottles that are there; the neighbour lists must hold."""
         self._state = state
-        self._found = members(1)[0].found
+        self._found = workers(1)[0].found
         self.fed = self.removed = self.springs = self.base_springs = 0.0
         self.restart()
 

@@ -6,7 +6,7 @@ writes bottles, some at a time. Sums run in a fixed order (pairs by partner, seg
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import find_touching, pack, pair_forces
 from conveyor_sim.engine.contact.path import forget_path
@@ -16,37 +16,37 @@ from conveyor_sim.engine.rails.rails import add_rail_forces, count_rail_contacts
 from conveyor_sim.engine.support.base import add_base_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
-from conveyor_sim.engine.threads.team import BLOCK, share, wait_for_all
+from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
 
 
 @part
-def evaluate_forces(world: World, member: Member, dt: float) -> None:
+def evaluate_forces(world: World, worker: Worker, dt: float) -> None:
     """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
-    forget_path(world.path, world.moving, member)
-    pack_all(world, member)
-    pair_phase(world, member, dt, 0.0)
-    begin, stop = share(member, world.bottles.x.size)
+    forget_path(world.path, world.moving, worker)
+    pack_all(world, worker)
+    pair_phase(world, worker, dt, 0.0)
+    begin, stop = share(worker, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
-        bottle_forces(world, member, dt, 0.0, first, min(first + BLOCK, stop))
-    wait_for_all(member)
+        bottle_forces(world, worker, dt, 0.0, first, min(first + BLOCK, stop))
+    wait_for_all(worker)
 
 
 @part
-def pack_all(world: World, member: Member) -> None:
-    """Pack this member's bottles; all are packed on return."""
-    begin, stop = share(member, world.bottles.x.size)
+def pack_all(world: World, worker: Worker) -> None:
+    """Pack this worker's bottles; all are packed on return."""
+    begin, stop = share(worker, world.bottles.x.size)
     pack(world.bottles, begin, stop)
-    wait_for_all(member)
+    wait_for_all(worker)
 
 
 @part
-def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> None:
-    """Find what this member's share of the pairs exerts; all pairs are done on return.
+def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> None:
+    """Find what this worker's share of the pairs exerts; all pairs are done on return.
 
     All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, of slip by which the
     tangential springs are drawn out, or by `World.path` if there is one; 0: what they are then is not kept.
     """
-    _count_closed(world, world.implicit, member, dt)
+    _count_closed(world, world.implicit, worker, dt)
     pair_forces(
         world.settings,
         world.bottles,
@@ -55,15 +55,15 @@ def pair_phase(world: World, member: Member, dt: float, spring_dt: float) -> Non
         world.pairs,
         world.curves,
         world.implicit,
-        member,
+        worker,
         spring_dt,
     )
-    find_pair_parts(world.settings, world.bottles, world.spin, world.pairs, world.ledger, world.curves, member)
-    wait_for_all(member)
+    find_pair_parts(world.settings, world.bottles, world.spin, world.pairs, world.ledger, world.curves, worker)
+    wait_for_all(worker)
 
 
 @part
-def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, first: int, end: int) -> None:
+def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, first: int, end: int) -> None:
     """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22)."""
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     sum_pair_parts(world.pairs, world.slots, world.ledger, first, end)
@@ -83,7 +83,7 @@ def bottle_forces(world: World, member: Member, dt: float, spring_dt: float, fir
         world.curves,
         world.implicit,
         world.ledger,
-        member.found,
+        worker.found,
         first,
         end,
         spring_dt,
@@ -127,14 +127,14 @@ def _moments(spin: Any) -> Any:
 
 
 @part
-def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> None:
+def _count_closed(world: World, implicit: Any, worker: Worker, dt: float) -> None:
     """Count the closed contacts of every bottle, for the mass splitting of the implicit solver."""
     if implicit is None:
         return
     bottles = world.bottles
-    find_touching(world.settings, bottles, world.pairs, member)
-    wait_for_all(member)
-    begin, stop = share(member, bottles.x.size)
+    find_touching(world.settings, bottles, world.pairs, worker)
+    wait_for_all(worker)
+    begin, stop = share(worker, bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
         sum_slots(world.slots, _touch(world.pairs), first, end, implicit.closed)
@@ -146,7 +146,7 @@ def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> Non
             world.near_arcs,
             world.moving,
             world.railed,
-            member.found,
+            worker.found,
             first,
             end,
             implicit.closed,
@@ -154,8 +154,8 @@ def _count_closed(world: World, implicit: Any, member: Member, dt: float) -> Non
         for i in range(first, end):
             # The base is a contact too.
             implicit.closed[i] += 1.0
-            implicit.ease[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
-    wait_for_all(member)
+            implicit.compliance[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
+    wait_for_all(worker)
 
 
 @part

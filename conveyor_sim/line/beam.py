@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.motion import CHORDS, Motion
 from conveyor_sim.scene.geometry import XY
 
@@ -33,7 +33,7 @@ class Beams(Device):
         self._along = (end - start) / self._length[:, None]
         self._spans: list[list[Span]] = [[] for _ in ends]
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """Find out when in this tick each was blocked."""
         self._spans = [[] for _ in self._spans]
         radius = now.state.world.bottles.radius

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from conveyor_sim.line.crossing import CrossingLine
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
 from conveyor_sim.scene.sensors import Counter
 
@@ -19,16 +19,16 @@ class CounterDevice(Device):
         self._line = CrossingLine(counter.from_, counter.to)
         self.forward = self.backward = 0
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """See where the bottles start."""
         self._line.begin(now)
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """Count the passages of this tick; a bottle that comes to the line and goes back within it makes none."""
         forward = self._line.end(now).forward
         self.forward += int(np.count_nonzero(forward))
         self.backward += int(np.count_nonzero(~forward))
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         return self.forward, self.backward

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8, I8
-from conveyor_sim.line.device import Now
+from conveyor_sim.line.device import ScanContext
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class CrossingLine:
         self._along = np.array(end) - self._start
         self._before: tuple[I8, F8, F8] | None = None
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """Note where the bottles are before the steps of a tick."""
         bottles = now.state.world.bottles
         self._before = (bottles.id.copy(), *self._seen(bottles.x, bottles.y))
 
-    def end(self, now: Now) -> Passages:
+    def end(self, now: ScanContext) -> Passages:
         """Who passed since then: straight between the two places, the time in proportion."""
         bottles = now.state.world.bottles
         if self._before is None:

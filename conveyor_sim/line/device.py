@@ -15,7 +15,7 @@ from conveyor_sim.state import State
 
 
 @dataclass
-class Now:
+class ScanContext:
     """What devices are shown of the line at a tick."""
 
     state: State
@@ -92,22 +92,22 @@ class Device:
         """What can be made to go wrong with it."""
         return self._faults
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
         raise NotImplementedError(f"{self.name} takes no commands")
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """Act before the steps of a tick; `now` is the tick that they start from."""
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """Look at what the steps came to, before bottles are taken and fed. Also once at the start, after `feed`."""
 
-    def take(self, now: Now) -> None:
+    def take(self, now: ScanContext) -> None:
         """Take bottles off the line."""
 
-    def feed(self, now: Now) -> None:
+    def feed(self, now: ScanContext) -> None:
         """Put bottles onto the line. Also once at the start."""
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """The signals' values, in their order."""
         return ()

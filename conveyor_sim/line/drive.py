@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from conveyor_sim.line.belt import BeltDevice
-from conveyor_sim.line.device import Now
+from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.line.ramp import Ramp
@@ -38,7 +38,7 @@ class DriveDevice(BeltDevice):
         self.travel = 0.0
         """m, forward less backward."""
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take a setpoint (m/s), run, reverse, reset, or the fault trip."""
         what = name.removeprefix(f"{self.name}/")
         if what == "run":
@@ -54,17 +54,17 @@ class DriveDevice(BeltDevice):
         else:
             super().command(name, value, now)
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """Ramp for a tick."""
         drive = self._drive
         now.speeds[self._index] = self.ramp.approach(self.wanted(now), drive.acceleration, drive.jerk, now.length)
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """Count what was travelled in the tick."""
         if now.tick > 0:
             self.travel += self.ramp.value * now.length
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """As a belt, then running, at_speed, fault, and pulses."""
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
         values = [*super().values(now), self.run and not self.tripped, at_speed, self.tripped]
@@ -72,7 +72,7 @@ class DriveDevice(BeltDevice):
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
 
-    def wanted(self, now: Now) -> float:
+    def wanted(self, now: ScanContext) -> float:
         """The speed that it is told to run at, m/s: none while it is stopped or tripped."""
         if not self.run or self.tripped:
             return 0.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conveyor_sim.line.device import Now
+from conveyor_sim.line.device import ScanContext
 from conveyor_sim.state import State
 
 CLEAR = 1e-9
@@ -49,7 +49,7 @@ class Quality:
         self.random = random
         self.count = 0
 
-    def judge(self, bottle: int, now: Now) -> None:
+    def judge(self, bottle: int, now: ScanContext) -> None:
         """Decide on the next bottle, by its id."""
         self.count += 1
         # Nothing is drawn where it would decide nothing.

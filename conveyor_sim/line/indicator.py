@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.counter import CounterDevice
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.zone import ZoneDevice
 from conveyor_sim.scene.indicators import Indicator
@@ -56,7 +56,7 @@ class IndicatorDevice(Device):
         """Ticks for which nothing was there to leave."""
         self.jam = self.starved = self.blocked = False
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """Judge this tick."""
         if now.tick == 0:
             return
@@ -77,13 +77,13 @@ class IndicatorDevice(Device):
         self.empty = self.empty + 1 if runs and not waits else 0
         self.starved = self.empty >= self._starved_ticks
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         flow = len(self.recent) * HOUR / self._window
         return flow, self.jam, self.starved, *((self.blocked,) if self._can_block else ())
 
 
-def _runs(belt: BeltDevice, now: Now) -> bool:
+def _runs(belt: BeltDevice, now: ScanContext) -> bool:
     return abs(belt.speed(now)) >= STANDS
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.entry import CLEAR, Entry, Quality
 from conveyor_sim.line.process_image import Signal
 from conveyor_sim.scene.schema import Infeed
@@ -44,7 +44,7 @@ class InfeedDevice(Device):
         """m, lateral jitter of the next bottle."""
         self._draw()
 
-    def feed(self, now: Now) -> None:
+    def feed(self, now: ScanContext) -> None:
         """Let in what is due."""
         if now.time < self._infeed.start:
             return
@@ -58,7 +58,7 @@ class InfeedDevice(Device):
     def _empty(self) -> bool:
         return self._infeed.count is not None and self.fed >= self._infeed.count
 
-    def _feed_packed(self, now: Now) -> bool:
+    def _feed_packed(self, now: ScanContext) -> bool:
         """The in-line moves with its last bottle: the next one enters a pitch behind it."""
         state, time = now.state, now.time
         pitch = 2.0 * self._radius + (self._infeed.gap or 0.0)
@@ -124,7 +124,7 @@ class InfeedDevice(Device):
             return self.fed > 0
         return time - self.due > LATE * (pitch / self._infeed.speed + self.extra)
 
-    def _feed_rate(self, now: Now) -> bool:
+    def _feed_rate(self, now: ScanContext) -> bool:
         rate, time = self._infeed.rate or 0.0, now.time
         if time < self.due + self.extra - ROUNDING:
             return False
@@ -136,7 +136,7 @@ class InfeedDevice(Device):
         self.due += 1.0 / rate
         return True
 
-    def _enter(self, now: Now, ahead: float) -> bool:
+    def _enter(self, now: ScanContext, ahead: float) -> bool:
         x, y = self._place(ahead)
         if not self._entry.has_room(now.state, x, y):
             return False
@@ -154,6 +154,6 @@ class InfeedDevice(Device):
         if lateral:
             self.offset = float(self.random.uniform(-lateral, lateral))
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Bottles fed so far, and whether one waits for room."""
         return self.fed, self.blocked

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.crossing import CrossingLine
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
 from conveyor_sim.scene.machines import Inspection
 
@@ -21,11 +21,11 @@ class InspectionDevice(Device):
         self.time = self.bad_time = 0.0
         """s, when the last bottle passed, and the last bad one."""
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """Note where the bottles are."""
         self._line.begin(now)
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """Look at those that passed."""
         passages = self._line.end(now)
         for bottle, time, forward in zip(passages.id, passages.time, passages.forward, strict=True):
@@ -34,6 +34,6 @@ class InspectionDevice(Device):
                 if int(bottle) in now.bad:
                     self.bad, self.bad_time = self.bad + 1, float(time)
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Bottles that passed, bad ones among them, and when the last of each did (s)."""
         return self.count, self.bad, self.time, self.bad_time

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.commands import CommandOutcome, refusal, shown
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
@@ -38,7 +38,7 @@ class Line:
     def __init__(self, scene: Scene, state: State) -> None:
         """The line of a scene with its devices as they are at first."""
         speeds = np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64)
-        self.now = Now(state, scene.tick, speeds, speeds.copy())
+        self.now = ScanContext(state, scene.tick, speeds, speeds.copy())
         devices = build_devices(scene, state.model)
         self._devices = devices
         self._belts = [device for device in devices if isinstance(device, BeltDevice)]

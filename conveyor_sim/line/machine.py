@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Command, Signal, switch
 
 ROUNDING = 1e-9
@@ -28,7 +28,7 @@ class MachineDevice(Device):
         self.cycle = 1.0
         """How much of the cycle is done; from 1 on it wants a bottle."""
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take run, rate (1/s), or the fault stop."""
         setattr(self, name.removeprefix(f"{self.name}/"), value if name.endswith("/rate") else value != 0.0)
 
@@ -37,7 +37,7 @@ class MachineDevice(Device):
         """Whether nobody has stopped it."""
         return self.run and not self.stop
 
-    def turn(self, now: Now) -> bool:
+    def turn(self, now: ScanContext) -> bool:
         """Go on with the cycle for the tick that has passed; whether it is done."""
         if self.runs and now.tick > 0:
             self.cycle += self.rate * now.length

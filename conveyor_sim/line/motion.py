@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 
 CHORDS = 8
 """A way is cut into so many straight pieces: at 1 g in a tick of 10 ms they leave it by 2 micrometres."""
@@ -21,12 +21,12 @@ class Motion(Device):
         self._start: tuple[F8, F8, F8, F8] | None = None
         self._steps = np.arange(1, CHORDS)[:, None] / CHORDS
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """Keep where bottles start."""
         bottles = now.state.world.bottles
         self._start = (bottles.x.copy(), bottles.y.copy(), bottles.vx.copy(), bottles.vy.copy())
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """See where they have come. At the very first there was no way: they stand."""
         bottles = now.state.world.bottles
         third = now.length / 3.0

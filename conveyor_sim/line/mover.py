@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
 from conveyor_sim.line.course import course_to, later, position_at, resting
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.model import Model
 from conveyor_sim.scene.moving import MovingShape
@@ -55,7 +55,7 @@ class Mover(Device):
         self.blocked = False
         """From when its drive can't keep it near its course, until it has kept that for a tick."""
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Go to the other end, jam or be free again, from where it is on."""
         if name == self.faults[0].name:
             self.jammed = value != 0.0
@@ -69,7 +69,7 @@ class Mover(Device):
             speed = self.speed
             self.course = course_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
 
-    def begin(self, now: Now) -> None:
+    def begin(self, now: ScanContext) -> None:
         """Tell the engine where the rail is in the steps of this tick."""
         rails, number = self._rails(now), self._number
         rails.course[number] = later(self.course, (now.tick - self.since) * now.length)
@@ -80,7 +80,7 @@ class Mover(Device):
             elif actuators.mode[number] == HELD:
                 actuators.mode[number] = ON_PROFILE
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """See where it is, and where it is going if its drive was held up."""
         rails, number = self._rails(now), self._number
         self.position, self.speed = float(rails.position[number]), float(rails.speed[number])
@@ -93,12 +93,12 @@ class Mover(Device):
         held_up = bool(actuators.mode[number] == OFF_PROFILE) and away > SWITCHED * self._shape.stroke
         self.blocked = held_up or (self.blocked and self.limited)
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Position from 0, at home, to 1, both end switches, and whether it is blocked."""
         share = min(1.0, max(0.0, self.position / self._shape.stroke))
         return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED), float(self.blocked)
 
-    def _rails(self, now: Now) -> MovingRails:
+    def _rails(self, now: ScanContext) -> MovingRails:
         moving = now.state.world.moving
         assert moving is not None
         return moving

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
 from conveyor_sim.scene.schema import Outfeed
 
@@ -18,7 +18,7 @@ class OutfeedDevice(Device):
         self._corners = np.array(outfeed.region)
         self.removed = 0
 
-    def take(self, now: Now) -> None:
+    def take(self, now: ScanContext) -> None:
         """Remove the bottles that are inside now."""
         bottles = now.state.world.bottles
         inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
@@ -26,7 +26,7 @@ class OutfeedDevice(Device):
             now.state.remove(int(slot))
             self.removed += 1
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Bottles removed so far."""
         return (self.removed,)
 

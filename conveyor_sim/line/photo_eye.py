@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from conveyor_sim.line.beam import ROUNDING, Beams, Span
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.motion import Motion
 from conveyor_sim.line.process_image import Command, Signal, switch
 from conveyor_sim.line.timer import Edge, Timer
@@ -68,7 +68,7 @@ class PhotoEyeDevice(Device):
         """What it tells."""
         return self.delayed.output
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Go wrong, or right again, from this tick on."""
         fault = name.rpartition("/")[2]
         setattr(self, fault, bool(value) if fault.startswith("stuck") else float(value))
@@ -77,7 +77,7 @@ class PhotoEyeDevice(Device):
             self.next_flip = now.time
             self._draw()
 
-    def end(self, now: Now) -> None:
+    def end(self, now: ScanContext) -> None:
         """See what happened in this tick."""
         spans = self._beams.spans(self._index)
         if now.tick == 0:
@@ -106,7 +106,7 @@ class PhotoEyeDevice(Device):
                 self.fell = at - self._debounce
         self.delayed.follow(seen, time)
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         return self.blocked, self.rose, self.fell, self.edges
 

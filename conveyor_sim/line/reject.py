@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.outfeed import in_polygon
 from conveyor_sim.line.process_image import Signal, switch
@@ -32,14 +32,14 @@ class RejectDevice(Device):
         self.removed_bad = 0
         self.missed = 0
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take fire, which counts as it rises, or the fault stop."""
         if name.endswith("/stop"):
             self.stop = value != 0.0
         elif self.fire.rises(value) and not self.stop:
             self.strokes = (*self.strokes, now.time + self._reject.delay)
 
-    def take(self, now: Now) -> None:
+    def take(self, now: ScanContext) -> None:
         """Throw out one bottle a stroke, within its window."""
         if not self.strokes:
             return
@@ -59,6 +59,6 @@ class RejectDevice(Device):
                 left.append(stroke)
         self.strokes = tuple(left)
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Rejected, bad and good ones among them, and strokes that hit nothing."""
         return self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.line.device import Now
+from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.machine import MachineDevice
 from conveyor_sim.line.outfeed import in_polygon
 from conveyor_sim.line.process_image import Signal
@@ -33,7 +33,7 @@ class SinkDevice(MachineDevice):
         self.starved = False
         self.starved_ticks = 0
 
-    def take(self, now: Now) -> None:
+    def take(self, now: ScanContext) -> None:
         """Take the bottle that has waited longest, if one is due."""
         bottles = now.state.world.bottles
         inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
@@ -53,6 +53,6 @@ class SinkDevice(MachineDevice):
             self.removed_bad += first in now.bad
             self.cycle -= 1.0
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Running, taken, taken_bad, starved, starved_time (s)."""
         return self.runs, self.removed, self.removed_bad, self.starved, self.starved_ticks * now.length

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.line.device import Now
+from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.entry import Entry, Quality
 from conveyor_sim.line.machine import MachineDevice
 from conveyor_sim.line.process_image import Signal
@@ -26,7 +26,7 @@ class SourceDevice(MachineDevice):
         self.blocked = False
         self.blocked_ticks = 0
 
-    def feed(self, now: Now) -> None:
+    def feed(self, now: ScanContext) -> None:
         """Give the bottle that is due, if there is room."""
         due = self.turn(now)
         self.blocked = due and not self._entry.has_room(now.state, *self._position)
@@ -38,6 +38,6 @@ class SourceDevice(MachineDevice):
             self.fed += 1
             self.cycle -= 1.0
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Running, produced, blocked, blocked_time (s)."""
         return self.runs and not self.blocked, self.fed, self.blocked, self.blocked_ticks * now.length

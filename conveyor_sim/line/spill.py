@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.entry import Entry
 from conveyor_sim.line.process_image import Signal, switch
@@ -20,18 +20,18 @@ class SpillDevice(Device):
         self.due = 0
         self.fed = 0
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take the fault drop."""
         if self.drop.rises(value) and self.fed + self.due < self._spill.count:
             self.due += 1
 
-    def feed(self, now: Now) -> None:
+    def feed(self, now: ScanContext) -> None:
         """Drop the bottles that are due."""
         while self.due and self._entry.has_room(now.state, *self._spill.position):
             self._entry.enter(now.state, *self._spill.position)
             self.due -= 1
             self.fed += 1
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """Bottles dropped so far."""
         return (self.fed,)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.line.device import Device, Now
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.outfeed import in_polygon
 from conveyor_sim.line.process_image import Command, Signal
 from conveyor_sim.scene.sensors import Zone
@@ -27,21 +27,21 @@ class ZoneDevice(Device):
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
         self.offset = 0
 
-    def command(self, name: str, value: float, now: Now) -> None:
+    def command(self, name: str, value: float, now: ScanContext) -> None:
         """Count wrongly from this tick on."""
         self.offset = int(value)
 
-    def count(self, now: Now) -> int:
+    def count(self, now: ScanContext) -> int:
         """Bottles that it shows now; never less than none."""
         bottles = now.state.world.bottles
         inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
         return max(0, int(np.count_nonzero(inside)) + self.offset)
 
-    def full(self, now: Now) -> bool:
+    def full(self, now: ScanContext) -> bool:
         """Whether its back-up switch is on; False without one."""
         return self._full_at is not None and self.count(now) >= self._full_at
 
-    def values(self, now: Now) -> Sequence[float]:
+    def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         count = self.count(now)
         full = () if self._full_at is None else (count >= self._full_at,)

@@ -8,7 +8,7 @@ from conveyor_sim.engine.arrays.moving import OFF_PROFILE, PHASES, UNLIMITED, Ac
 from conveyor_sim.engine.arrays.rails import Ends
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.rails.joint import FREE
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.scene.moving import MovingShape
 
 

@@ -12,7 +12,7 @@ from conveyor_sim.engine.arrays.support import Belts, Sectors
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.lists.static_grid import build_static_grid
 from conveyor_sim.engine.support.sector import BEYOND_HALF, FULL_CIRCLE, UP_TO_HALF
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.model.surfaces import Joints, find_joints
 from conveyor_sim.scene.geometry import ArcPiece, BeltShape, Piece, RailShape, SegmentPiece, is_full_turn
 

@@ -20,7 +20,7 @@ HARDER = 1.05
 
 
 @dataclass(frozen=True)
-class Achieved:
+class ForceCheck:
     """The largest normal contact force of a run, and what it says."""
 
     peak_force: float
@@ -126,12 +126,12 @@ class PeakWatch:
                 self._pressing.take(simulation.time, bottles.id, bottles.impulse)
 
 
-def achieved(model: Model, peak_force: float | None) -> Achieved | None:
+def achieved(model: Model, peak_force: float | None) -> ForceCheck | None:
     """What a run came to with its largest normal contact force (N); None if it is not known, or nothing can touch."""
     if peak_force is None or not model.impacts:
         return None
     overlap = max(impact.overlap(peak_force) / impact.diameter for impact in model.impacts)
-    return Achieved(peak_force, model.prediction.force, model.prediction.force_reason, overlap)
+    return ForceCheck(peak_force, model.prediction.force, model.prediction.force_reason, overlap)
 
 
 def pressed(model: Model, load: float | None) -> Pressed | None:

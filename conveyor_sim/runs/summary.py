@@ -14,7 +14,7 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from conveyor_sim.runs.force_check import Achieved, Pressed, PressWatch, achieved, pressed
+from conveyor_sim.runs.force_check import ForceCheck, Pressed, PressWatch, achieved, pressed
 from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.bag.recorded_scene import recorded_scene
@@ -24,7 +24,7 @@ from conveyor_sim.line.process_image import Role
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.model.step_choice import choose_steps
-from conveyor_sim.observe.borne import Borne
+from conveyor_sim.observe.load_history import LoadHistory
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
@@ -134,7 +134,7 @@ class Summary:
     """The errors to expect; None if this version refuses the recorded scene."""
     steps: list[str]
     """What sets the number of steps, and what would lower it; empty if this version would choose another number."""
-    achieved: Achieved | None
+    achieved: ForceCheck | None
     """What the peak force says; None if it or the prediction is not known."""
     pressed: Pressed | None
     """What pressed for long; None if it is not known, or no bound on the time step rests on it."""
@@ -144,7 +144,7 @@ class Summary:
     """What it said, the first times."""
     energy: Energy | None
     """None if no energy ledger was recorded."""
-    borne: Borne | None
+    borne: LoadHistory | None
     """What bottles have borne; None if it was not recorded."""
     damage_events: dict[str, int]
     """How often a limit was passed, by limit."""
@@ -193,7 +193,7 @@ class _Tally:
         self._ledger: Ledger | None = None
         self._outcomes: Counter[bool] = Counter()
         self._guard: list[tuple[str, str]] = []
-        self._borne: Borne | None = None
+        self._borne: LoadHistory | None = None
         self._passed: list[tuple[str, str]] = []
         self._pressing = PressWatch()
         for topic, _, data in bag.raw():
@@ -216,7 +216,7 @@ class _Tally:
         elif kind == GUARD_EVENT:
             self._guard.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif kind == DAMAGE:
-            self._borne = (self._borne or Borne()).with_more(to_columns(DamageColumns, message))
+            self._borne = (self._borne or LoadHistory()).with_more(to_columns(DamageColumns, message))
         elif kind == DAMAGE_EVENT:
             self._passed.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif kind == LEDGER:

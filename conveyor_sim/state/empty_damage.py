@@ -18,7 +18,7 @@ from conveyor_sim.engine.arrays.damage import (
     Worst,
 )
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.model import Model
 from conveyor_sim.scene.geometry import ArcPiece, Piece
 

@@ -9,14 +9,14 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw, Implicit, PairParts,
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
 from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
-from conveyor_sim.engine.arrays.observers import Ledger, Watch
+from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
 from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED
 from conveyor_sim.engine.observers.ledger import BELTS
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.model import Model
 from conveyor_sim.model.moving_rails import moving_arrays
 from conveyor_sim.model.plant import belt_arrays, listed
@@ -97,7 +97,7 @@ def empty_world(model: Model, slots: int) -> World:
             bucket=np.zeros(buckets + 1, np.uint32),
             order=np.zeros(slots, np.uint32),
         ),
-        watch=Watch(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
+        probe=GuardProbe(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
         pairs=empty_pairs(model, entries),
         slots=empty_slots(slots, entries) if model.pair_law is not None else None,
         pair_law=model.pair_law,
@@ -156,7 +156,7 @@ def _footing(model: Model, slots: int) -> Footing | None:
         ux=np.zeros(slots),
         uy=np.zeros(slots),
         turn=np.zeros(slots) if model.has("curved_belts") else None,
-        pull=np.zeros(slots),
+        friction_limit=np.zeros(slots),
     )
 
 

@@ -10,10 +10,10 @@ from conveyor_sim.engine.arrays.contacts import PairSprings
 from conveyor_sim.engine.arrays.damage import bin_columns, slot_columns
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
 from conveyor_sim.engine.arrays.moving import present
-from conveyor_sim.engine.fewer import lists_of
 from conveyor_sim.engine.lists.near import drop_near_springs
 from conveyor_sim.engine.lists.neighbours import drop_springs
 from conveyor_sim.engine.lists.rebuild import rebuild
+from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.model import Model
 from conveyor_sim.model.moving_rails import for_slots
 from conveyor_sim.scene.geometry import RailShape

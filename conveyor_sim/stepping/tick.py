@@ -1,4 +1,4 @@
-"""One tick of the engine: whole steps on a crew of threads, with the guard looking on."""
+"""One tick of the engine: whole steps on a pool of threads, with the guard looking on."""
 
 import os
 import time
@@ -9,8 +9,8 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
-from conveyor_sim.engine.threads.crew import Crew
 from conveyor_sim.engine.threads.thread_choice import ThreadChoice
+from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model.moving_rails import fastest_rail
 from conveyor_sim.state import State
@@ -34,7 +34,7 @@ class Integration:
         self._state = state
         self._model = state.model
         self._advance = INTEGRATORS[state.model.integrator]
-        self._crew = Crew(cores if threads is None else threads)
+        self._pool = ThreadPool(cores if threads is None else threads)
         self._choice = ThreadChoice(cores) if threads is None else None
         self._shorter = SHORTER if shorten else ()
         self._guard = Guard(state, self.found)
@@ -46,12 +46,12 @@ class Integration:
     @property
     def threads(self) -> int:
         """Threads that the next tick is to be stepped with."""
-        return self._crew.most if self._choice is None else self._choice.size
+        return self._pool.most if self._choice is None else self._choice.size
 
     @property
     def found(self) -> RailContacts:
         """Scratch of the calling thread."""
-        return self._crew.team(1)[0].found
+        return self._pool.group(1)[0].found
 
     @property
     def deepest_overlap(self) -> float:
@@ -125,7 +125,7 @@ class Integration:
         done, phase, steps, dt = 0, START, factor * self._model.steps_per_tick, self._model.dt / factor
         self._set_clock(0)
         while True:
-            done += self._crew.advance(self.threads, self._advance, self._state.world, steps - done, dt, phase)
+            done += self._pool.advance(self.threads, self._advance, self._state.world, steps - done, dt, phase)
             if not self._state.world.neighbourhood.stale[0]:
                 return
             self._state.make_lists()
@@ -161,7 +161,7 @@ class Integration:
         self._set_clock(model.steps_per_tick)
         velocities = [chatter.velocities_of(state.world)]
         for _ in range(chatter.STEPS):
-            self._crew.advance(self.threads, self._advance, state.world, 1, model.dt, START)
+            self._pool.advance(self.threads, self._advance, state.world, 1, model.dt, START)
             state.make_lists()
             velocities.append(chatter.velocities_of(state.world))
         memory.put_back(state)

@@ -41,7 +41,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Watch:
+class GuardProbe:
     """A condition that is asserted, from a time on."""
 
     condition: Condition
@@ -84,7 +84,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.scene = scene
         self.simulation = Simulation(scene)
         self.history = History(self.simulation.process_image)
-        self.failed: Watch | None = None
+        self.failed: GuardProbe | None = None
         """The condition that failed."""
         self.failure = ""
         """What became of it, in words."""
@@ -97,7 +97,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._node: AttachedNode | None = None
         self._answer: dict[str, float] = {}
         self._alarms: dict[str, float] = {}
-        self._standing: list[Watch] = []
+        self._standing: list[GuardProbe] = []
         self._signals: dict[str, float] = {}
         self._look()
 
@@ -198,12 +198,12 @@ class Scenario(AbstractContextManager["Scenario"]):
         For what a scenario needs to begin with; raises AssertionError if it takes more than `within` seconds.
         """
         __tracebackhide__ = True
-        return self._wait(Watch(condition, "run_until", self.time), within)
+        return self._wait(GuardProbe(condition, "run_until", self.time), within)
 
     def eventually(self, condition: Condition, within: float) -> float:
         """Assert that a condition comes true within so many seconds, let them pass until then; returns how many."""
         __tracebackhide__ = True
-        return self._wait(Watch(condition, "eventually", self.time), within)
+        return self._wait(GuardProbe(condition, "eventually", self.time), within)
 
     def always(self, condition: Condition, for_: float | None = None) -> None:
         """Assert that a condition is true now and at every tick of the next `for_` seconds, and let them pass.
@@ -211,14 +211,14 @@ class Scenario(AbstractContextManager["Scenario"]):
         for_: None: lets no time pass, and asserts it at every tick of whatever is run later.
         """
         __tracebackhide__ = True
-        self._hold(Watch(condition, "always", self.time), for_)
+        self._hold(GuardProbe(condition, "always", self.time), for_)
 
     def never(self, condition: Condition, for_: float | None = None) -> None:
         """Assert that a condition is true at no tick, as `always` does."""
         __tracebackhide__ = True
-        self._hold(Watch(condition, "never", self.time), for_)
+        self._hold(GuardProbe(condition, "never", self.time), for_)
 
-    def _hold(self, watch: Watch, for_: float | None) -> None:
+    def _hold(self, watch: GuardProbe, for_: float | None) -> None:
         __tracebackhide__ = True
         self._check(watch)
         self._standing.append(watch)
@@ -226,7 +226,7 @@ class Scenario(AbstractContextManager["Scenario"]):
             self.run_for(for_)
             self._standing.remove(watch)
 
-    def _wait(self, watch: Watch, within: float) -> float:
+    def _wait(self, watch: GuardProbe, within: float) -> float:
         __tracebackhide__ = True
         first, last = self.simulation.tick, self.simulation.tick + self._ticks(within)
         while not self._true(watch, present := self.signals):
@@ -236,7 +236,7 @@ class Scenario(AbstractContextManager["Scenario"]):
             self._step()
         return round((self.simulation.tick - first) * self.scene.tick, 9)
 
-    def _check(self, watch: Watch) -> None:
+    def _check(self, watch: GuardProbe) -> None:
         __tracebackhide__ = True
         unwanted = watch.word == "never"
         if self._true(watch, present := self.signals) is unwanted:
@@ -244,12 +244,12 @@ class Scenario(AbstractContextManager["Scenario"]):
             when = f"at {self.time:.2f} s (tick {self.simulation.tick}){after}"
             self._fail(watch, f"{watch.text} was {str(unwanted).lower()} {when}", present)
 
-    def _true(self, watch: Watch, present: Present) -> bool:
+    def _true(self, watch: GuardProbe, present: Present) -> bool:
         true = bool(watch.condition(present))
         self._read = {**present.read, **self._read}
         return true
 
-    def _fail(self, watch: Watch, head: str, present: Present) -> NoReturn:
+    def _fail(self, watch: GuardProbe, head: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
         self.failed, self.failure = watch, head
         raise AssertionError(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")

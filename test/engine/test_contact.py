@@ -127,9 +127,9 @@ def test_a_share_scales_the_whole_law() -> None:
 
 def test_implicit_friction_takes_the_slip_after_the_step() -> None:
     """T dt/m_t is what the slip loses: s + b v_lim p(s) = s_0 with mu N p(s) = -T."""
-    ease, slip = 5e-4, 0.6 * LIMIT
-    normal, tangential = force(0.002, 0.5, slip, implicit=(ease, 0.0), stiffness=K, friction=MU, damping_normal=C)
-    after = slip + ease * tangential
+    compliance, slip = 5e-4, 0.6 * LIMIT
+    normal, tangential = force(0.002, 0.5, slip, implicit=(compliance, 0.0), stiffness=K, friction=MU, damping_normal=C)
+    after = slip + compliance * tangential
     assert 0.0 < after < slip
     assert -tangential == pytest.approx(MU * normal * (2.0 * after / LIMIT - (after / LIMIT) ** 2))
 

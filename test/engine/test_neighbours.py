@@ -8,8 +8,8 @@ import pytest
 from scenes import RADIUS, arc, bottle, contact, kind, polyline, scene, segment
 from worlds import FAR, nearest_on_arc, nearest_on_segment, rail_scene, state_of
 
-from conveyor_sim.engine.fewer import lists_of
 from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
+from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.state import State
 from conveyor_sim.state.empty_world import empty_pairs
 

@@ -18,8 +18,8 @@ from worlds import (
     rail_scene,
 )
 
-from conveyor_sim.engine.rails.keep import keep_deepest
-from conveyor_sim.engine.threads.team import MOST_CONTACTS
+from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
+from conveyor_sim.engine.threads.workers import MOST_CONTACTS
 from conveyor_sim.model import build_model
 
 RANDOM = np.random.default_rng(20240229)

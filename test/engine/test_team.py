@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scenes import base, belt, contact, kind, polyline, scene
 
-from conveyor_sim.engine.threads.crew import Crew
-from conveyor_sim.engine.threads.team import BLOCK
+from conveyor_sim.engine.threads.thread_pool import ThreadPool
+from conveyor_sim.engine.threads.workers import BLOCK
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -82,35 +82,35 @@ def test_the_number_may_change_from_tick_to_tick() -> None:
     given = crowd()
     one, other = Simulation(given, threads=1), Simulation(given, threads=3)
     one.advance(9)
-    crew, sizes = other._integration._crew, [1, 3, 2, 2, 1, 3, 1, 2, 3]
+    pool, sizes = other._integration._pool, [1, 3, 2, 2, 1, 3, 1, 2, 3]
     for size in sizes:
         steps = other.model.steps_per_tick
         other._line.begin(other.tick)
-        assert crew.advance(size, other._integration._advance, other._state.world, steps, other.model.dt, 0) == steps
+        assert pool.advance(size, other._integration._advance, other._state.world, steps, other.model.dt, 0) == steps
         other.tick += 1
     assert other.state_hash() == one.state_hash()
 
 
 def test_a_team_has_a_size() -> None:
-    with pytest.raises(ValueError, match="a team of 3 threads, expected 1 to 2"):
-        Crew(2).team(3)
+    with pytest.raises(ValueError, match="a group of 3 threads, expected 1 to 2"):
+        ThreadPool(2).group(3)
     with pytest.raises(ValueError, match="threads: 0, expected 1 or more"):
         Simulation(crowd(), threads=0)
 
 
 def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
-    """What a worker raises reaches the caller; the next call finds a new team."""
+    """What a worker raises reaches the caller; the next call finds a new group."""
 
-    def failing(_world: Any, member: Any, _steps: int, _dt: float, _phase: int) -> int:
-        if member.rank > 0:
+    def failing(_world: Any, worker: Any, _steps: int, _dt: float, _phase: int) -> int:
+        if worker.rank > 0:
             raise ArithmeticError("rank 1")
         return 0
 
     sim = Simulation(crowd(), threads=2)
-    crew, world = sim._integration._crew, sim._state.world
-    crew._entries[failing] = failing
+    pool, world = sim._integration._pool, sim._state.world
+    pool._entries[failing] = failing
     with pytest.raises(ArithmeticError, match="rank 1"):
-        crew.advance(2, failing, world, 1, 1e-5, 0)
+        pool.advance(2, failing, world, 1, 1e-5, 0)
     other = Simulation(crowd(), threads=1)
     sim.advance(3)
     other.advance(3)
@@ -118,12 +118,12 @@ def test_a_thread_that_fails_is_heard_and_the_crew_goes_on() -> None:
 
 
 def test_a_process_of_another_number_has_threads_of_its_own() -> None:
-    """A fork copies queues, not threads: a crew that finds itself in a child must not wait for those of the parent."""
+    """A fork copies queues, not threads: a pool that finds itself in a child must not wait for those of the parent."""
     sim, other = Simulation(crowd(), threads=2), Simulation(crowd(), threads=1)
     sim.advance(2)
-    tasks = list(sim._integration._crew._tasks)
-    sim._integration._crew._process = -1  # as a child sees it
+    tasks = list(sim._integration._pool._tasks)
+    sim._integration._pool._process = -1  # as a child sees it
     sim.advance(1)
-    assert sim._integration._crew._tasks[0] is not tasks[0]
+    assert sim._integration._pool._tasks[0] is not tasks[0]
     other.advance(3)
     assert sim.state_hash() == other.state_hash()

@@ -69,11 +69,19 @@ def test_contacts(names: list[str], atan: bool, spring: bool, implicit: bool) ->
 
     @compiled
     def loop(
-        count: int, law: Any, atan: Any, overlap: Any, closing: Any, slip: Any, elongation: Any, ease: Any, found: Any
+        count: int,
+        law: Any,
+        atan: Any,
+        overlap: Any,
+        closing: Any,
+        slip: Any,
+        elongation: Any,
+        compliance: Any,
+        found: Any,
     ) -> None:
         for c in range(uint64(count)):
             normal, tangential = contact_force(
-                law, c, None, 0.01, atan, overlap[c], 1.0, closing[c], slip[c], at(elongation, c), both(ease, c)
+                law, c, None, 0.01, atan, overlap[c], 1.0, closing[c], slip[c], at(elongation, c), both(compliance, c)
             )
             found[c] = normal
             found[c + uint64(COUNT)] = tangential
@@ -101,10 +109,10 @@ def at(values: Any, c: int) -> Any:
 
 
 @compiled
-def both(ease: Any, c: int) -> Any:
-    if ease is None:
+def both(compliance: Any, c: int) -> Any:
+    if compliance is None:
         return None
-    return ease[c], 0.5
+    return compliance[c], 0.5
 
 
 def test_tangential_springs() -> None:

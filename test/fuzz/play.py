@@ -13,7 +13,7 @@ from itertools import cycle
 from pathlib import Path
 
 from fuzz.case import Case
-from fuzz.invariants import Sent, Watch
+from fuzz.invariants import GuardProbe, Sent
 from fuzz.violation import Violation
 
 from conveyor_sim.bag.outputs import Outputs
@@ -189,7 +189,7 @@ def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched
     recorder = Recorder(bag) if bag is not None else None
     outputs = Outputs(simulation, [] if recorder is None else [recorder], run_id="fuzz")
     outputs.start()
-    watch, sent = Watch(simulation), by_tick(case)
+    watch, sent = GuardProbe(simulation), by_tick(case)
     seen = _Watched([], [], "", simulation.counts.present, 0, 0)
     while simulation.tick < ticks and not seen.stopped:
         now = sent.get(simulation.tick, [])

@@ -12,7 +12,7 @@ from fuzz.case import Case, cases, load_case
 from fuzz.commands import Command
 from fuzz.crossing import crossed
 from fuzz.families import CI_FAMILIES, Family, random_family
-from fuzz.invariants import Sent, Watch
+from fuzz.invariants import GuardProbe, Sent
 from fuzz.play import failure_kind, play
 from fuzz.violation import Violation
 from fuzz.wrong import judge, wrong_texts
@@ -110,7 +110,7 @@ class Passing(Simulation):
 
 def test_a_bottle_through_a_rail_is_noticed() -> None:
     simulation = Passing(parse_scene(small().scene_text))
-    watch = Watch(simulation)
+    watch = GuardProbe(simulation)
     with pytest.raises(Violation, match="through a rail"):
         for _ in range(5):
             simulation.advance()
@@ -152,7 +152,7 @@ class Misread(Simulation):
 def test_a_signal_that_is_wrong_is_noticed(signal: str, by: float, kind: str) -> None:
     simulation = Misread(parse_scene(small(**DEVICES).scene_text))
     simulation.signal, simulation.by = signal, by
-    watch = Watch(simulation)
+    watch = GuardProbe(simulation)
     found = ""
     try:
         for _ in range(7):
@@ -170,7 +170,7 @@ def test_a_drive_that_does_not_ramp_is_noticed() -> None:
     simulation = Simulation(
         parse_scene(small(belts={"b": belt}, base=[{"between": ["glass", "chain"], "friction": 0.1}]).scene_text)
     )
-    watch = Watch(simulation)
+    watch = GuardProbe(simulation)
     sent: Sent = [(("belts/b/cmd_speed",), (1.0,), False)]
     simulation.command(*sent[0][:2])
     simulation.advance()
@@ -182,7 +182,7 @@ def test_a_drive_that_does_not_ramp_is_noticed() -> None:
 
 def test_a_bottle_that_is_nowhere_is_noticed() -> None:
     simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
-    watch = Watch(simulation)
+    watch = GuardProbe(simulation)
     simulation.displace(np.array([0.0, math.nan]), np.zeros(2))
     with pytest.raises(Violation, match="not finite"):
         watch.after_tick([], [])
@@ -190,7 +190,7 @@ def test_a_bottle_that_is_nowhere_is_noticed() -> None:
 
 def test_a_lost_bottle_is_noticed() -> None:
     simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
-    watch = Watch(simulation)
+    watch = GuardProbe(simulation)
     simulation._state.remove(0)
     simulation.advance()
     with pytest.raises(Violation, match="lost bottle"):

@@ -7,7 +7,7 @@ from scenes import NO_FLOOR, bottle, scene
 from worlds import state_of
 
 from conveyor_sim.line.beam import within_reach
-from conveyor_sim.line.device import Now
+from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.motion import CHORDS, Motion
 from conveyor_sim.line.timer import Timer
 
@@ -45,7 +45,7 @@ def test_a_way_is_the_cubic_through_its_ends() -> None:
     c = np.array([[0.1, 0.5, 3.0, -40.0], [0.3, -0.2, 1.0, 70.0], [0.7, 0.0, 0.0, 0.0]])
     h = 0.01
     state = state_of(scene(bottles=[bottle(9.0, 9.0)], **NO_FLOOR), [[x, 0.1] for x in c[:, 0]], lists=False)
-    now = Now(state, h, np.empty(0), np.empty(0))
+    now = ScanContext(state, h, np.empty(0), np.empty(0))
     bottles = state.world.bottles
     bottles.vx[:3] = c[:, 1]
     motion = Motion()

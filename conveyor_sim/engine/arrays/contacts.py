@@ -100,7 +100,7 @@ class Gathered(NamedTuple):
     """(BLOCK,), omega of i and of j together, rad/s."""
     rim: F8
     """(BLOCK,), R omega of i and of j together, m/s, where radii differ."""
-    ease: F8
+    compliance: F8
     """(BLOCK,), dt/m_t, s/kg, for the implicit solver."""
     way: F8
     """(4 * BLOCK,), how far j has gone less i, x and y (m), how far both have turned (rad), and their rims (m)."""
@@ -126,5 +126,5 @@ class Implicit(NamedTuple):
     """1/m + R^2/J, 1/kg."""
     closed: F8
     """Closed contacts of each bottle, its base among them."""
-    ease: F8
+    compliance: F8
     """dt times mobility times closed contacts, s/kg, times `Settings.ahead`."""

@@ -37,7 +37,7 @@ class RailBins(NamedTuple):
     arc_span: F8
     """(A,), rad"""
     work: F8
-    """(units, B), J, of the bottles of each unit (`team.py`), so that sums do not depend on who did which."""
+    """(units, B), J, of the bottles of each unit (`workers.py`), so that sums do not depend on who did which."""
     impulse: F8
     """(units, B), N s, likewise."""
 
@@ -104,7 +104,7 @@ class Damage(NamedTuple):
     tipping: Tipping | None
 
 
-class Borne(NamedTuple):
+class LoadHistory(NamedTuple):
     """Scratch: the closed contacts of one bottle, (MOST_BORNE,)."""
 
     nx: F8
@@ -121,7 +121,7 @@ class Borne(NamedTuple):
     """Bin of the rail; -1 for a bottle."""
 
 
-def borne() -> Borne:
+def borne() -> LoadHistory:
     """Room for the contacts of one bottle."""
 
     def reals() -> F8:
@@ -129,7 +129,7 @@ def borne() -> Borne:
 
     nx, ny, normal, tangential, slip, approach = (reals() for _ in range(6))
     key, place = np.zeros((2, MOST_BORNE), np.int64)
-    return Borne(nx, ny, normal, tangential, slip, approach, key, place)
+    return LoadHistory(nx, ny, normal, tangential, slip, approach, key, place)
 
 
 def worst_columns(damage: Damage) -> Iterator[Worst]:

@@ -75,7 +75,7 @@ class Linear(NamedTuple):
     product: Triple
     """The matrix times `way`; then the inverse blocks times `left`."""
     left_sum: F8
-    """(units,), part of a sum for each unit of bottles (`team.py`)."""
+    """(units,), part of a sum for each unit of bottles (`workers.py`)."""
     way_sum: F8
     """(units,), likewise."""
     most: F8

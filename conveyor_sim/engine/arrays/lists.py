@@ -6,7 +6,7 @@ from conveyor_sim.engine.arrays.types import F8, I8, U4
 
 
 class Listed(NamedTuple):
-    """Some of the bottles, in order; those of the u-th unit (`team.py`) are bottle[first[u]:first[u + 1]]."""
+    """Some of the bottles, in order; those of the u-th unit (`workers.py`) are bottle[first[u]:first[u + 1]]."""
 
     bottle: U4
     first: U4

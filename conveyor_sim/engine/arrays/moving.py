@@ -38,8 +38,8 @@ class Actuators(NamedTuple):
     acceleration: F8
     """In the last step off the profile."""
     push: F8
-    """(units, Q, 1), N or N m, of the bottles of a unit (`team.py`) on a rail in the last evaluation; with the energy
-    ledger (units, Q, 3), beside it what damping and what friction have of it.
+    """(units, Q, 1), N or N m, of the bottles of a unit (`workers.py`) on a rail in the last evaluation; with the
+    energy ledger (units, Q, 3), beside it what damping and what friction have of it.
     """
 
 

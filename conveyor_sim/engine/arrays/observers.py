@@ -16,7 +16,7 @@ class Ledger(NamedTuple):
     base: Triple
     """(S,), likewise of what it stands on."""
     belt_power: F8
-    """(units, H + 1), W, of each belt on a unit of bottles (`team.py`) in the last evaluation; the floor is last."""
+    """(units, H + 1), W, of each belt on a unit of bottles (`workers.py`) in the last evaluation; the floor is last."""
     rail_power: F8 | None
     """(units, Q + 2), W, of each moving rail, then what damping and friction take of it; None where no rail moves."""
     power: F8
@@ -25,8 +25,8 @@ class Ledger(NamedTuple):
     """(units, BELTS + H + 1 + Q), J, the accounts, since the start."""
 
 
-class Watch(NamedTuple):
-    """The deepest overlaps since the guard last looked (`watch.py`): of two bottles, and of a bottle with a rail."""
+class GuardProbe(NamedTuple):
+    """The deepest overlaps since the guard last looked: of two bottles, and of a bottle with a rail."""
 
     depth: F8
     """(2,), over the (smaller) radius."""

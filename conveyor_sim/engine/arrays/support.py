@@ -60,7 +60,7 @@ class Footing(NamedTuple):
     ux: F8
     uy: F8
     turn: F8 | None
-    pull: F8
+    friction_limit: F8
     """mu m g, N; 0 where a ring may straddle belts and is summed point by point."""
 
 

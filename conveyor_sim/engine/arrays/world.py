@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves, Gathered, Implicit, Pairs, Slots
-from conveyor_sim.engine.arrays.damage import Borne, Damage
+from conveyor_sim.engine.arrays.damage import Damage, LoadHistory
 from conveyor_sim.engine.arrays.integrators import Linear, Slopes, Stage, Triple
 from conveyor_sim.engine.arrays.lists import Listed, Near, Neighbourhood, StaticGrid
 from conveyor_sim.engine.arrays.moving import MovingRails
-from conveyor_sim.engine.arrays.observers import Ledger, Watch
+from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import I8
@@ -55,7 +55,7 @@ class World(NamedTuple):
     linear: Linear | None
     implicit: Implicit | None
     neighbourhood: Neighbourhood
-    watch: Watch
+    probe: GuardProbe
     pairs: Pairs | None
     slots: Slots | None
     pair_law: ContactLaw | None
@@ -78,8 +78,8 @@ class World(NamedTuple):
     damage: Damage | None
 
 
-class Member(NamedTuple):
-    """One of the threads that take steps together, with its scratch; explained in `team.py`."""
+class Worker(NamedTuple):
+    """One of the threads that take steps together, with its scratch; explained in `workers.py`."""
 
     rank: int
     size: int
@@ -87,4 +87,4 @@ class Member(NamedTuple):
     """(SYNC_SIZE,), shared: counts of the barrier and flags."""
     gathered: Gathered
     found: RailContacts
-    borne: Borne
+    borne: LoadHistory

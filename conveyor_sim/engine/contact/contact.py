@@ -145,8 +145,8 @@ def _tangential_stiffness(stiffness: Any, mindlin: Any, e: int, depth: float) ->
 def _curve_share(most: float, slip: float, slip_limit: float, atan: Any, implicit: Any) -> float:
     if implicit is None:
         return friction_share(slip, slip_limit, atan)
-    ease, at_once = implicit
-    b = most * ease * (1.0 / slip_limit) - at_once
+    compliance, at_once = implicit
+    b = most * compliance * (1.0 / slip_limit) - at_once
     return implicit_share(slip, 0.0 if b < 0.0 else b, slip_limit, atan)
 
 

@@ -22,11 +22,11 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
-from conveyor_sim.engine.arrays.world import Member, Settings
+from conveyor_sim.engine.arrays.world import Settings, Worker
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
 from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
-from conveyor_sim.engine.threads.team import BLOCK, share
+from conveyor_sim.engine.threads.workers import BLOCK, share
 
 # Unsigned and known to the compiler: a signed index would be tested for wrapping round, and a lane would not be one.
 _1, _2, _3, _4 = uint64(1), uint64(2), uint64(3), uint64(4)
@@ -58,22 +58,22 @@ def pair_forces(
     pairs: Any,
     curves: Any,
     implicit: Any,
-    member: Member,
+    worker: Worker,
     spring_dt: float,
 ) -> None:
-    """Find the forces and moments of this member's share of the pairs, from `bottles.packed` and `spin.omega`.
+    """Find the forces and moments of this worker's share of the pairs, from `bottles.packed` and `spin.omega`.
 
     path, spring_dt: how far the tangential springs are taken along (`pair_phase`).
     """
     if pairs is None:
         return
-    begin, stop = share(member, pairs.used[0])
+    begin, stop = share(worker, pairs.used[0])
     for start in range(begin, stop, BLOCK):
         first: Any = uint64(start)
         count: Any = uint64(min(BLOCK, stop - start))
-        _gather(bottles.packed, spin, pairs, pairs.reach, first, count, member.gathered)
-        _gather_ease(implicit, pairs, first, count, member.gathered.ease)
-        _gather_ways(path, pairs, pairs.reach, first, count, member.gathered.way)
+        _gather(bottles.packed, spin, pairs, pairs.reach, first, count, worker.gathered)
+        _gather_compliance(implicit, pairs, first, count, worker.gathered.compliance)
+        _gather_ways(path, pairs, pairs.reach, first, count, worker.gathered.way)
         _law(
             settings,
             settings.atan,
@@ -86,7 +86,7 @@ def pair_forces(
             pairs.spring,
             curves,
             implicit,
-            member.gathered,
+            worker.gathered,
             first,
             count,
             spring_dt,
@@ -125,11 +125,11 @@ def _gather_rims(spin: Any, pairs: Pairs, reach: Any, first: int, count: int, ri
 
 
 @part
-def _gather_ease(implicit: Any, pairs: Pairs, first: int, count: int, ease: Any) -> None:
+def _gather_compliance(implicit: Any, pairs: Pairs, first: int, count: int, compliance: Any) -> None:
     if implicit is None:
         return
     for c in range(count):
-        ease[c] = implicit.ease[pairs.i[first + c]] + implicit.ease[pairs.j[first + c]]
+        compliance[c] = implicit.compliance[pairs.i[first + c]] + implicit.compliance[pairs.j[first + c]]
 
 
 @part
@@ -200,7 +200,7 @@ def _law(
             closing,
             slip,
             stretched(spring, slip, slip_time),
-            _ease(settings, implicit, gathered, c),
+            _compliance(settings, implicit, gathered, c),
         )
         fx = -normal * nx - tangential * ny
         fy = tangential * nx - normal * ny
@@ -296,18 +296,18 @@ def _rims_way(settings: Settings, reach: Any, way: Any, row: int, shorter: float
 
 
 @part
-def _ease(settings: Settings, implicit: Any, gathered: Any, c: int) -> Any:
+def _compliance(settings: Settings, implicit: Any, gathered: Any, c: int) -> Any:
     if implicit is None:
         return None
-    return gathered.ease[c], settings.at_once
+    return gathered.compliance[c], settings.at_once
 
 
 @part
-def find_touching(settings: Settings, bottles: Bottles, pairs: Any, member: Member) -> None:
-    """Note in `pairs.touch` which of this member's share of the pairs are closed; for the implicit solver."""
+def find_touching(settings: Settings, bottles: Bottles, pairs: Any, worker: Worker) -> None:
+    """Note in `pairs.touch` which of this worker's share of the pairs are closed; for the implicit solver."""
     if pairs is None:
         return
-    begin, stop = share(member, pairs.used[0])
+    begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
         i, j = uint64(pairs.i[p]) * _4, uint64(pairs.j[p]) * _4
         dx = bottles.packed[j] - bottles.packed[i]

@@ -12,9 +12,9 @@ from numba import uint64
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.integrators import Stage
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.arrays.world import Member
+from conveyor_sim.engine.arrays.world import Worker
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.threads.team import share
+from conveyor_sim.engine.threads.workers import share
 
 
 @part
@@ -48,14 +48,14 @@ def note_stage(
 
 
 @part
-def forget_path(path: Any, moving: Any, member: Member) -> None:
+def forget_path(path: Any, moving: Any, worker: Worker) -> None:
     """Springs are as long as they were kept. Seen by all after the next `wait_for_all`."""
     if path is None:
         return
-    begin, stop = share(member, path.x.size)
+    begin, stop = share(worker, path.x.size)
     for i in range(begin, stop):
         path.x[i] = path.y[i] = path.turn[i] = 0.0
-    if member.rank == 0:
+    if worker.rank == 0:
         _forget_rails(moving)
 
 

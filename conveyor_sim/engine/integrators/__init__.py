@@ -1,19 +1,19 @@
-"""Time integrators, one a file, each a function ``advance(world, member, steps, dt, phase) -> whole steps done``.
+"""Time integrators, one a file, each a function ``advance(world, worker, steps, dt, phase) -> whole steps done``.
 
 ``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set: a neighbour list
 did not fit. The caller then grows and rebuilds it and calls again with RESUME for the rest; the bits are those of an
-uninterrupted tick. Every member of a team calls it alike (`team.py`).
+uninterrupted tick. Every worker of a group calls it alike (`workers.py`).
 """
 
 from collections.abc import Callable
 
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.integrators import dormand_prince, linearly_implicit, rk4, semi_implicit_euler, velocity_verlet
 from conveyor_sim.engine.integrators.phase import RESUME, START
 
 __all__ = ["INTEGRATORS", "RESUME", "START", "Advance"]
 
-Advance = Callable[[World, Member, int, float, int], int]
+Advance = Callable[[World, Worker, int, float, int], int]
 
 INTEGRATORS: dict[str, Advance] = {
     "leapfrog": semi_implicit_euler.advance,

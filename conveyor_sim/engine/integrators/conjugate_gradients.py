@@ -14,11 +14,11 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, Triple
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.slots import sum_slots
 from conveyor_sim.engine.integrators.tangent_pairs import resist_pairs
-from conveyor_sim.engine.threads.team import UNIT, share, wait_for_all
+from conveyor_sim.engine.threads.workers import UNIT, share, wait_for_all
 
 RELATIVE = 1e-8
 """Of the largest kick that the forces alone would give in the step: what may be left of it."""
@@ -62,24 +62,24 @@ def begin_search(bottles: Bottles, spin: Any, load: Load, linear: Linear, dt: fl
 
 
 @part
-def search(world: World, member: Member, small: float) -> bool:
-    """Find `linear.change`; True if what is left is small enough. All must have begun; every member calls it alike."""
+def search(world: World, worker: Worker, small: float) -> bool:
+    """Find `linear.change`; True if what is left is small enough. All must have begun; every worker calls it alike."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
-    begin, stop = share(member, bottles.x.size)
+    begin, stop = share(worker, bottles.x.size)
     most = largest_kick(linear)
     before, beta, rounds = _total(linear.left_sum), 0.0, 0
     while most > small and rounds < MOST_ROUNDS:
-        resist_pairs(world.pairs, linear.product, linear.way, beta, member)
-        wait_for_all(member)
+        resist_pairs(world.pairs, linear.product, linear.way, beta, worker)
+        wait_for_all(worker)
         for first in range(begin, stop, UNIT):
             _go_on(world.pairs, world.slots, linear, beta, first, min(first + UNIT, stop))
-        wait_for_all(member)
+        wait_for_all(worker)
         alpha = before / _total(linear.way_sum)
         for first in range(begin, stop, UNIT):
             _step(linear, alpha, first, min(first + UNIT, stop))
             _look_back(bottles, world.spin, linear, first, min(first + UNIT, stop))
-        wait_for_all(member)
+        wait_for_all(worker)
         after = _total(linear.left_sum)
         beta, before = after / before, after
         most = _largest(linear.most)

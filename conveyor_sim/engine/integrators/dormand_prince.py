@@ -27,10 +27,9 @@ import numpy as np
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack
-from conveyor_sim.engine.fewer import for_forces
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, watch_rebuilt
 from conveyor_sim.engine.integrators.phase import RESUME
@@ -46,7 +45,8 @@ from conveyor_sim.engine.integrators.runge_kutta import (
 )
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
-from conveyor_sim.engine.threads.team import BLOCK, share, wait_for_all
+from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
+from conveyor_sim.engine.world_views import for_forces
 
 STAGES = 7
 LAST = STAGES - 1
@@ -87,7 +87,7 @@ MOST = 1_000_000
 
 
 @kernel
-def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds, each in substeps; return how many were finished (see the package's docstring).
 
     What is not a number even in the shortest substep, or takes more than MOST of them, ends the call as if all were
@@ -96,17 +96,17 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     bottles, allowed = world.bottles, max(world.settings.error, LEAST)
     line = for_forces(world)
     slopes: Any = world.slopes
-    begin, stop = share(member, bottles.x.size)
+    begin, stop = share(worker, bottles.x.size)
     stage, h, left, tried = 0, dt, dt, 0
     if phase == RESUME:
         stage, h, left, tried = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2], int(slopes.progress[3])
     taken = 0
-    pack_all(line, member)
+    pack_all(line, worker)
     while taken < steps:
-        pair_phase(line, member, h, 0.0)
+        pair_phase(line, worker, h, 0.0)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, member, h, 0.0, first, end)
+            bottle_forces(line, worker, h, 0.0, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             if stage == 0:
@@ -115,7 +115,7 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             if stage == LAST:
                 _note_errors(bottles.radius, world.spin, slopes, h, first, end)
         if stage == LAST:
-            wait_for_all(member)
+            wait_for_all(worker)
             worst = _largest(slopes.error)
             tried += 1
             if tried > MOST:
@@ -126,9 +126,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                     _accept(world, slopes, h, first, end)
                     if worst == math.inf:
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
-                note_damage(world, member, h)
+                note_damage(world, worker, h)
                 left -= h
-                watch_rebuilt(line, member)
+                watch_rebuilt(line, worker)
                 if left == 0.0:
                     left = dt
                     taken += 1
@@ -145,9 +145,9 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
             if stage == LAST:
                 come_to_rest(bottles, world.spin, first, end)
             pack(bottles, first, end)
-            note_moved(line, member, first, end)
-        if not lists_hold(line, member):
-            if member.rank == 0:
+            note_moved(line, worker, first, end)
+        if not lists_hold(line, worker):
+            if worker.rank == 0:
                 slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = stage, h, left, tried
             return taken
     return taken

@@ -1,12 +1,12 @@
 """Linearly implicit: forces are taken ahead in the step, made linear in the change of velocity, which is solved for.
 
-    (M + lean^2 h^2 K + lean h C) dv = h F(r + lean h v, v),  r += h (v + lean dv),  v += dv     (`tangent.py`)
+    (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v),  r += h (v + theta dv),  v += dv     (`tangent.py`)
 
-Where a step resolves the stiffest contact, lean is 1/2, the implicit midpoint rule: order 2 where forces are smooth and
-through friction, at first touch every method's: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with Hertz
-(RMS over 64 phases: 1.00, 1.00, 2.00, 2.52; through friction 2.00). In longer steps lean goes to 1, implicit Euler,
-and the system is solved again about its own solution up to PASSES times, for contacts close and open: impacts are then
-lost within a step, but packings and queues stay stable and press with the right forces, at any step.
+Where a step resolves the stiffest contact, theta is 1/2, the implicit midpoint rule: order 2 where forces are smooth
+and through friction, at first touch every method's: 1 with a dashpot, clamped or not, 2 without, 2.5 in velocity with
+Hertz (RMS over 64 phases: 1.00, 1.00, 2.00, 2.52; through friction 2.00). In longer steps theta goes to 1, implicit
+Euler, and the system is solved again about its own solution up to PASSES times, for contacts close and open: impacts
+are then lost within a step, but packings and queues stay stable and press with the right forces, at any step.
 
 A system is solved by conjugate gradients (`conjugate_gradients.py`).
 """
@@ -18,10 +18,9 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.slots import sum_pair_forces
-from conveyor_sim.engine.fewer import for_forces
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.conjugate_gradients import (
     LEAST,
@@ -41,7 +40,8 @@ from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book, note_powers
 from conveyor_sim.engine.support.base import add_base_friction
 from conveyor_sim.engine.support.footing import check_footing
-from conveyor_sim.engine.threads.team import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
+from conveyor_sim.engine.threads.workers import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
+from conveyor_sim.engine.world_views import for_forces
 
 PASSES = 10
 """Of a step longer than a contact, at most; what is left of the impulses then is kept, so that momentum is."""
@@ -51,54 +51,54 @@ ENOUGH = 1e-4
 
 
 @kernel
-def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
     line = for_forces(world)
     linear: Any = world.linear
-    begin, stop = share(member, bottles.x.size)
+    begin, stop = share(worker, bottles.x.size)
     for step in range(steps):
-        note_damage(world, member, dt)
+        note_damage(world, worker, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             _begin(bottles, linear, first, end)
             _look_ahead(world, dt, 0.0, first, end)
-        squared = dt * dt * _stiffest(world, member)
-        lean = _lean(squared)
+        squared = dt * dt * _stiffest(world, worker)
+        theta = _lean(squared)
         small = enough = 0.0
-        for again in range(PASSES if lean > 0.5 else 1):
+        for again in range(PASSES if theta > 0.5 else 1):
             for first in range(begin, stop, BLOCK):
-                _look_ahead(world, lean * dt, lean, first, min(first + BLOCK, stop))
-            wait_for_all(member)
+                _look_ahead(world, theta * dt, theta, first, min(first + BLOCK, stop))
+            wait_for_all(worker)
             linear_pairs(
-                world.settings, bottles, world.spin, linear, world.pairs, world.curves, member, dt, lean, again
+                world.settings, bottles, world.spin, linear, world.pairs, world.curves, worker, dt, theta, again
             )
-            wait_for_all(member)
+            wait_for_all(worker)
             for first in range(begin, stop, BLOCK):
-                _assemble(world, member, dt, lean, first, min(first + BLOCK, stop))
-            wait_for_all(member)
+                _assemble(world, worker, dt, theta, first, min(first + BLOCK, stop))
+            wait_for_all(worker)
             most = largest_kick(linear)
             if again == 0:
                 small, enough = max(RELATIVE * most, LEAST), max(ENOUGH * most, LEAST * (1.0 + 10.0 * squared))
             elif not most > enough:
                 break
-            if search(world, member, small):
+            if search(world, worker, small):
                 for first in range(begin, stop, BLOCK):
                     kick_with_rest(bottles, world.spin, linear, first, min(first + BLOCK, stop))
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            _move(bottles, linear, dt, lean, first, end)
-            _turn(world.spin, linear, dt, lean, first, end)
+            _move(bottles, linear, dt, theta, first, end)
+            _turn(world.spin, linear, dt, theta, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
             # Half of what other methods allow: bottles are looked for as far ahead again.
             if moved_too_far(bottles, world.neighbourhood, 0.5 * world.settings.skin, first, end) or _fast(
                 bottles, 0.25 * world.settings.skin / dt, first, end
             ):
-                raise_flag(member, MOVED)
-        _book_solution(world, linear, world.ledger, member, dt, lean)
-        if not lists_hold(line, member):
+                raise_flag(worker, MOVED)
+        _book_solution(world, linear, world.ledger, worker, dt, theta)
+        if not lists_hold(line, worker):
             return step + 1
-        watch_rebuilt(line, member)
+        watch_rebuilt(line, worker)
     return steps
 
 
@@ -111,13 +111,13 @@ def _begin(bottles: Bottles, linear: Linear, first: int, end: int) -> None:
 
 
 @part
-def _look_ahead(world: World, time: float, lean: float, first: int, end: int) -> None:
+def _look_ahead(world: World, time: float, theta: float, first: int, end: int) -> None:
     """Put bottles where they would be after some time (s), but no farther than the lists hold."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
     far = 0.25 * world.settings.skin
     for i in range(uint64(first), uint64(end)):
-        vx, vy = bottles.vx[i] + lean * linear.change.x[i], bottles.vy[i] + lean * linear.change.y[i]
+        vx, vy = bottles.vx[i] + theta * linear.change.x[i], bottles.vy[i] + theta * linear.change.y[i]
         way = time * math.sqrt(vx * vx + vy * vy)
         allowed = max(far, time * math.sqrt(bottles.vx[i] * bottles.vx[i] + bottles.vy[i] * bottles.vy[i]))
         reached = time * (allowed / way if way > allowed else 1.0)
@@ -134,13 +134,13 @@ def _fast(bottles: Bottles, limit: float, first: int, end: int) -> bool:
 
 
 @part
-def _stiffest(world: World, member: Member) -> float:
+def _stiffest(world: World, worker: Worker) -> float:
     """The largest stiffness times mobility of all contacts, 1/s^2."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
-    begin, stop = share(member, bottles.x.size)
-    wait_for_all(member)
-    stiffest_pairs(world.settings, bottles, linear, world.pairs, world.curves, member)
+    begin, stop = share(worker, bottles.x.size)
+    wait_for_all(worker)
+    stiffest_pairs(world.settings, bottles, linear, world.pairs, world.curves, worker)
     for first in range(begin, stop, BLOCK):
         stiffest_rails(
             world.settings,
@@ -153,11 +153,11 @@ def _stiffest(world: World, member: Member) -> float:
             world.railed,
             world.rail_law,
             world.curves,
-            member.found,
+            worker.found,
             first,
             min(first + BLOCK, stop),
         )
-    wait_for_all(member)
+    wait_for_all(worker)
     most = _most_of_pairs(world.pairs)
     for unit in range(linear.most.size):
         most = linear.most[unit] if linear.most[unit] > most else most
@@ -181,7 +181,7 @@ def _lean(squared: float) -> float:
 
 
 @part
-def _assemble(world: World, member: Member, dt: float, lean: float, first: int, end: int) -> None:
+def _assemble(world: World, worker: Worker, dt: float, theta: float, first: int, end: int) -> None:
     """Make the blocks and the right-hand side of bottles first to end, and begin the search."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
@@ -201,9 +201,9 @@ def _assemble(world: World, member: Member, dt: float, lean: float, first: int, 
         world.railed,
         world.rail_law,
         world.curves,
-        member.found,
+        worker.found,
         dt,
-        lean,
+        theta,
         first,
         end,
     )
@@ -233,7 +233,7 @@ def _assemble(world: World, member: Member, dt: float, lean: float, first: int, 
         world.footing,
         world.ring,
         dt,
-        lean,
+        theta,
         first,
         end,
     )
@@ -275,31 +275,31 @@ def _copy_blocks(source: Blocks, target: Blocks, first: int, end: int) -> None:
 
 
 @part
-def _move(bottles: Bottles, linear: Linear, dt: float, lean: float, first: int, end: int) -> None:
+def _move(bottles: Bottles, linear: Linear, dt: float, theta: float, first: int, end: int) -> None:
     change = linear.change
     for i in range(uint64(first), uint64(end)):
-        bottles.x[i] = linear.x[i] + dt * (bottles.vx[i] + lean * change.x[i])
-        bottles.y[i] = linear.y[i] + dt * (bottles.vy[i] + lean * change.y[i])
+        bottles.x[i] = linear.x[i] + dt * (bottles.vx[i] + theta * change.x[i])
+        bottles.y[i] = linear.y[i] + dt * (bottles.vy[i] + theta * change.y[i])
         bottles.vx[i] = settle(bottles.vx[i] + change.x[i])
         bottles.vy[i] = settle(bottles.vy[i] + change.y[i])
 
 
 @part
-def _turn(spin: Any, linear: Linear, dt: float, lean: float, first: int, end: int) -> None:
+def _turn(spin: Any, linear: Linear, dt: float, theta: float, first: int, end: int) -> None:
     if spin is None:
         return
     for i in range(uint64(first), uint64(end)):
-        spin.theta[i] += dt * (spin.omega[i] + lean * linear.change.turn[i])
+        spin.theta[i] += dt * (spin.omega[i] + theta * linear.change.turn[i])
         spin.omega[i] = settle(spin.omega[i] + linear.change.turn[i])
 
 
 @part
-def _book_solution(world: World, linear: Linear, ledger: Any, member: Member, dt: float, lean: float) -> None:
+def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt: float, theta: float) -> None:
     """Book a step by what the laws exert where it took the forces: what linear ones differ by is its error."""
     if ledger is None:
         return
     bottles: Bottles = world.bottles
-    begin, stop = share(member, bottles.x.size)
+    begin, stop = share(worker, bottles.x.size)
     change, way, product = linear.change, linear.way, linear.product
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
@@ -308,14 +308,14 @@ def _book_solution(world: World, linear: Linear, ledger: Any, member: Member, dt
             way.x[i], way.y[i], product.x[i], product.y[i] = bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i]
             bottles.vx[i] -= change.x[i]
             bottles.vy[i] -= change.y[i]
-        _look_ahead(world, lean * dt, lean, first, end)
-        _set_velocities(bottles, world.spin, linear, 1.0 - lean, True, first, end)
+        _look_ahead(world, theta * dt, theta, first, end)
+        _set_velocities(bottles, world.spin, linear, 1.0 - theta, True, first, end)
     line = for_forces(world)
-    pack_all(line, member)
-    pair_phase(line, member, dt, 0.0)
+    pack_all(line, worker)
+    pair_phase(line, worker, dt, 0.0)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        bottle_forces(line, member, dt, 0.0, first, end)
+        bottle_forces(line, worker, dt, 0.0, first, end)
         _set_velocities(bottles, world.spin, linear, 0.5, False, first, end)
         note_powers(bottles, world.spin, world.load, ledger, 0.0, 0, first, end)
         book(ledger, 0, dt, first, end)

@@ -8,12 +8,12 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.fewer import for_lists
 from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
-from conveyor_sim.engine.observers.watch import watch_overlaps
-from conveyor_sim.engine.threads.team import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
+from conveyor_sim.engine.observers.guard_probe import watch_overlaps
+from conveyor_sim.engine.threads.workers import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
+from conveyor_sim.engine.world_views import for_lists
 
 TINY = 1e-100
 """m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
@@ -52,32 +52,32 @@ def _accumulate(largest: Any, sums: Any, peaks: Any, dt: float, first: int, end:
 
 
 @part
-def note_moved(world: World, member: Member, first: int, end: int) -> None:
+def note_moved(world: World, worker: Worker, first: int, end: int) -> None:
     """Raise the flag MOVED if a bottle of first to end has left the range for which the lists hold."""
     if moved_too_far(world.bottles, world.neighbourhood, world.settings.skin, first, end):
-        raise_flag(member, MOVED)
+        raise_flag(worker, MOVED)
 
 
 @part
-def lists_hold(world: World, member: Member) -> bool:
+def lists_hold(world: World, worker: Worker) -> bool:
     """Wait for all; rebuild the lists if a bottle has moved too far; False if they did not fit and must be grown."""
-    wait_for_all(member)
-    if flag_raised(member, MOVED):
-        wait_for_all(member)
-        if member.rank == 0:
-            lower_flag(member, MOVED)
+    wait_for_all(worker)
+    if flag_raised(worker, MOVED):
+        wait_for_all(worker)
+        if worker.rank == 0:
+            lower_flag(worker, MOVED)
             rebuild(for_lists(world))
-            world.watch.due[0] = 1
-        wait_for_all(member)
+            world.probe.due[0] = 1
+        wait_for_all(worker)
     return world.neighbourhood.stale[0] == 0
 
 
 @part
-def watch_rebuilt(world: World, member: Member) -> None:
-    """At the end of a step: look at the overlaps if the lists were made anew since the last look (`watch.py`)."""
-    if world.watch.due[0] != 0:
-        wait_for_all(member)
-        if member.rank == 0:
-            watch_overlaps(for_lists(world), member.found)
-            world.watch.due[0] = 0
-        wait_for_all(member)
+def watch_rebuilt(world: World, worker: Worker) -> None:
+    """At the end of a step: look at the overlaps if the lists were made anew since the last look (`guard_probe.py`)."""
+    if world.probe.due[0] != 0:
+        wait_for_all(worker)
+        if worker.rank == 0:
+            watch_overlaps(for_lists(world), worker.found)
+            world.probe.due[0] = 0
+        wait_for_all(worker)

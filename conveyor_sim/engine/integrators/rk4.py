@@ -18,11 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.contact.pairs import pack
 from conveyor_sim.engine.contact.path import forget_path, note_stage
-from conveyor_sim.engine.fewer import for_forces
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, watch_rebuilt
 from conveyor_sim.engine.integrators.phase import RESUME, START
@@ -38,7 +37,8 @@ from conveyor_sim.engine.integrators.runge_kutta import (
 )
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
-from conveyor_sim.engine.threads.team import BLOCK, share
+from conveyor_sim.engine.threads.workers import BLOCK, share
+from conveyor_sim.engine.world_views import for_forces
 
 STAGES = 4
 TIMES = np.array([0.0, 0.5, 0.5, 1.0, 1.0])
@@ -55,26 +55,26 @@ WAYS = ways_of(WEIGHTS)
 
 
 @kernel
-def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
     bottles = world.bottles
     line = for_forces(world)
     slopes: Any = world.slopes
-    begin, stop = share(member, bottles.x.size)
+    begin, stop = share(worker, bottles.x.size)
     stage = int(slopes.progress[0]) if phase == RESUME else 0
     taken = 0
     if phase == START:
-        forget_path(line.path, line.moving, member)
-    pack_all(line, member)
+        forget_path(line.path, line.moving, worker)
+    pack_all(line, worker)
     while True:
         if stage == 0 and taken < steps:
-            note_damage(world, member, dt)
+            note_damage(world, worker, dt)
         # Springs are as long as a stage's way draws them, and are cut and kept where a step ends.
         kept = dt if stage == 0 else 0.0
-        pair_phase(line, member, dt, kept)
+        pair_phase(line, worker, dt, kept)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, member, dt, kept, first, end)
+            bottle_forces(line, worker, dt, kept, first, end)
             if stage == 0:
                 note_peaks(world.load, world.peaks, first, end)
                 if taken == steps:
@@ -90,16 +90,16 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
                 book_stages(world.ledger, WEIGHTS, dt, first, end)
             pack(bottles, first, end)
-            note_moved(line, member, first, end)
+            note_moved(line, worker, first, end)
         if taken == steps:
             return steps
         stage += 1
         if stage == STAGES:
             stage = 0
             taken += 1
-        if not lists_hold(line, member):
-            if member.rank == 0:
+        if not lists_hold(line, worker):
+            if worker.rank == 0:
                 slopes.progress[0] = stage
             return taken
         if stage == 0:
-            watch_rebuilt(line, member)
+            watch_rebuilt(line, worker)

@@ -16,44 +16,44 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
-from conveyor_sim.engine.fewer import for_forces
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
 from conveyor_sim.engine.support.static_friction import carry_anchors
-from conveyor_sim.engine.threads.team import BLOCK, share
+from conveyor_sim.engine.threads.workers import BLOCK, share
+from conveyor_sim.engine.world_views import for_forces
 
 
 @kernel
-def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
     line = for_forces(world)
-    begin, stop = share(member, bottles.x.size)
-    place_rails(line.moving, member, dt)
-    pack_all(line, member)
+    begin, stop = share(worker, bottles.x.size)
+    place_rails(line.moving, worker, dt)
+    pack_all(line, worker)
     for step in range(steps):
-        note_damage(world, member, dt)
-        pair_phase(line, member, dt, dt)
+        note_damage(world, worker, dt)
+        pair_phase(line, worker, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, member, dt, dt, first, end)
+            bottle_forces(line, worker, dt, dt, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
             _move(bottles, world.load, dt, first, end)
             _turn(world.spin, dt, first, end)
             carry_anchors(world.footing, world.static_friction, dt, first, end)
             accumulate_peaks(world.load, world.peaks, dt, first, end)
-            note_moved(line, member, first, end)
-        hold = lists_hold(line, member)
-        pass_step(line.moving, line.ledger, member, dt, False)
+            note_moved(line, worker, first, end)
+        hold = lists_hold(line, worker)
+        pass_step(line.moving, line.ledger, worker, dt, False)
         if not hold:
             return step + 1
-        watch_rebuilt(line, member)
+        watch_rebuilt(line, worker)
     return steps
 
 

@@ -1,12 +1,12 @@
 """One contact as the linearly implicit method has it: its force ahead, and how it resists a change of velocity.
 
-A step of h from (r, v) changes v by dv and takes forces at r + lean h (v + lean dv) and v + lean dv, made linear in dv:
-    (M + lean^2 h^2 K + lean h C) dv = h F(r + lean h v, v)
+A step of h from (r, v) changes v by dv and takes forces at r + theta h (v + theta dv) and v + theta dv, linear in dv:
+    (M + theta^2 h^2 K + theta h C) dv = h F(r + theta h v, v)
 with K and C symmetric and nowhere negative: of each contact its stiffness along the normal, its damping, and the slope
 of its friction. The turning of normals and the change of friction with the normal force are left out; they are of a
 higher order. Slopes are differences of `contact_force`, so every law has them, and no law is written twice.
 
-In steps longer than a contact, lean > 1/2, three things differ, by `late` = 2 lean - 1:
+In steps longer than a contact, theta > 1/2, three things differ, by `late` = 2 theta - 1:
 - A contact that was closed before the step and is open ahead is held on to, or a packing at rest would come loose.
 - Friction takes the normal force from before the step: ahead, deep in each other, the bottles would press far too hard.
 - Friction and damping resist by their secant to rest, force over slip, where a step could otherwise turn a slip round.
@@ -41,7 +41,7 @@ def linear_contact(
     mobility: float,
     rim_mobility: float,
     dt: float,
-    lean: float,
+    theta: float,
     hold: bool,
 ) -> tuple[float, float, float, float, float]:
     """Return N and T (N) ahead, what resists dv along n and t (kg), and N before the step.
@@ -49,7 +49,7 @@ def linear_contact(
     before, ahead: m, overlaps; 0 or less: apart. share, closing, slip: as in `contact_force`. mobility, rim_mobility:
     1/kg, what closing speed and slip gain from a unit of impulse. dt: s, of the step.
     """
-    late = 2.0 * lean - 1.0
+    late = 2.0 * theta - 1.0
     least = DIFFERENCE * slip_limit
     speed = abs(slip) if abs(slip) > least else least
     faster = speed + least
@@ -67,19 +67,19 @@ def linear_contact(
     acts = 1.0 if normal != 0.0 else 0.0
     drag += late * (old - drag)
     drag_faster += late * (old_faster - drag_faster)
-    along = dt * dt * lean * lean * stiffness + resistance(dt * damping, dt * damping, lean, CONTACTS * mobility)
-    across = resistance(dt * (drag - drag_faster) / least, -dt * drag / speed, lean, CONTACTS * rim_mobility)
+    along = dt * dt * theta * theta * stiffness + resistance(dt * damping, dt * damping, theta, CONTACTS * mobility)
+    across = resistance(dt * (drag - drag_faster) / least, -dt * drag / speed, theta, CONTACTS * rim_mobility)
     return normal, drag * (slip / speed), acts * along, across, normal_before
 
 
 @part
-def resistance(slope: float, secant: float, lean: float, mobility: float) -> float:
+def resistance(slope: float, secant: float, theta: float, mobility: float) -> float:
     """What resists (kg), from a force's slope over velocity and its quotient by velocity, both times dt (kg).
 
-    Of the slope lean, the method's own, but so much of the secant that the step does not turn the velocity round.
+    Of the slope theta, the method's own, but so much of the secant that the step does not turn the velocity round.
     mobility: 1/kg, what the velocity gains from a unit of impulse, times the contacts that may act together.
     """
-    return lean * slope + firmness(secant * mobility) * (secant - lean * slope)
+    return theta * slope + firmness(secant * mobility) * (secant - theta * slope)
 
 
 @part

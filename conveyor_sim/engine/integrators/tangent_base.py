@@ -11,7 +11,7 @@ from conveyor_sim.engine.contact.friction import regularisation
 from conveyor_sim.engine.integrators.tangent import DIFFERENCE, firmness, resistance
 from conveyor_sim.engine.support.base import relative_velocity
 from conveyor_sim.engine.support.ring import ring_means, ring_share, straddling_ring
-from conveyor_sim.engine.threads.team import units
+from conveyor_sim.engine.threads.workers import units
 
 
 @part
@@ -25,7 +25,7 @@ def resist_base(
     footing: Any,
     ring: Any,
     dt: float,
-    lean: float,
+    theta: float,
     first: int,
     end: int,
 ) -> None:
@@ -34,14 +34,14 @@ def resist_base(
         return
     if ring is None:
         for i in range(first, end):
-            _resist_point(settings, settings.atan, bottles, own, footing, footing.turn, dt, lean, i)
+            _resist_point(settings, settings.atan, bottles, own, footing, footing.turn, dt, theta, i)
     if ring is not None:
         for i in range(first, end):
             if ring.radius[i] > 0.0:
-                _resist_ring(settings, bottles, spin, own, footing, footing.turn, ring, dt, lean, i)
+                _resist_ring(settings, bottles, spin, own, footing, footing.turn, ring, dt, theta, i)
             else:
-                _resist_point(settings, settings.atan, bottles, own, footing, footing.turn, dt, lean, i)
-        _resist_straddling(settings, bottles, spin, own, belts, surface, footing, ring, dt, lean, first, end)
+                _resist_point(settings, settings.atan, bottles, own, footing, footing.turn, dt, theta, i)
+        _resist_straddling(settings, bottles, spin, own, belts, surface, footing, ring, dt, theta, first, end)
 
 
 @part
@@ -53,7 +53,7 @@ def _resist_point(
     footing: Any,
     turn: Any,
     dt: float,
-    lean: float,
+    theta: float,
     i: int,
 ) -> None:
     vx, vy = relative_velocity(bottles, footing, turn, 0.0, i)
@@ -62,11 +62,11 @@ def _resist_point(
     far = speed if speed > least else least
     faster = far + least
     quotient = regularisation(far, settings.slip_limit, atan)
-    pull = dt * footing.pull[i]
+    pull = dt * footing.friction_limit[i]
     secant = pull * quotient
     slope = pull * (faster * regularisation(faster, settings.slip_limit, atan) - far * quotient) / least
-    along = resistance(slope, secant, lean, 2.0 * bottles.inverse_mass[i])
-    across = resistance(secant, secant, lean, 2.0 * bottles.inverse_mass[i])
+    along = resistance(slope, secant, theta, 2.0 * bottles.inverse_mass[i])
+    across = resistance(secant, secant, theta, 2.0 * bottles.inverse_mass[i])
     nx, ny = (vx / far, vy / far) if speed > least else (1.0, 0.0)
     own.xx[i] += along * nx * nx + across * ny * ny
     own.xy[i] += (along - across) * nx * ny
@@ -83,7 +83,7 @@ def _resist_ring(
     turn: Any,
     ring: Any,
     dt: float,
-    lean: float,
+    theta: float,
     i: int,
 ) -> None:
     vx, vy = relative_velocity(bottles, footing, turn, 0.0, i)
@@ -94,13 +94,13 @@ def _resist_ring(
     force, twist = _ring_forces(slide, spinning, settings.slip_limit)
     force_faster, twist_faster = _ring_forces(slide + least, spinning, settings.slip_limit)
     _, twist_spun = _ring_forces(slide, spinning + least, settings.slip_limit)
-    pull = dt * footing.pull[i]
+    pull = dt * footing.friction_limit[i]
     secant, secant_turn = pull * force / slide, pull * twist / spinning
     turns = max(secant * bottles.inverse_mass[i], secant_turn * radius * radius * spin.inverse_inertia[i])
     turned = firmness(2.0 * turns)
-    slope = lean * (1.0 - turned) * pull / least
+    slope = theta * (1.0 - turned) * pull / least
     along = slope * (force_faster - force) + turned * secant
-    across = lean * secant + turned * (1.0 - lean) * secant
+    across = theta * secant + turned * (1.0 - theta) * secant
     both = slope * (twist_faster - twist) * (radius if turning > 0.0 else -radius)
     nx, ny = (vx / slide, vy / slide) if speed > least else (1.0, 0.0)
     own.xx[i] += along * nx * nx + across * ny * ny
@@ -129,7 +129,7 @@ def _resist_straddling(
     footing: Any,
     ring: Any,
     dt: float,
-    lean: float,
+    theta: float,
     first: int,
     end: int,
 ) -> None:
@@ -151,7 +151,7 @@ def _resist_straddling(
         pull = dt * surface.friction[footing.carrier[i], bottles.type[i]] * bottles.weight[i]
         secant = pull * regularisation(math.sqrt(vx * vx + vy * vy), settings.slip_limit, None)
         turned = firmness(2.0 * secant * bottles.inverse_mass[i])
-        slope = lean * (1.0 - turned) * dt / step
+        slope = theta * (1.0 - turned) * dt / step
         own.xx[i] += slope * (fx - fx_x) + turned * secant
         own.xy[i] += slope * (fy - fy_x)
         own.yy[i] += slope * (fy - fy_y) + turned * secant

@@ -7,17 +7,17 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear
-from conveyor_sim.engine.arrays.world import Member, Settings
+from conveyor_sim.engine.arrays.world import Settings, Worker
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.integrators.tangent import contact_stiffness, linear_contact
-from conveyor_sim.engine.threads.team import UNIT, share
+from conveyor_sim.engine.threads.workers import UNIT, share
 
 
 @part
 def stiffest_pairs(
-    settings: Settings, bottles: Bottles, linear: Linear, pairs: Any, curves: Any, member: Member
+    settings: Settings, bottles: Bottles, linear: Linear, pairs: Any, curves: Any, worker: Worker
 ) -> None:
     """Write to `pairs.tangent.most`, for each unit, the largest stiffness times mobility (1/s^2) of closed contacts.
 
@@ -25,7 +25,7 @@ def stiffest_pairs(
     """
     if pairs is None:
         return
-    begin, stop = share(member, pairs.used[0])
+    begin, stop = share(worker, pairs.used[0])
     for first in range(begin, stop, UNIT):
         most = 0.0
         for p in range(uint64(first), uint64(min(first + UNIT, stop))):
@@ -47,24 +47,24 @@ def linear_pairs(
     linear: Linear,
     pairs: Any,
     curves: Any,
-    member: Member,
+    worker: Worker,
     dt: float,
-    lean: float,
+    theta: float,
     again: int,
 ) -> None:
-    """Find forces and moments ahead, and `pairs.tangent`, of this member's share of the pairs.
+    """Find forces and moments ahead, and `pairs.tangent`, of this worker's share of the pairs.
 
     Normal forces, for peaks, are those before the step.
     """
     if pairs is None:
         return
-    begin, stop = share(member, pairs.used[0])
+    begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
         i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
         ahead, before, nx, ny = _overlaps(bottles, linear, i, j)
-        hold = lean > 0.5 and (before > 0.0 or (again > 0 and pairs.tangent.normal[p] > 0.0))
+        hold = theta > 0.5 and (before > 0.0 or (again > 0 and pairs.tangent.normal[p] > 0.0))
         if ahead > 0.0 or before > 0.0 or hold:
-            _close(settings, bottles, spin, linear, pairs, curves, p, i, j, ahead, before, nx, ny, dt, lean, hold)
+            _close(settings, bottles, spin, linear, pairs, curves, p, i, j, ahead, before, nx, ny, dt, theta, hold)
         else:
             _write(pairs, pairs.moment, pairs.normal, p, 0.0, 0.0, 0.0, 0.0, 0.0)
             pairs.tangent.normal[p] = 0.0
@@ -96,7 +96,7 @@ def _close(
     nx: float,
     ny: float,
     dt: float,
-    lean: float,
+    theta: float,
     hold: bool,
 ) -> None:
     change = linear.change
@@ -121,12 +121,12 @@ def _close(
         ahead,
         1.0,
         vx * nx + vy * ny,
-        (vx + lean * dvx) * nx + (vy + lean * dvy) * ny,
+        (vx + theta * dvx) * nx + (vy + theta * dvy) * ny,
         slip,
         mobility,
         rim_mobility,
         dt,
-        lean,
+        theta,
         hold,
     )
     tangential -= across * slip_change / dt
@@ -167,11 +167,11 @@ def _write(
 
 
 @part
-def resist_pairs(pairs: Any, way: Any, old: Any, beta: float, member: Member) -> None:
-    """Write the impulses with which this member's pairs resist the velocities way + beta old, both Triples, by pair."""
+def resist_pairs(pairs: Any, way: Any, old: Any, beta: float, worker: Worker) -> None:
+    """Write the impulses with which this worker's pairs resist the velocities way + beta old, both Triples, by pair."""
     if pairs is None:
         return
-    begin, stop = share(member, pairs.used[0])
+    begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
         _resist(pairs, pairs.tangent, pairs.moment, way, old, beta, p)
 

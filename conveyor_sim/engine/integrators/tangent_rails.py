@@ -12,7 +12,7 @@ from conveyor_sim.engine.integrators.tangent_pairs import add_block
 from conveyor_sim.engine.rails.arc import arc_contact
 from conveyor_sim.engine.rails.rails import find_rail_contacts, law_entry, rail_arm
 from conveyor_sim.engine.rails.segment import segment_contact
-from conveyor_sim.engine.threads.team import UNIT, units
+from conveyor_sim.engine.threads.workers import UNIT, units
 
 
 @part
@@ -69,7 +69,7 @@ def linear_rails(
     curves: Any,
     found: RailContacts,
     dt: float,
-    lean: float,
+    theta: float,
     first: int,
     end: int,
 ) -> None:
@@ -82,7 +82,7 @@ def linear_rails(
         x, y, radius = bottles.x[i], bottles.y[i], bottles.radius[i]
         old_x, old_y = linear.x[i], linear.y[i]
         # Contacts that are closed ahead; then those that were before the step, of surfaces that are not touched ahead.
-        for earlier in range(2 if lean > 0.5 else 1):
+        for earlier in range(2 if theta > 0.5 else 1):
             if earlier:
                 bottles.x[i], bottles.y[i] = old_x, old_y
             count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)
@@ -114,7 +114,7 @@ def linear_rails(
                         before,
                         ahead,
                         dt,
-                        lean,
+                        theta,
                         earlier > 0,
                     )
 
@@ -185,7 +185,7 @@ def _add_contact(
     before: float,
     ahead: float,
     dt: float,
-    lean: float,
+    theta: float,
     hold: bool,
 ) -> None:
     nx, ny = found.nx[c], found.ny[c]
@@ -207,12 +207,12 @@ def _add_contact(
         ahead,
         found.share[c],
         closing,
-        closing + lean * closing_change,
+        closing + theta * closing_change,
         slip,
         mobility,
         rim_mobility,
         dt,
-        lean,
+        theta,
         hold,
     )
     # The block, which holds this contact, will take that off again.

@@ -17,11 +17,10 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.integrators import Stage
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
 from conveyor_sim.engine.contact.path import note_path
-from conveyor_sim.engine.fewer import for_forces
 from conveyor_sim.engine.forces import bottle_forces, evaluate_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
 from conveyor_sim.engine.integrators.phase import START
@@ -29,11 +28,12 @@ from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
 from conveyor_sim.engine.support.static_friction import carry_anchors
-from conveyor_sim.engine.threads.team import BLOCK, share
+from conveyor_sim.engine.threads.workers import BLOCK, share
+from conveyor_sim.engine.world_views import for_forces
 
 
 @kernel
-def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> int:
+def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring).
 
     A step ends and the next one begins in one pass over the bottles. A call that is broken off has moved them.
@@ -41,44 +41,44 @@ def advance(world: World, member: Member, steps: int, dt: float, phase: int) -> 
     line = for_forces(world)
     stage: Any = world.stage
     damage = _is_there(world.damage)
-    begin, stop = share(member, world.bottles.x.size)
-    place_rails(line.moving, member, dt)
+    begin, stop = share(worker, world.bottles.x.size)
+    place_rails(line.moving, worker, dt)
     done = 0
     if phase == START:
         # Commands and supply come in between ticks: the last forces are of another line.
-        evaluate_forces(line, member, dt)
+        evaluate_forces(line, worker, dt)
         if steps == 0:
             return 0
-        note_damage(world, member, dt)
+        note_damage(world, worker, dt)
         for first in range(begin, stop, BLOCK):
-            _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
-        hold = lists_hold(line, member)
-        pass_step(line.moving, line.ledger, member, dt, True)
+            _begin_step(world, line, stage, worker, dt, first, min(first + BLOCK, stop))
+        hold = lists_hold(line, worker)
+        pass_step(line.moving, line.ledger, worker, dt, True)
         if not hold:
             return 0
-        watch_rebuilt(line, member)
+        watch_rebuilt(line, worker)
     else:
-        pack_all(line, member)
+        pack_all(line, worker)
     while True:
         done += 1
-        pair_phase(line, member, dt, dt)
+        pair_phase(line, worker, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, member, dt, dt, first, end)
+            bottle_forces(line, worker, dt, dt, first, end)
             _end_step(world, stage, dt, first, end)
             if done < steps and not damage:
-                _begin_step(world, line, stage, member, dt, first, end)
+                _begin_step(world, line, stage, worker, dt, first, end)
         if done == steps:
             return steps
         if damage:
-            note_damage(world, member, dt)
+            note_damage(world, worker, dt)
             for first in range(begin, stop, BLOCK):
-                _begin_step(world, line, stage, member, dt, first, min(first + BLOCK, stop))
-        hold = lists_hold(line, member)
-        pass_step(line.moving, line.ledger, member, dt, True)
+                _begin_step(world, line, stage, worker, dt, first, min(first + BLOCK, stop))
+        hold = lists_hold(line, worker)
+        pass_step(line.moving, line.ledger, worker, dt, True)
         if not hold:
             return done
-        watch_rebuilt(line, member)
+        watch_rebuilt(line, worker)
 
 
 @part
@@ -87,7 +87,7 @@ def _is_there(group: Any) -> bool:
 
 
 @part
-def _begin_step(world: World, line: World, stage: Stage, member: Member, dt: float, first: int, end: int) -> None:
+def _begin_step(world: World, line: World, stage: Stage, worker: Worker, dt: float, first: int, end: int) -> None:
     """Move bottles first to end, and give them the velocities at which the forces at the end of the step are taken."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
     book_kick(bottles, spin, load, world.ledger, half, first, end)
@@ -95,7 +95,7 @@ def _begin_step(world: World, line: World, stage: Stage, member: Member, dt: flo
     _turn(spin, stage, dt, first, end)
     carry_anchors(world.footing, world.static_friction, dt, first, end)
     note_path(world.path, stage, dt, first, end)
-    note_moved(line, member, first, end)
+    note_moved(line, worker, first, end)
 
 
 @part

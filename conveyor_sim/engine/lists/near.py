@@ -12,7 +12,7 @@ from conveyor_sim.engine.arrays.lists import Listed, Near
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.rails.moving import near_sweep
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 
 
 @part

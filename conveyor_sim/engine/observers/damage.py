@@ -12,8 +12,8 @@ import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load, Spin
-from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, Borne, RailBins, Worst
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, LoadHistory, RailBins, Worst
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import WIDTH
@@ -23,42 +23,42 @@ from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, ra
 from conveyor_sim.engine.support.base import add_base_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
-from conveyor_sim.engine.threads.team import BLOCK, UNIT, share, wait_for_all
+from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, wait_for_all
 
 
 @part
-def note_damage(world: World, member: Member, dt: float) -> None:
+def note_damage(world: World, worker: Worker, dt: float) -> None:
     """Note what all bottles bear in the present state, for a step of dt seconds; lists hold and bottles are in place.
 
-    Every member calls it; on return all have read what they need.
+    Every worker calls it; on return all have read what they need.
     """
-    _note(world, world.damage, member, dt)
+    _note(world, world.damage, worker, dt)
 
 
 @part
-def _note(world: World, damage: Any, member: Member, dt: float) -> None:
+def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
     if damage is None:
         return
-    # Velocity Verlet has just given bottles their velocities, each member those of its own.
-    wait_for_all(member)
-    begin, stop = share(member, world.bottles.x.size)
+    # Velocity Verlet has just given bottles their velocities, each worker those of its own.
+    wait_for_all(worker)
+    begin, stop = share(worker, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
         _find_base(world, world.bottles, world.spin, damage.tipping, dt, first, end)
         for i in range(first, end):
             if world.bottles.id[i] >= 0:
-                count = _list_pairs(i, world, world.pairs, world.slots, damage.impacts, member.borne)
-                count = _list_rails(i, world, world.rail_law, damage, member, count)
-                _scuff(i, damage.scuffing, member.borne, count, dt)
-                _crush(i, damage.crushing, member.borne, count)
-                _hit(i, damage.impacts, member.borne, count)
-                _tip(i, world.bottles, damage.tipping, member.borne, count, dt)
-    wait_for_all(member)
+                count = _list_pairs(i, world, world.pairs, world.slots, damage.impacts, worker.borne)
+                count = _list_rails(i, world, world.rail_law, damage, worker, count)
+                _scuff(i, damage.scuffing, worker.borne, count, dt)
+                _crush(i, damage.crushing, worker.borne, count)
+                _hit(i, damage.impacts, worker.borne, count)
+                _tip(i, world.bottles, damage.tipping, worker.borne, count, dt)
+    wait_for_all(worker)
     _keep_velocities(world.bottles, damage.impacts, begin, stop)
 
 
 @part
-def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, borne: Borne) -> int:
+def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, borne: LoadHistory) -> int:
     """Write the closed contacts of bottle i with others to `borne`; return how many."""
     if pairs is None:
         return 0
@@ -72,7 +72,7 @@ def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, born
 
 
 @part
-def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne: Borne, count: int) -> int:
+def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne: LoadHistory, count: int) -> int:
     bottles = world.bottles
     p = entry if entry < pairs.i.size else entry - pairs.i.size
     j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
@@ -92,10 +92,10 @@ def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne
 
 
 @part
-def _list_rails(i: int, world: World, law: Any, damage: Any, member: Member, count: int) -> int:
+def _list_rails(i: int, world: World, law: Any, damage: Any, worker: Worker, count: int) -> int:
     if law is None:
         return count
-    bottles, found = world.bottles, member.found
+    bottles, found = world.bottles, worker.found
     here = find_rail_contacts(
         i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
     )
@@ -132,14 +132,14 @@ def _list_rails(i: int, world: World, law: Any, damage: Any, member: Member, cou
                 place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
             ux, uy = surface_velocity(world.moving, found, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
-            _write(member.borne, count, nx, ny, normal, tangential, slip, approach, key, place)
+            _write(worker.borne, count, nx, ny, normal, tangential, slip, approach, key, place)
             count += 1
     return count
 
 
 @part
 def _write(
-    borne: Borne,
+    borne: LoadHistory,
     c: int,
     nx: float,
     ny: float,
@@ -222,7 +222,7 @@ def _bin_at(first: int, end: int, way: float) -> int:
 
 
 @part
-def _scuff(i: int, scuffing: Any, borne: Borne, count: int, dt: float) -> None:
+def _scuff(i: int, scuffing: Any, borne: LoadHistory, count: int, dt: float) -> None:
     """Add |T s| dt to the bottle, and to the rail where it slides."""
     if scuffing is None:
         return
@@ -242,7 +242,7 @@ def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None
 
 
 @part
-def _crush(i: int, crushing: Any, borne: Borne, count: int) -> None:
+def _crush(i: int, crushing: Any, borne: LoadHistory, count: int) -> None:
     """Note the sum of normal forces, and the largest min(N_a, N_b) |cos| of two that oppose each other."""
     if crushing is None:
         return
@@ -257,7 +257,7 @@ def _crush(i: int, crushing: Any, borne: Borne, count: int) -> None:
 
 
 @part
-def _hit(i: int, impacts: Any, borne: Borne, count: int) -> None:
+def _hit(i: int, impacts: Any, borne: LoadHistory, count: int) -> None:
     """Note the largest force of one contact, and the speed at which those closed that were open at the last look."""
     if impacts is None:
         return
@@ -330,7 +330,7 @@ def _apart(spin: Any, moment: Any) -> Any:
 
 
 @part
-def _tip(i: int, bottles: Bottles, tipping: Any, borne: Borne, count: int, dt: float) -> None:
+def _tip(i: int, bottles: Bottles, tipping: Any, borne: LoadHistory, count: int, dt: float) -> None:
     """Note |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed: a blow is over before a bottle can tip."""
     if tipping is None:
         return

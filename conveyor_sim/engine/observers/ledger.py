@@ -1,7 +1,7 @@
 """The energy ledger's books: where the work of forces goes, added up in every step.
 
 An evaluation of the forces leaves their parts (`ledger_parts.py`); a part's power is that force times a velocity,
-summed over the bottles of a unit (`team.py`) by one thread in their order: the sums do not depend on who did which.
+summed over the bottles of a unit (`workers.py`) by one thread in their order: the sums do not depend on who did which.
 
 A kick, v += h F/m, is booked with the mean of the velocities before and after it: the change of kinetic energy is then
 exactly the sum of all powers times h. The Runge-Kutta methods book each stage with its own velocity and the method's
@@ -17,7 +17,7 @@ from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.observers import Ledger
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.threads.team import UNIT, units
+from conveyor_sim.engine.threads.workers import UNIT, units
 
 DAMPING, CONTACT_FRICTION, BASE_FRICTION, BELTS = 0, 1, 2, 3
 """Columns of the accounts: what is dissipated, then the work of each belt, then that of each moving rail."""

@@ -14,25 +14,25 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.integrators import Triple
 from conveyor_sim.engine.arrays.observers import Ledger
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Member, Settings
+from conveyor_sim.engine.arrays.world import Settings, Worker
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import drag_force, elastic_force
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import sum_slots
 from conveyor_sim.engine.rails.moving import add_rail_power
-from conveyor_sim.engine.threads.team import UNIT, share, units
+from conveyor_sim.engine.threads.workers import UNIT, share, units
 
 
 @part
 def find_pair_parts(
-    settings: Settings, bottles: Bottles, spin: Any, pairs: Any, ledger: Any, curves: Any, member: Member
+    settings: Settings, bottles: Bottles, spin: Any, pairs: Any, ledger: Any, curves: Any, worker: Worker
 ) -> None:
-    """Take the forces just found for this member's share of the pairs apart, into `pairs.parts`."""
+    """Take the forces just found for this worker's share of the pairs apart, into `pairs.parts`."""
     if ledger is None:
         return
     if pairs is None:
         return
-    begin, stop = share(member, pairs.used[0])
+    begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
         i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
         reach = bottles.radius[i] + bottles.radius[j]

@@ -17,7 +17,7 @@ from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.observers.ledger import BELTS, CONTACT_FRICTION, DAMPING
 from conveyor_sim.engine.rails.motion_profile import phase_at, plan_profile, stopping_place, wanted_acceleration
-from conveyor_sim.engine.threads.team import UNIT, units
+from conveyor_sim.engine.threads.workers import UNIT, units
 
 
 @part

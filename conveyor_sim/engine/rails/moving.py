@@ -12,39 +12,39 @@ from typing import Any
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.moving import MovingRails
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Member
+from conveyor_sim.engine.arrays.world import Worker
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.rails.actuators import add_push, add_push_parts, clear_push, drive_rails, is_off_profile
-from conveyor_sim.engine.rails.keep import keep_deepest
+from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
 from conveyor_sim.engine.rails.motion_profile import phase_at
 from conveyor_sim.engine.rails.segment import segment_contact
-from conveyor_sim.engine.threads.team import UNIT, units, wait_for_all
+from conveyor_sim.engine.threads.workers import UNIT, units, wait_for_all
 
 MOVING = 1 << 40
 """Added to the number of a moving rail, in `RailContacts.entry`."""
 
 
 @part
-def place_rails(moving: Any, member: Member, dt: float) -> None:
+def place_rails(moving: Any, worker: Worker, dt: float) -> None:
     """Put the rails where they are at the clock, in steps of dt (s); seen by all after the next `wait_for_all`."""
     if moving is None:
         return
-    if member.rank == 0:
+    if worker.rank == 0:
         _place(moving, moving.clock[0] * dt)
 
 
 @part
-def pass_step(moving: Any, ledger: Any, member: Member, dt: float, centred: bool) -> None:
+def pass_step(moving: Any, ledger: Any, worker: Worker, dt: float, centred: bool) -> None:
     """Move the rails on by a step, right after a `wait_for_all`; all see it on return. centred: see `drive_rails`."""
     if moving is None:
         return
-    if member.rank == 0:
+    if worker.rank == 0:
         _note_path(moving, moving.springs, -1.0)
         drive_rails(moving.actuators, moving, ledger, moving.clock[0] * dt, dt, centred)
         moving.clock[0] += 1.0
         _place(moving, moving.clock[0] * dt)
         _note_path(moving, moving.springs, 1.0)
-    wait_for_all(member)
+    wait_for_all(worker)
 
 
 @part

@@ -11,7 +11,7 @@ from conveyor_sim.engine.contact.contact import carried, contact_force, spring_a
 from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
 from conveyor_sim.engine.observers.ledger_parts import add_rail_parts
 from conveyor_sim.engine.rails.arc import arc_contact
-from conveyor_sim.engine.rails.keep import keep_deepest
+from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
 from conveyor_sim.engine.rails.moving import (
     add_rail_push,
     clear_rail_power,
@@ -26,7 +26,7 @@ from conveyor_sim.engine.rails.moving import (
 )
 from conveyor_sim.engine.rails.segment import segment_contact
 from conveyor_sim.engine.rails.shares import share_overlaps
-from conveyor_sim.engine.threads.team import units
+from conveyor_sim.engine.threads.workers import units
 
 
 @part
@@ -197,9 +197,21 @@ def add_rail_forces(
             if found.share[c] > 0.0:
                 kept = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
                 spring = _drawn_out(settings, law, bottles, spin, path, moving, found, c, i, kept)
-                ease = _ease(settings, implicit, i)
+                compliance = _compliance(settings, implicit, i)
                 normal, tangential, slip, spring = rail_contact(
-                    c, i, settings, settings.atan, bottles, spin, moving, found, law, curves, spring, slip_time, ease
+                    c,
+                    i,
+                    settings,
+                    settings.atan,
+                    bottles,
+                    spin,
+                    moving,
+                    found,
+                    law,
+                    curves,
+                    spring,
+                    slip_time,
+                    compliance,
                 )
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
@@ -296,10 +308,10 @@ def _note_parts(
 
 
 @part
-def _ease(settings: Settings, implicit: Any, i: int) -> Any:
+def _compliance(settings: Settings, implicit: Any, i: int) -> Any:
     if implicit is None:
         return None
-    return implicit.ease[i], settings.at_once
+    return implicit.compliance[i], settings.at_once
 
 
 @part

@@ -14,7 +14,7 @@ from conveyor_sim.engine.arrays.world import Settings
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import implicit_regularisation, regularisation
 from conveyor_sim.engine.support.ring import ring_means, ring_share, straddling_ring
-from conveyor_sim.engine.threads.team import units
+from conveyor_sim.engine.threads.workers import units
 
 
 @part
@@ -74,7 +74,7 @@ def _point_friction(
 ) -> None:
     for i in range(uint64(first), uint64(end)):
         vx, vy = relative_velocity(bottles, footing, turn, settings.lag * dt, i)
-        pull = footing.pull[i] * _quotient(
+        pull = footing.friction_limit[i] * _quotient(
             settings, atan, bottles, footing, implicit, dt, i, math.sqrt(vx * vx + vy * vy)
         )
         load.fx[i] -= pull * vx
@@ -88,7 +88,10 @@ def _quotient(
     if implicit is None:
         return regularisation(speed, settings.slip_limit, atan)
     ahead = settings.ahead * dt
-    b = ahead * footing.pull[i] * bottles.inverse_mass[i] * implicit.closed[i] / settings.slip_limit - settings.at_once
+    b = (
+        ahead * footing.friction_limit[i] * bottles.inverse_mass[i] * implicit.closed[i] / settings.slip_limit
+        - settings.at_once
+    )
     return implicit_regularisation(speed, 0.0 if b < 0.0 else b, settings.slip_limit, atan)
 
 
@@ -115,8 +118,10 @@ def _ring_friction(
         slide = math.sqrt(vx * vx + vy * vy)
         limit, first, rest = ring_means(slide, rim, settings.slip_limit)
         point = _quotient(settings, atan, bottles, footing, implicit, dt, i, slide)
-        pull = footing.pull[i] * (ring_share(slide, rim, limit, first, rest) if ring.radius[i] > 0.0 else point)
-        twist = footing.pull[i] * ring_share(rim, slide, limit, first, rest)
+        pull = footing.friction_limit[i] * (
+            ring_share(slide, rim, limit, first, rest) if ring.radius[i] > 0.0 else point
+        )
+        twist = footing.friction_limit[i] * ring_share(rim, slide, limit, first, rest)
         load.fx[i] -= pull * vx
         load.fy[i] -= pull * vy
         spin.moment[i] -= twist * ring.radius[i] * ring.radius[i] * turning

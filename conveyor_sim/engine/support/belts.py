@@ -9,7 +9,7 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.lists.near import end_list
 from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.support.sector import span_distance
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 
 
 @part

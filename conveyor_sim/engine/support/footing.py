@@ -10,7 +10,7 @@ from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.support import Footing, Surface
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.support.belts import carrier
-from conveyor_sim.engine.threads.team import units
+from conveyor_sim.engine.threads.workers import units
 
 
 @part
@@ -20,10 +20,10 @@ def stand_on(footing: Footing, surface: Surface, bottles: Bottles, ring: Any, i:
     footing.ux[i] = surface.ux[h]
     footing.uy[i] = surface.uy[h]
     _turn_with(footing.turn, surface.turn, i, h)
-    footing.pull[i] = surface.friction[h, bottles.type[i]] * bottles.weight[i]
+    footing.friction_limit[i] = surface.friction[h, bottles.type[i]] * bottles.weight[i]
     if ring is not None:
         if not alone and ring.radius[i] > 0.0:
-            footing.pull[i] = 0.0
+            footing.friction_limit[i] = 0.0
 
 
 @part

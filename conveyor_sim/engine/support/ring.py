@@ -12,7 +12,7 @@ import numpy as np
 
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.support.belts import carrier, surface_velocity
-from conveyor_sim.engine.threads.team import UNIT
+from conveyor_sim.engine.threads.workers import UNIT
 
 POINTS = 32
 """Of a ring that may stand on several belts."""

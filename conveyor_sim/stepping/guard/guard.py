@@ -9,8 +9,8 @@ from conveyor_sim.accounts.elastic import deepest_overlap
 from conveyor_sim.engine.arrays.bodies import Bottles, Spin
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.compile import entry
+from conveyor_sim.engine.observers.guard_probe import look
 from conveyor_sim.engine.observers.stored_energy import find_stored_energy
-from conveyor_sim.engine.observers.watch import look
 from conveyor_sim.state import State
 from conveyor_sim.stepping.guard.memory import Memory
 from conveyor_sim.stepping.guard.squeeze import Squeeze, squeeze_of
@@ -63,7 +63,7 @@ class Guard:
         model, world = self._model, self._state.world
         self._memory.keep(world)
         if tick % self._every == 0:
-            world.watch.due[0] = 1
+            world.probe.due[0] = 1
         bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
         # A rail that pushes a queue works against its friction; one that hits a bottle of speed v leaves it v + 2 u.
         hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
@@ -74,7 +74,7 @@ class Guard:
         """What is wrong with the state at the end of a tick, reached in steps of dt (s); it is put back then."""
         world, model = self._state.world, self._model
         bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
-        deep = float(world.watch.depth[0]), float(world.watch.depth[1])
+        deep = float(world.probe.depth[0]), float(world.probe.depth[1])
         self.forget()
         if bad >= 0:
             return self._words_before().not_finite(bad)
@@ -92,7 +92,7 @@ class Guard:
         self.has_put_in = self.has_put_in and depth == 0.0
         if depth > SOFT >= self.deepest or depth > DEEPEST:
             worst = deep.index(depth)
-            bottle, other = int(world.watch.bottle[worst]), int(world.watch.other[worst])
+            bottle, other = int(world.probe.bottle[worst]), int(world.probe.other[worst])
             words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
             found = (words.rail if worst else words.pair)(bottle, other, depth)
             if depth > DEEPEST:
@@ -103,8 +103,8 @@ class Guard:
 
     def forget(self) -> None:
         """What was seen of overlaps since the last tick."""
-        self._state.world.watch.depth[:] = 0.0
-        self._state.world.watch.due[0] = 0
+        self._state.world.probe.depth[:] = 0.0
+        self._state.world.probe.due[0] = 0
 
     def soft(self, tick: int) -> GuardEvent | None:
         """A contact that is too soft for what it bears, told once, at a tick."""
@@ -140,7 +140,7 @@ class Guard:
 
     def _was_deep(self) -> bool:
         """Whether bottles were put in so deep before the tick: they may part."""
-        after, watch = Memory(), self._state.world.watch
+        after, watch = Memory(), self._state.world.probe
         bottle, other = watch.bottle.copy(), watch.other.copy()
         after.keep(self._state.world)
         self._put_back()

@@ -1,4 +1,4 @@
-"""The threads behind a team (`team.py`): they wait in Python between ticks, and take the steps of a tick together."""
+"""A pool of threads: they wait in Python between ticks, and take the steps of a tick together (`workers.py`)."""
 
 import os
 import threading
@@ -6,38 +6,38 @@ import weakref
 from queue import SimpleQueue
 from typing import Any
 
-from conveyor_sim.engine.arrays.world import Member, World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.integrators import Advance
-from conveyor_sim.engine.threads.team import members
+from conveyor_sim.engine.threads.workers import workers
 
-Task = tuple[Advance, World, Member, int, float, int]
+Task = tuple[Advance, World, Worker, int, float, int]
 
 
-class Crew:
+class ThreadPool:
     """Teams of up to `most` threads, the calling one among them. The others start when first needed.
 
-    A crew is for Worlds of one scene: their arrays may be replaced, their types not.
+    A pool is for Worlds of one scene: their arrays may be replaced, their types not.
     """
 
     def __init__(self, most: int) -> None:
         self.most = most
         self._entries: dict[Any, Advance] = {}
         self._process = os.getpid()
-        self._teams: dict[int, tuple[Member, ...]] = {}
+        self._groups: dict[int, tuple[Worker, ...]] = {}
         self._tasks: list[SimpleQueue[Task | None]] = []
         self._done: SimpleQueue[BaseException | None] = SimpleQueue()
         weakref.finalize(self, _dismiss, self._tasks)
 
     def advance(self, size: int, function: Advance, world: World, steps: int, dt: float, phase: int) -> int:
         """Run an integrator on `size` threads; return the steps that it took. Raises ValueError beyond `most`."""
-        team = self.team(size)
-        function = self._compiled(function, world, team[0], steps, dt, phase)
+        group = self.group(size)
+        function = self._compiled(function, world, group[0], steps, dt, phase)
         others = self._workers(size - 1)
         try:
-            for task, member in zip(others, team[1:], strict=True):
-                task.put((function, world, member, steps, dt, phase))
-            taken = function(world, team[0], steps, dt, phase)
+            for task, worker in zip(others, group[1:], strict=True):
+                task.put((function, world, worker, steps, dt, phase))
+            taken = function(world, group[0], steps, dt, phase)
             for _ in others:
                 if (error := self._done.get()) is not None:
                     raise error
@@ -47,16 +47,16 @@ class Crew:
             raise
         return taken
 
-    def team(self, size: int) -> tuple[Member, ...]:
-        """Members of a team of `size`; those of one size are always the same."""
+    def group(self, size: int) -> tuple[Worker, ...]:
+        """Workers in a group of `size`; those of one size are always the same."""
         if not 1 <= size <= self.most:
-            raise ValueError(f"a team of {size} threads, expected 1 to {self.most}")
-        if size not in self._teams:
-            self._teams[size] = members(size)
-        return self._teams[size]
+            raise ValueError(f"a group of {size} threads, expected 1 to {self.most}")
+        if size not in self._groups:
+            self._groups[size] = workers(size)
+        return self._groups[size]
 
     def _compiled(self, function: Any, *arguments: Any) -> Advance:
-        """The machine code for arguments of these types, which never change in a crew's life."""
+        """The machine code for arguments of these types, which never change in a pool's life."""
         if function not in self._entries:
             self._entries[function] = entry(function, *arguments)
         return self._entries[function]
@@ -64,7 +64,7 @@ class Crew:
     def _disband(self) -> None:
         _dismiss(self._tasks)
         self._tasks.clear()
-        self._teams, self._done = {}, SimpleQueue()
+        self._groups, self._done = {}, SimpleQueue()
 
     def _workers(self, count: int) -> list["SimpleQueue[Task | None]"]:
         if self._process != os.getpid():
@@ -80,15 +80,15 @@ class Crew:
 
 def _work(tasks: "SimpleQueue[Task | None]", done: "SimpleQueue[BaseException | None]") -> None:
     while (task := tasks.get()) is not None:
-        function, world, member, steps, dt, phase = task
+        function, world, worker, steps, dt, phase = task
         try:
-            function(world, member, steps, dt, phase)
+            function(world, worker, steps, dt, phase)
         except BaseException as error:
             done.put(error)
         else:
             done.put(None)
         # While it waits it must not keep the arrays of a run that has ended.
-        del task, function, world, member
+        del task, function, world, worker
 
 
 def _dismiss(tasks: list["SimpleQueue[Task | None]"]) -> None:

@@ -1,6 +1,6 @@
 """Threads that take steps together: who does which block of the work, and where they wait for each other.
 
-Every thread runs the same integrator on the same World with a Member of its own. Pairs, and bottles, are shared out in
+Every thread runs the same integrator on the same World with a Worker of its own. Pairs, and bottles, are shared out in
 whole units, and each share is worked on block by block. No block reads what another writes in the same phase, and no
 sum runs over blocks, so the bits do not depend on who did which.
 """
@@ -15,7 +15,7 @@ from conveyor_sim.engine.arrays.contacts import Gathered
 from conveyor_sim.engine.arrays.damage import borne
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8, U4
-from conveyor_sim.engine.arrays.world import Member
+from conveyor_sim.engine.arrays.world import Worker
 from conveyor_sim.engine.compiler.compile import part
 
 UNIT = 64
@@ -27,7 +27,7 @@ BLOCK = 8 * UNIT
 MOST_CONTACTS = 32
 """Of one bottle with rails at a time, the deepest ones; as many touch only in a pocket drawn as a fine polyline."""
 
-# Places in `Member.sync`, a cache line apart.
+# Places in `Worker.sync`, a cache line apart.
 ARRIVED, TURN, MOVED = 0, 8, 16
 SYNC_SIZE = 24
 
@@ -35,10 +35,10 @@ SPINS = 2000
 """Looks at the barrier before a thread offers its core to others: about 20 us."""
 
 
-def members(size: int) -> tuple[Member, ...]:
-    """Return `size` members of one team."""
+def workers(size: int) -> tuple[Worker, ...]:
+    """Return `size` workers of one group."""
     sync = np.zeros(SYNC_SIZE, np.int64)
-    return tuple(Member(rank, size, sync, _gathered(), _rail_contacts(), borne()) for rank in range(size))
+    return tuple(Worker(rank, size, sync, _gathered(), _rail_contacts(), borne()) for rank in range(size))
 
 
 def _gathered() -> Gathered:
@@ -66,12 +66,12 @@ def _rail_contacts() -> RailContacts:
 
 
 @part
-def share(member: Member, count: int) -> tuple[int, int]:
-    """This member's share of `count` things: the first, and where it ends."""
+def share(worker: Worker, count: int) -> tuple[int, int]:
+    """This worker's share of `count` things: the first, and where it ends."""
     units = (count + UNIT - 1) // UNIT
     # What can't be shared is for the calling thread, rank 0, which is awake already.
-    begin = (member.rank * units + member.size - 1) // member.size
-    stop = ((member.rank + 1) * units + member.size - 1) // member.size
+    begin = (worker.rank * units + worker.size - 1) // worker.size
+    stop = ((worker.rank + 1) * units + worker.size - 1) // worker.size
     return min(begin * UNIT, count), min(stop * UNIT, count)
 
 
@@ -82,38 +82,38 @@ def units(first: int, end: int) -> tuple[int, int]:
 
 
 @part
-def wait_for_all(member: Member) -> None:
-    """Return when all members have called it; what they wrote before is then seen by all."""
-    if member.size == 1:
+def wait_for_all(worker: Worker) -> None:
+    """Return when all workers have called it; what they wrote before is then seen by all."""
+    if worker.size == 1:
         return
-    turn = _load(member.sync, TURN)
-    if _add(member.sync, ARRIVED, 1) == member.size - 1:
-        _store(member.sync, ARRIVED, 0)
-        _store(member.sync, TURN, turn + 1)
+    turn = _load(worker.sync, TURN)
+    if _add(worker.sync, ARRIVED, 1) == worker.size - 1:
+        _store(worker.sync, ARRIVED, 0)
+        _store(worker.sync, TURN, turn + 1)
         return
     spins = 0
-    while _load(member.sync, TURN) == turn:
+    while _load(worker.sync, TURN) == turn:
         spins += 1
         if spins > SPINS:
             _sched_yield()
 
 
 @part
-def raise_flag(member: Member, flag: int) -> None:
+def raise_flag(worker: Worker, flag: int) -> None:
     """Set a flag that all see after the next `wait_for_all`."""
-    _store(member.sync, flag, 1)
+    _store(worker.sync, flag, 1)
 
 
 @part
-def lower_flag(member: Member, flag: int) -> None:
-    """Clear a flag; by one member, between two barriers."""
-    _store(member.sync, flag, 0)
+def lower_flag(worker: Worker, flag: int) -> None:
+    """Clear a flag; by one worker, between two barriers."""
+    _store(worker.sync, flag, 0)
 
 
 @part
-def flag_raised(member: Member, flag: int) -> bool:
+def flag_raised(worker: Worker, flag: int) -> bool:
     """Whether a flag is set."""
-    return _load(member.sync, flag) != 0
+    return _load(worker.sync, flag) != 0
 
 
 _sched_yield = numba.types.ExternalFunction("sched_yield", numba.types.int32())

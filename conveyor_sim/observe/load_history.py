@@ -27,7 +27,7 @@ class Worst:
 
 
 @dataclass(frozen=True)
-class Borne:
+class LoadHistory:
     """The worst of each quantity (`DamageColumns`) over bottles and time; None: not looked at."""
 
     scuffing_work: Worst | None = None
@@ -37,10 +37,10 @@ class Borne:
     impact_force: Worst | None = None
     tipping: Worst | None = None
 
-    def with_more(self, damage: DamageColumns) -> Borne:
+    def with_more(self, damage: DamageColumns) -> LoadHistory:
         """With another output of damage taken in."""
         found = {}
-        for field in fields(Borne):
+        for field in fields(LoadHistory):
             values, before = getattr(damage, field.name), getattr(self, field.name)
             if np.isfinite(values).any():
                 index = int(np.nanargmax(values))
@@ -51,7 +51,7 @@ class Borne:
     @property
     def sentence(self) -> str:
         """The same in words."""
-        there = {field.name: worst for field in fields(Borne) if (worst := getattr(self, field.name)) is not None}
+        there = {field.name: worst for field in fields(LoadHistory) if (worst := getattr(self, field.name)) is not None}
         return "at most " + "; ".join(
             f"{WORDS[name].format(worst.value)} (bottle {worst.bottle})" for name, worst in there.items()
         )

@@ -8,13 +8,13 @@ import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.observers import Watch
+from conveyor_sim.engine.arrays.observers import GuardProbe
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.rails.rails import find_rail_contacts
-from conveyor_sim.engine.threads.team import units
+from conveyor_sim.engine.threads.workers import units
 
 
 @kernel
@@ -38,9 +38,9 @@ def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
 
 @part
 def watch_overlaps(world: World, found: RailContacts) -> None:
-    """Note the deepest overlaps in `world.watch`; the lists must hold."""
-    _watch_pairs(world.bottles, world.pairs, world.watch)
-    _watch_rails(world, world.railed, world.watch, found)
+    """Note the deepest overlaps in `world.probe`; the lists must hold."""
+    _watch_pairs(world.bottles, world.pairs, world.probe)
+    _watch_rails(world, world.railed, world.probe, found)
 
 
 @part
@@ -58,7 +58,7 @@ def _turning_energy(spin: Any, i: int) -> float:
 
 
 @part
-def _watch_pairs(bottles: Bottles, pairs: Any, watch: Watch) -> None:
+def _watch_pairs(bottles: Bottles, pairs: Any, watch: GuardProbe) -> None:
     if pairs is None:
         return
     for p in range(pairs.used[0]):
@@ -70,7 +70,7 @@ def _watch_pairs(bottles: Bottles, pairs: Any, watch: Watch) -> None:
 
 
 @part
-def _watch_rails(world: World, railed: Any, watch: Watch, found: RailContacts) -> None:
+def _watch_rails(world: World, railed: Any, watch: GuardProbe, found: RailContacts) -> None:
     if railed is None:
         return
     bottles = world.bottles
@@ -85,7 +85,7 @@ def _watch_rails(world: World, railed: Any, watch: Watch, found: RailContacts) -
 
 
 @part
-def _note(watch: Watch, place: int, depth: float, bottle: int, other: int) -> None:
+def _note(watch: GuardProbe, place: int, depth: float, bottle: int, other: int) -> None:
     if depth > watch.depth[place]:
         watch.depth[place] = depth
         watch.bottle[place] = bottle

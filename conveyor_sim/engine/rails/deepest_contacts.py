@@ -2,7 +2,7 @@
 
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.threads.team import MOST_CONTACTS
+from conveyor_sim.engine.threads.workers import MOST_CONTACTS
 
 
 @kernel
