@@ -11,7 +11,7 @@ from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.forces import evaluate_forces
-from conveyor_sim.engine.threads.workers import members
+from conveyor_sim.engine.threads.workers import workers
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.state import State
@@ -24,8 +24,8 @@ STIFFNESS = 1000.0
 FAR = 90.0
 """m: a bottle at (FAR, FAR) is near nothing."""
 
-ALONE = members(1)[0]
-"""A team of one thread."""
+ALONE = workers(1)[0]
+"""A thread by itself."""
 
 _evaluate_forces: Any = kernel(evaluate_forces.py_func)  # type: ignore[attr-defined]
 

@@ -1,7 +1,7 @@
 """Coefficients of damping from the restitution e of a head-on impact, e the speed after over the speed before.
 
 Two bottles, or a bottle and a rail, are one body of the reduced mass m_r on a spring and a dashpot. Each law here is
-solved for that body; test/test_restitution.py integrates it.
+solved for that body; test/laws/test_restitution.py integrates it.
 """
 
 import math

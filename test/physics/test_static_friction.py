@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, order, rms, scene, segment, simulation
-from test_checkpoint import END, SAVED, everything, queue, run
+from state.test_checkpoint import END, SAVED, everything, queue, run
 
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state.world_arrays import changing_arrays

@@ -150,7 +150,7 @@ def test_to_and_fro_between_two_belts_is_no_loop(tmp_path: Path) -> None:
 
 def test_bottles_of_machines_count_too(tmp_path: Path) -> None:
     """A source and a sink; sums go by what a signal counts, not by its name."""
-    buffer_lane = Path(__file__).parents[1] / "config" / "scenarios" / "buffer_lane.yaml"
+    buffer_lane = Path(__file__).parents[2] / "config" / "scenarios" / "buffer_lane.yaml"
     simulation = record(load_scene(buffer_lane, {"duration": 5.0}), tmp_path / "bag", 500)
     summary = summarize(tmp_path / "bag")
     assert (summary.fed, summary.removed) == (simulation.counts.fed, simulation.counts.removed)

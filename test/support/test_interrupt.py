@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 MAIN = "print('began', flush=True); import sys; from conveyor_sim.cli import main; sys.exit(main())"
 """As the console script has it."""
 FUZZ = "print('began', flush=True); import runpy; runpy.run_module('fuzz', run_name='__main__')"
