@@ -74,7 +74,16 @@ def _resting(terms: Terms, dt: float) -> list[Term]:
 
     The lag is a slip of Omega^2 r dt / 2 outward, which friction answers with m mu g Omega^2 r dt / v_lim.
     """
-    return _lag("load on turning belts", terms.method.creep_off, terms, dt)
+    turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
+    behind = terms.method.turned * _turning(terms.scene) * dt if turns else 0.0
+    late = [Term("load on turning belts", behind, "half a step's turn of the belt")] if behind > 0.0 else []
+    return [*_lag("load on turning belts", terms.method.creep_off, terms, dt), *late]
+
+
+def _turning(scene: Scene) -> float:
+    """rad/s, of the belt that turns fastest as the scene begins; 0 without any."""
+    curved = (belt for belt in scene.belts.values() if isinstance(belt, CurvedBelt))
+    return max((abs(belt.speed) / (belt.inner_radius + 0.5 * belt.width) for belt in curved), default=0.0)
 
 
 def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
@@ -142,7 +151,8 @@ BASE_FRICTION = Effect(
     shares=_braked,
     share="with leapfrog and semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
     resting=_resting,
-    rest="on belts that turn, with semi-implicit Euler one part in the steps in v_lim / (mu g)",
+    rest="on belts that turn, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
+    "Omega dt / 2",
     side=_creep,
     beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
     "and implicit friction two",

@@ -54,6 +54,8 @@ class Method:
     creep_order: float = 1.0
     creep_steps: float = 0.0
     """The fewest such steps for which that holds; in fewer, creep is off by about one part in them."""
+    turned: float = 0.0
+    """Of Omega dt, by which forces on a belt that turns are behind it, and so is resting load off."""
     implicit_creep: float = 0.0
     """The same under implicit friction, where that is what makes it; of 1 / n."""
     explicit: bool = True
@@ -99,9 +101,18 @@ class Method:
 
 
 METHODS: Mapping[str, Method] = {
-    # 1/sqrt(3), RMS over phases of the greatest, is 0.58. Implicit friction is that of the slip a whole step later.
+    # 1/sqrt(3), RMS over phases of the greatest, is 0.58. Forces are those of half a step ago, implicit
+    # friction that of the slip half a step later.
     "leapfrog": Method(
-        peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, onset=0.35, slip=1.3, second_order=False, implicit_creep=2.0
+        peak=0.6,
+        jump=0.6,
+        touch=0.0,
+        tsuji=0.4,
+        onset=0.35,
+        slip=1.3,
+        second_order=False,
+        turned=0.5,
+        implicit_creep=2.0,
     ),
     "semi_implicit_euler": Method(
         peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, onset=0.35, slip=1.3, second_order=False, creep=1.0

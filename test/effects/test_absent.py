@@ -32,7 +32,7 @@ def world_of(**fields: Any) -> World:
 def test_an_absent_effect_has_no_arrays() -> None:
     """One bottle, frictionless, alone: nothing to search, nothing to turn, nothing under it."""
     world = world_of(bottles=TWO[:1], **NO_FLOOR)
-    present = {"settings", "bottles", "load", "neighbourhood", "watch"}
+    present = {"settings", "bottles", "load", "neighbourhood", "probe"}
     assert set(world._fields) - absent(world) == present
     assert absent(world.load) == {"normal_max", "normal_sum"}
     two = world_of(bottles=TWO, contacts=GLASS, belts={"one": belt(0.1)}, base=base(0.4))
