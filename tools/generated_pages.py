@@ -1,0 +1,46 @@
+"""The pages of docs/ that are made by programs: are they up to date?
+
+    make docs-check                 # names those that are not; fails if there are any
+    make docs                       # writes them anew
+
+What is measured is not measured again: pages are made from the figures kept beside them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+
+
+def pages() -> Iterator[tuple[Path, str]]:
+    """Each page, and its text as it should be."""
+    for name in ("scene", "effects"):
+        yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{name}.reference").reference()
+    sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test")]
+    accuracy, promises, stability = (importlib.import_module(name) for name in ("accuracy", "promises", "stability"))
+    text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
+    yield DOCS / "accuracy.md", promises.page(accuracy.page(text))
+    yield from accuracy.tables().items()
+    text = stability.PAGE.read_text(encoding="utf-8")
+    yield stability.PAGE, stability.page(text, stability.FOLDER)
+
+
+def main() -> None:
+    """Compare all pages, or write them."""
+    stale = [(path, text) for path, text in pages() if not path.exists() or path.read_text(encoding="utf-8") != text]
+    if "--write" in sys.argv[1:]:
+        for path, text in stale:
+            path.write_text(text, encoding="utf-8")
+            print(f"{path.relative_to(ROOT)}: written")
+    elif stale:
+        names = ", ".join(str(path.relative_to(ROOT)) for path, _ in stale)
+        sys.exit(f"{names}: not what its program writes now; `make docs` writes it anew")
+
+
+if __name__ == "__main__":
+    main()
