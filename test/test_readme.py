@@ -26,6 +26,19 @@ def test_python_is_the_example() -> None:
     assert text.split('"""\n\n', 1)[1] == block("python")
 
 
+def test_first_scenario_is_the_one_that_is_tested() -> None:
+    """test/testing/test_documented.py runs it."""
+    documented = (ROOT / "docs" / "testing_control_logic.md").read_text()
+    first = re.search(r"```python\n# test_first.py\n(.*?)```", documented, re.DOTALL)
+    assert first is not None
+    assert f"```python\n# test_first.py\n{first.group(1)}```" in README
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda page: page.name)
+def test_every_page_is_linked(page: Path) -> None:
+    assert f"](docs/{page.name}" in README
+
+
 def test_python_example_runs() -> None:
     done = subprocess.run(
         [sys.executable, "examples/simulate.py"], cwd=ROOT, capture_output=True, text=True, check=True
