@@ -66,7 +66,7 @@ def main(context: click.Context) -> None:
 @click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def check(scene: str, out: Path, outside_tables: bool) -> None:
-    """Validate SCENE (a file, or the name of a shipped one), tell what it comes to, and draw it."""
+    """Validate SCENE (a file, or the name of a shipped one), list its effects and time step with reasons, draw it."""
     from conveyor_sim.model import build_model
     from conveyor_sim.runs.report import plot_function
     from conveyor_sim.scene import load_scene
@@ -93,7 +93,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 @click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
-    """Tell why SCENE is simulated as it is: which effects are on, what bounds the time step; with --price, the cost."""
+    """Explain why SCENE is simulated as it is: its effects, what bounds the time step; with --price, the cost."""
     from conveyor_sim.explain.choices import explanation, price_table
     from conveyor_sim.model import build_model
     from conveyor_sim.scene import load_scene

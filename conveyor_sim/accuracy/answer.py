@@ -1,4 +1,4 @@
-"""The answer: the cheapest setting that a scene can be trusted with, and what an exacter one would cost.
+"""The answer: the cheapest setting that a scene can be trusted with, and what a more exact one would cost.
 
 A setting is recommended only if it did not fail, keeps the tolerance in impacts and in resting load, is within every
 bound of stability, and no long runs found it different; among those, settings come first whose measured errors are
@@ -14,7 +14,7 @@ from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.words import digits, duration, percent
 
 EXACTER = 10.0
-"""How many times exacter the setting is whose cost is told beside."""
+"""How many times more exact the setting is whose cost stands beside."""
 
 NEAR = 1.05
 """Costs within this factor are taken as one: of such settings the most exact is chosen."""
@@ -107,9 +107,9 @@ def _exceeded(point: Point, reference: Reference, rest: Rest | None) -> bool:
 
 
 def _sentence(chosen: Point, exacter: Point | None) -> str:
-    price = "no setting tried is ten times exacter"
+    price = "no setting tried is ten times more exact"
     if exacter is not None:
-        price = f"ten times exacter costs {digits(_cost(exacter) / _cost(chosen))} x ({_named(exacter)})"
+        price = f"ten times more exact costs {digits(_cost(exacter) / _cost(chosen))} x ({_named(exacter)})"
     resting = "" if chosen.resting is None else f" and {percent(chosen.resting)} in resting load"
     return (
         f"{_named(chosen)}: {percent(_error(chosen))} in impacts{resting}, {digits(1.0 / _cost(chosen))} x real time "

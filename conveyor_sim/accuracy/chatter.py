@@ -14,8 +14,8 @@ STEPS = 48
 """Steps that are watched: chatter must fill half of them, no contact at its five steps or more rings so long."""
 
 LEAST = 0.05
-"""Amplitude of chatter, of v_lim, from which it is told. It settles at 2 (1 - b) of it, b the least stable step over
-the one taken, and is 1 and more from twice that on."""
+"""Amplitude of chatter, of v_lim, from which it is reported. It settles at 2 (1 - b) of it, b the least stable step
+over the one taken, and is 1 and more from twice that on."""
 
 
 class ChatterProbe:

@@ -1,4 +1,4 @@
-"""Processor time: what a study takes does not depend on what else the machine does, and compiling is told apart."""
+"""Processor time: what a study takes does not depend on what else the machine does, and compiling is counted apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs that fail, told in one sentence each: unstable, or tunnelling. Chatter is looked for in chatter.py."""
+"""Runs that fail, each reported in one sentence: unstable, or tunnelling. Chatter is looked for in chatter.py."""
 
 import numpy as np
 from numpy.typing import NDArray

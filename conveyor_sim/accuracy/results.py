@@ -193,7 +193,7 @@ class StiffnessRow:
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest setting that can be trusted, and what exacter would cost."""
+    """The cheapest setting that can be trusted, and what a more exact one would cost."""
 
     setting: Setting
     dt: float

@@ -1,4 +1,4 @@
-"""A study from its closed forms to its answer: stage after stage, each told while it runs."""
+"""A study from its closed forms to its answer: stage after stage, each with its progress."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Price:
 
     @property
     def certain(self) -> bool:
-        """Whether the cost is told apart from 0."""
+        """Whether the cost can be told from 0."""
         return self.low > 0.0 or self.high < 0.0
 
 

@@ -222,7 +222,7 @@ def _notes(study: Study, placed: Sequence[Point]) -> list[Note]:
     named: list[tuple[Setting | None, str, str]] = [(study.own, "the scene's own", _OWN)]
     if study.answer is not None:
         named.insert(0, (study.answer.setting, "recommended", _BEST))
-        named.append((study.answer.exacter, "ten times exacter", style.MUTED))
+        named.append((study.answer.exacter, "ten times more exact", style.MUTED))
     for point in placed:
         assert point.cost is not None and point.errors is not None
         titles = [(title, colour) for setting, title, colour in named if setting == point.setting]

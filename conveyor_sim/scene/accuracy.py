@@ -22,7 +22,7 @@ The stiffest shipped scene at the preset `fine`, ten times finer again, stays be
 """
 
 MANY_STEPS = 20_000
-"""In a tick, from which on a scene is told to be slow: 100 bottles take a minute for ten simulated seconds."""
+"""In a tick, from which on a scene is reported as slow: 100 bottles take a minute for ten simulated seconds."""
 
 StepCount = Annotated[int, Strict(), Ge(1), Le(MOST_STEPS), Says(f"a whole number from 1 to {MOST_STEPS}")]
 

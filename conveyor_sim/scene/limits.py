@@ -1,4 +1,4 @@
-"""Limits of a scene file: what goes beyond them is told as an event (topic `damage_events`); nothing else happens."""
+"""Limits of a scene file: what goes beyond them is an event (topic `damage_events`); nothing else happens."""
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.types import Positive, quantity

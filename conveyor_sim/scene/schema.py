@@ -283,7 +283,7 @@ class Scene(Part):
     outputs: Outputs = quantity("Rates of the outputs.", default=Outputs.model_construct())
     limits: Annotated[DamageLimits, Holds("a mapping with the fields " + ", ".join(DamageLimits.model_fields))] = (
         quantity(
-            "What bottles should bear at most; what goes beyond is told as an event.",
+            "What bottles should bear at most; what goes beyond is reported as an event.",
             default=DamageLimits.model_construct(),
         )
     )

@@ -137,7 +137,7 @@ class Integration:
             self._state.world.moving.clock[0] = steps
 
     def _tell(self, tick: int) -> None:
-        """What does not stop a run, told the first time."""
+        """What does not stop a run, reported the first time."""
         if (event := self._guard.soft(tick)) is not None:
             self._events.append(event)
         if self._listening and not self._chatters and tick % self._listening == 0:

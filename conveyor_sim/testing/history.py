@@ -55,7 +55,7 @@ class History:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All that there is: signals, commands, faults, then the alarms that were told of."""
+        """All that there is: signals, commands, faults, then the alarms that were raised."""
         return (*self._index, *self._others)
 
     @property

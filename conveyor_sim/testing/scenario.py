@@ -122,7 +122,7 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     @property
     def alarms(self) -> frozenset[str]:
-        """Names of the alarms that stand, as told by the controller's last scan."""
+        """Names of the alarms that stand, as of the controller's last scan."""
         return frozenset(name.removeprefix(ALARMS) for name, value in self._alarms.items() if value >= ON)
 
     @property

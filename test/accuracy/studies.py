@@ -196,8 +196,8 @@ def study() -> Study:
             exacter_error=0.00081,
             exacter_cost=4.9,
             sentence=f"Δt = 100 us, velocity_verlet: {100.0 * chosen.errors.peak_force:.2g} % in impacts and 0.03 % in "
-            f"resting load, {1.0 / chosen.cost.median:.2g} x real time on this machine; ten times exacter costs 4.9 x "
-            "(Δt = 20 us, velocity_verlet).",
+            f"resting load, {1.0 / chosen.cost.median:.2g} x real time on this machine; ten times more exact costs "
+            "4.9 x (Δt = 20 us, velocity_verlet).",
             accepted=False,
             doubts=("Long runs could not decide within the budget; they resolve mean queue force to 2 % (8 runs).",),
             resting=chosen.resting,

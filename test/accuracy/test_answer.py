@@ -39,7 +39,7 @@ SURE = Reference(Setting("dormand_prince", 500, error=1e-9), errors(1e-6))
 
 
 def test_the_cheapest_that_keeps_the_tolerance() -> None:
-    """Failed settings and softer ones are no answers; ten times exacter is the cheapest of a tenth of the error."""
+    """Failed settings and softer ones are no answers; ten times more exact is the cheapest of a tenth of the error."""
     assert [p.setting for p in eligible(ALL, 0.01)] == [MIDDLE.setting, VERLET.setting, FINE.setting]
     answer = find_answer(ALL, SURE, [], 0.01)
     assert answer is not None
@@ -49,7 +49,7 @@ def test_the_cheapest_that_keeps_the_tolerance() -> None:
     assert answer.exacter_cost == pytest.approx(3.2)
     assert answer.sentence == (
         "Δt = 500 us, semi_implicit_euler: 0.8 % in impacts, 50 x real time on this machine; "
-        "ten times exacter costs 3.2 x (Δt = 100 us, velocity_verlet)."
+        "ten times more exact costs 3.2 x (Δt = 100 us, velocity_verlet)."
     )
 
 

@@ -1,4 +1,4 @@
-"""Processor time is what a study counts, and compiling is told apart."""
+"""Processor time is what a study counts, and compiling is counted apart."""
 
 from __future__ import annotations
 

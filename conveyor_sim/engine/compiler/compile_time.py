@@ -1,4 +1,4 @@
-"""Processor time that numba takes to compile, told apart from what runs."""
+"""Processor time that numba takes to compile, counted apart from what runs."""
 
 from collections.abc import Callable
 

@@ -19,7 +19,7 @@ STEPS = 8
 """Steps that are listened to: no contact that is resolved rings at every step for so long."""
 
 LEAST = 0.25
-"""Amplitude of chatter, of v_lim, from which it is told."""
+"""Amplitude of chatter, of v_lim, from which it is reported."""
 
 
 def chatter_of(velocities: F8) -> F8:

@@ -23,7 +23,7 @@ GROWTH = 2.0
 """Of all energy in a tick, what belts do apart: explicit methods swing by less in a contact that they can follow."""
 
 SOFT = 0.2
-"""Overlap over the radius from which it is told: places and gaps are wrong by as much."""
+"""Overlap over the radius from which it is reported: places and gaps are wrong by as much."""
 
 CLOSELY = 128
 """Steps after which overlaps are looked at again at the latest; that costs about half a step."""
@@ -107,7 +107,7 @@ class Guard:
         self._state.world.probe.due[0] = 0
 
     def soft(self, tick: int) -> GuardEvent | None:
-        """A contact that is too soft for what it bears, told once, at a tick."""
+        """A contact that is too soft for what it bears, reported once, at a tick."""
         found, self._soft = self._soft, None
         if found is None:
             return None
