@@ -52,7 +52,7 @@ def _one_size(n: int, effort: Effort, lammps: bool) -> list[Row]:
         if effects == "everything":  # other bottles, and some are fed: it has to pack its own
             ours.press(simulation, settle)
         else:
-            simulation.take_state_of(presser)
+            simulation.restore_from(presser)
             simulation.advance(round(HANDED_OVER / TICK))
         say(f"dense, {n} bottles: {name_of(effects, threads)} is packed")
     start = ours.state_of(presser, box_for(n))

@@ -26,7 +26,7 @@ from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
-from conveyor_sim.state.part_memory import entries, recall, remembered, typed
+from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
 from conveyor_sim.state.state import FIRST_SLOTS, State
 from conveyor_sim.state.world_arrays import changing_arrays
 from conveyor_sim.stepping.guard import GuardEvent
@@ -106,7 +106,7 @@ class Simulation:
         """
         checkpoint = read_checkpoint(Path(path), scene, folder)
         simulation = cls(checkpoint.scene, threads)
-        simulation._go_on_from(checkpoint)
+        simulation._restore(checkpoint)
         return simulation
 
     def save(self, path: str | PathLike[str], folder: Path | None = None) -> None:
@@ -114,7 +114,7 @@ class Simulation:
 
         folder: as for `load`. Raises CheckpointError if the file can't be written, which leaves what it held.
         """
-        write_checkpoint(Path(path), self.scene, self._memory(), changing_arrays(self._state.world), folder)
+        write_checkpoint(Path(path), self.scene, self._snapshot(), changing_arrays(self._state.world), folder)
 
     @property
     def time(self) -> float:
@@ -216,14 +216,14 @@ class Simulation:
         """Threads that the next tick is to be stepped with."""
         return self._integration.threads
 
-    def take_state_of(self, other: "Simulation") -> None:
+    def restore_from(self, other: "Simulation") -> None:
         """Take over the bottles, the time and the belts' speeds of another Simulation of the same line.
 
         The scenes may differ in their effects and steps. Tangential springs of contacts start anew.
         """
         self.tick = other.tick
-        self._line.take_over(other._line)
-        self._state.take(other._state)
+        self._line.restore_from(other._line)
+        self._state.restore_from(other._state)
         self._integration.put_in()
         self._set_surfaces()
         if self._account is not None:
@@ -322,32 +322,32 @@ class Simulation:
             digest.update(moving.position.tobytes() + moving.speed.tobytes())
         return int.from_bytes(digest.digest(), "little")
 
-    def _memory(self) -> dict[str, Any]:
+    def _snapshot(self) -> dict[str, Any]:
         """All that changes as it runs but the arrays of the World, as plain data."""
         return {
             "tick": self.tick,
             "next_id": self._state.next_id,
-            "line": self._line.memory(),
-            "account": None if self._account is None else remembered(self._account),
-            "damage": None if self._damage is None else remembered(self._damage),
-            "integration": self._integration.memory(),
+            "line": self._line.snapshot(),
+            "account": None if self._account is None else snapshot(self._account),
+            "damage": None if self._damage is None else snapshot(self._damage),
+            "integration": self._integration.snapshot(),
         }
 
-    def _go_on_from(self, checkpoint: Checkpoint) -> None:
+    def _restore(self, checkpoint: Checkpoint) -> None:
         memory = checkpoint.memory
         try:
-            entries(memory, self._memory(), "memory")
+            entries(memory, self._snapshot(), "memory")
             self.tick = typed(int, memory["tick"], "tick")
             if self.tick < 0 or self.stamp_ns > LAST_STAMP_NS:
                 raise ValueError(f"tick {self.tick}, which no message can say")
-            self._line.go_on_from(self.tick, memory["line"])
+            self._line.restore(self.tick, memory["line"])
             for name, account in (("account", self._account), ("damage", self._damage)):
                 if account is None:
                     typed(type(None), memory[name], name)
                 else:
-                    recall(account, memory[name], name)
-            self._integration.recall(memory["integration"])
-            self._state.go_on_from(checkpoint.arrays, typed(int, memory["next_id"], "next_id"))
+                    restore(account, memory[name], name)
+            self._integration.restore(memory["integration"])
+            self._state.restore(checkpoint.arrays, typed(int, memory["next_id"], "next_id"))
         except (ValueError, MemoryError) as error:
             raise damaged(checkpoint.path, error) from error
 

@@ -12,7 +12,7 @@ from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColu
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.state import State
 from conveyor_sim.state.empty_damage import rail_places
-from conveyor_sim.state.part_memory import Unchecked
+from conveyor_sim.state.snapshot import Unchecked
 
 WORDS = {
     "scuffing_work": ("has taken {:.3g} J of sliding work at its wall by the time it is", "J"),

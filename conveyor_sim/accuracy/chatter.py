@@ -34,7 +34,7 @@ class ChatterProbe:
     def look(self, state: Simulation) -> str:
         """One sentence if the setting chatters from a state of the scene on, which stays as it is; else empty."""
         simulation = self._simulation
-        simulation.take_state_of(state)
+        simulation.restore_from(state)
         bottles = simulation.bottles()
         radius = simulation.model.type_radius[bottles.type]
         velocities = []

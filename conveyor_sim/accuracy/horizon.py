@@ -90,8 +90,8 @@ class HorizonFinder:
 
     def _growth_of_error(self, begin: Simulation, early: int, most: int) -> int | None:
         """Ticks until the coarse setting's own error after an early part has grown by GROWTH; None: not in `most`."""
-        self.coarse.take_state_of(begin)
-        self.fine.take_state_of(begin)
+        self.coarse.restore_from(begin)
+        self.fine.restore_from(begin)
         try:
             self.coarse.advance(early)
             self.fine.advance(early)
@@ -102,14 +102,14 @@ class HorizonFinder:
             return None
         # Of the two, only its state is needed from here on.
         middle = self.coarse
-        middle.take_state_of(self.fine)
+        middle.restore_from(self.fine)
         grown = self._growth(middle, error, most - early)
         return None if grown is None else early + grown
 
     def _growth(self, begin: Simulation, shift: F8, most: int) -> int | None:
         """Ticks until a displacement (2, bottles) has grown by GROWTH; None: not in `most` ticks."""
-        self.fine.take_state_of(begin)
-        self.nudged.take_state_of(begin)
+        self.fine.restore_from(begin)
+        self.nudged.restore_from(begin)
         self.nudged.displace(shift[0], shift[1])
         ids, size = begin.bottles().id, _rms(np.hypot(*shift))
         before, smooth = np.hypot(*shift), np.full(ids.size, True)

@@ -139,7 +139,7 @@ class RestingLoad:
 
     def _keep(self, fine: Simulation, loads: Loads) -> None:
         self.state = variant(self.scene, fine_setting(self.scene))
-        self.state.take_state_of(fine)
+        self.state.restore_from(fine)
         self.reason = f"settled at {fine.time:g} s, with {loads.force.size} resting contacts of {loads.rms:.3g} N (RMS)"
         work = max(1, fine.counts.present) * standard_steps(self.scene) / self.scene.tick
         self.window = min(WINDOW, max(10.0 * self.scene.tick, WINDOW_WORK / work))
@@ -197,7 +197,7 @@ def loads_from(simulation: Simulation, state: Simulation, window: float = WINDOW
 
     Tangential springs, which such a start leaves slack, get another window before to be taut again.
     """
-    simulation.take_state_of(state)
+    simulation.restore_from(state)
     if simulation.model.has("tangential_spring"):
         simulation.advance(_ticks(simulation, window))
     return mean_loads(simulation, window)

@@ -85,7 +85,7 @@ def _find(scene: Scene, exercise: Exercise | None, progress: Progress) -> list[S
             _advance(again, exercise)
             progress((1.0 + again.tick / ticks[-1]) * scene.duration, whole)
         state = variant(scene, setting)
-        state.take_state_of(again)
+        state.restore_from(again)
         starts.append(Start(state, untouched=tick == first))
     progress(whole, whole)
     return starts

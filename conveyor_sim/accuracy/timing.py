@@ -56,7 +56,7 @@ def _run(simulation: Simulation, state: Simulation, ticks: int, repeats: int) ->
     """Processor time (s) of some ticks from a state on, several times over; what it takes to go back is not counted."""
     spent = 0.0
     for _ in range(repeats):
-        simulation.take_state_of(state)
+        simulation.restore_from(state)
         start = time.process_time()
         simulation.advance(ticks)
         spent += time.process_time() - start

@@ -51,7 +51,7 @@ def variant(scene: Scene, setting: Setting, **fields: Any) -> Simulation:
 
 def follow(simulation: Simulation, start: Simulation, ticks: int) -> Trajectory:
     """Run from the state of another Simulation of the same line."""
-    simulation.take_state_of(start)
+    simulation.restore_from(start)
     # A run that is unstable overflows before it ends.
     with np.errstate(over="ignore", invalid="ignore"):
         frames = [_frame(simulation)]

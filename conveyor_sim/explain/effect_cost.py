@@ -124,12 +124,12 @@ class Pricing:
         model = self._warm.model
         removable = _removable(model)
         wanted = [*((name, [name]) for name in removable), (ALL, removable)] if removable else []
-        self._full.take_state_of(self._warm)
+        self._full.restore_from(self._warm)
         self._full.advance()
         for done, (name, off) in enumerate(wanted):
             progress(done, len(wanted))
             simulation = Simulation(_variant(self._scene, model, off), threads=1, shorten=False)
-            simulation.take_state_of(self._warm)
+            simulation.restore_from(self._warm)
             try:
                 simulation.advance()
             except SimulationError as error:
@@ -217,7 +217,7 @@ def _run(simulation: Simulation, warm: Simulation, ticks: int) -> tuple[float, f
 
     Time of this thread, which takes all the steps: another program on the core is not an effect's price.
     """
-    simulation.take_state_of(warm)
+    simulation.restore_from(warm)
     simulation.advance()  # what a new state costs once, such as lists and cold memory, is not an effect's price
     before = simulation.counts.present
     start = time.thread_time()

@@ -16,7 +16,7 @@ from conveyor_sim.line.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
-from conveyor_sim.state.part_memory import Unchecked, entries, recall, remembered, typed
+from conveyor_sim.state.snapshot import Unchecked, entries, restore, snapshot, typed
 from conveyor_sim.support.printable import printable
 
 FAULT = "fault"
@@ -161,14 +161,14 @@ class Line:
         self.now.begin_scan()
         return self.now.carriers()
 
-    def take_over(self, other: "Line") -> None:
+    def restore_from(self, other: "Line") -> None:
         """Stand as another line of the same scene does; watchdogs too."""
         self.now.tick = other.now.tick
         self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
         self.now.bad = set(other.now.bad)
-        recall(self._by_name(), remembered(other._by_name()))
+        restore(self._by_name(), snapshot(other._by_name()))
 
-    def memory(self) -> dict[str, Any]:
+    def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
         return {
             "pending": self._pending,
@@ -176,19 +176,19 @@ class Line:
             "setpoints": self.now.setpoints.tolist(),
             "speeds": self.now.speeds.tolist(),
             "bad": sorted(self.now.bad),
-            "devices": remembered(self._by_name()),
+            "devices": snapshot(self._by_name()),
         }
 
-    def go_on_from(self, tick: int, memory: dict[str, Any]) -> None:
+    def restore(self, tick: int, memory: dict[str, Any]) -> None:
         """Stand as one of the same scene did at a tick. Raises ValueError for what is no memory of one."""
-        entries(memory, self.memory(), "line")
+        entries(memory, self.snapshot(), "line")
         self.now.tick = tick
         self._pending = typed(list[_Pending], memory["pending"], "line.pending")
         self._outcomes = [CommandOutcome(*told) for told in typed(list[_Outcome], memory["outcomes"], "line.outcomes")]
         speeds = {"setpoints": self.now.setpoints, "speeds": self.now.speeds}
-        recall(speeds, {name: memory[name] for name in speeds}, "line")
+        restore(speeds, {name: memory[name] for name in speeds}, "line")
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
-        recall(self._by_name(), memory["devices"], "line.devices")
+        restore(self._by_name(), memory["devices"], "line.devices")
 
     def _by_name(self) -> dict[str, Device]:
         return {device.name: device for device in self._devices}

@@ -24,7 +24,7 @@ from conveyor_sim.errors import CheckpointError, SceneError
 from conveyor_sim.model.model import versions_here
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.difference import scene_difference
-from conveyor_sim.state.part_memory import wrong
+from conveyor_sim.state.snapshot import wrong
 from conveyor_sim.state.world_arrays import Arrays
 from conveyor_sim.support.files import MB, FileError, in_mb, read_file, write_file
 from conveyor_sim.support.printable import printable

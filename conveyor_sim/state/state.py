@@ -78,7 +78,7 @@ class State:
             world.moving.springs.elongation[slot] = 0.0
         world.neighbourhood.stale[0] = 1
 
-    def take(self, other: "State") -> None:
+    def restore_from(self, other: "State") -> None:
         """Take over the bottles of a State of the same line and bottle types, each in its slot.
 
         What their bases are tied to comes along; tangential springs of contacts start anew.
@@ -101,7 +101,7 @@ class State:
         self._note_velocities(slice(None))
         self.make_lists()
 
-    def go_on_from(self, arrays: Arrays, next_id: int) -> None:
+    def restore(self, arrays: Arrays, next_id: int) -> None:
         """Take the arrays of another State of the same Model for its own (`changing_arrays`), lists included.
 
         Raises ValueError where they are not those of such a State.

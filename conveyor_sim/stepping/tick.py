@@ -14,9 +14,9 @@ from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model.moving_rails import fastest_rail
 from conveyor_sim.state import State
-from conveyor_sim.state.part_memory import Unchecked, entries, typed
+from conveyor_sim.state.snapshot import Unchecked, entries, typed
 from conveyor_sim.stepping.guard import Guard, GuardEvent, Violation, chatter
-from conveyor_sim.stepping.guard.memory import Memory
+from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
 SHORTER = (4, 16, 64)
 """By what factors steps are shortened, one after another, for a tick that the guard objects to."""
@@ -63,8 +63,8 @@ class Integration:
         events, self._events = self._events, []
         return events
 
-    def memory(self) -> dict[str, Any]:
-        """What is remembered from tick to tick beside the State, as plain data for `recall`."""
+    def snapshot(self) -> dict[str, Any]:
+        """What is remembered from tick to tick beside the State, as plain data for `restore`."""
         return {
             "events": [astuple(event) for event in self._events],
             "chatters": self._chatters,
@@ -73,9 +73,9 @@ class Integration:
             "put_in": self._guard.has_put_in,
         }
 
-    def recall(self, memory: dict[str, Any]) -> None:
+    def restore(self, memory: dict[str, Any]) -> None:
         """Take over what another one of the same Model remembered. Raises ValueError for what is no such memory."""
-        entries(memory, self.memory(), "integration")
+        entries(memory, self.snapshot(), "integration")
         self._events = [GuardEvent(*event) for event in typed(list[_Event], memory["events"], "integration.events")]
         self._chatters = typed(bool, memory["chatters"], "integration.chatters")
         self.shortened_ticks = typed(int, memory["shortened_ticks"], "integration.shortened_ticks")
@@ -156,15 +156,15 @@ class Integration:
     def _listen(self, tick: int) -> None:
         """Take some steps on, one by one, and go back."""
         state, model = self._state, self._model
-        memory = Memory()
-        memory.keep(state.world)
+        memory = WorldSnapshot()
+        memory.take(state.world)
         self._set_clock(model.steps_per_tick)
         velocities = [chatter.velocities_of(state.world)]
         for _ in range(chatter.STEPS):
             self._pool.advance(self.threads, self._advance, state.world, 1, model.dt, START)
             state.make_lists()
             velocities.append(chatter.velocities_of(state.world))
-        memory.put_back(state)
+        memory.restore(state)
         self._guard.forget()
         amplitude = chatter.chatter_of(np.array(velocities))
         amplitude[state.world.bottles.id < 0] = 0.0

@@ -267,7 +267,7 @@ def chatter(simulation: Simulation) -> float:
     setting = Setting(simulation.model.integrator, 1, error=scene.accuracy.error)
     # The same effects as those of the run, whose kernels are compiled.
     probe = variant(scene, setting, tick=step, duration=step, effects=supply, outputs={"ledger": 1.0 / step})
-    probe.take_state_of(simulation)
+    probe.restore_from(simulation)
     radius = simulation.model.type_radius[simulation.bottles().type]
     velocities = []
     for _ in range(STEPS):

@@ -172,7 +172,7 @@ def test_to_push_bottles_by_hand_is_to_bring_energy() -> None:
     assert ledger_of(sim).fed == ledger_of(sim).kinetic == pytest.approx(0.5 * MASS)
     assert ledger_of(sim).residual == 0.0
     fresh = apart(bottle(50.0, 0.0), bottle(60.0, 0.0))
-    fresh.take_state_of(sim)
+    fresh.restore_from(sim)
     assert ledger_of(fresh).fed == pytest.approx(0.5 * MASS)
 
 

@@ -19,7 +19,7 @@ from worlds import ALONE
 from conveyor_sim.engine.integrators import INTEGRATORS as INTEGRATORS_BY_NAME
 from conveyor_sim.engine.integrators import START
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard.memory import Memory
+from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
 INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "rk4"]
 MOVING = INTEGRATORS[:2]
@@ -252,11 +252,11 @@ def test_the_same_bits_however_it_is_run(integrator: str, tmp_path: Path) -> Non
         assert moving.springs is not None
         assert np.count_nonzero(moving.springs.elongation) >= 3
     # As the guard does it: the tick is taken back, and done again.
-    memory = Memory()
-    memory.keep(state.world)
+    memory = WorldSnapshot()
+    memory.take(state.world)
     going_on._integration._take_steps(4)
     assert state.springs() != springs
-    memory.put_back(state)
+    memory.restore(state)
     assert state.springs() == springs
     for tick in range(20):
         if tick == 7:

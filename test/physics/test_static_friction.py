@@ -15,7 +15,7 @@ from state.test_checkpoint import END, SAVED, everything, queue, run
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state.world_arrays import changing_arrays
 from conveyor_sim.state.world_checks import indices, ranges
-from conveyor_sim.stepping.guard.memory import Memory
+from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
 MU, G = 0.4, 9.81
 MOST = MU * MASS * G
@@ -100,7 +100,7 @@ def test_it_stands_still_in_steps_of_another_length() -> None:
     one, other = (standing("velocity_verlet", steps, 0.5, 0.0, 0.0, omega * 0.5, omega=omega) for steps in (100, 200))
     one.advance(100)
     start = math.hypot(*place(one))
-    other.take_state_of(one)
+    other.restore_from(one)
     other.advance(50)
     assert math.hypot(*place(other)) == pytest.approx(start, abs=1e-9)
 
@@ -270,12 +270,12 @@ def test_a_loaded_run_goes_on_bit_for_bit_on_any_number_of_threads(integrator: s
 def test_the_guard_takes_springs_back() -> None:
     sim = Simulation(queue(base=sprung()), threads=1)
     run(sim, 60)
-    state, memory = sim._state, Memory()
+    state, memory = sim._state, WorldSnapshot()
     before, hashed = state.springs(), sim.state_hash()
-    memory.keep(state.world)
+    memory.take(state.world)
     sim._integration._take_steps(1)
     assert state.springs() != before
-    memory.put_back(state)
+    memory.restore(state)
     assert (state.springs(), sim.state_hash()) == (before, hashed)
 
 

@@ -27,7 +27,7 @@ from conveyor_sim.errors import CheckpointError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state.checkpoint import FORMAT, sealed, versions
-from conveyor_sim.state.part_memory import remembered
+from conveyor_sim.state.snapshot import snapshot
 from conveyor_sim.state.world_arrays import CONSTANT, changing_arrays
 from conveyor_sim.state.world_checks import FIXED, SCRATCH, indices, ranges
 
@@ -213,13 +213,13 @@ def test_all_that_changes_is_in_the_file(tmp_path: Path) -> None:
     assert loaded._state.next_id == sim._state.next_id
     assert sorted(loaded._state._free) == sorted(sim._state._free)
     memory, again = (
-        {name: remembered(value) for name, value in vars(each).items() if name not in BUILT_ANEW}
+        {name: snapshot(value) for name, value in vars(each).items() if name not in BUILT_ANEW}
         | {"deepest overlap": each.deepest_overlap}
         for each in (sim, loaded)
     )
     assert again == memory
     assert {"tick", "_integration"} <= memory.keys()
-    assert loaded._line.memory() == sim._line.memory()
+    assert loaded._line.snapshot() == sim._line.snapshot()
     assert memory["deepest overlap"] > 0.0
 
 
@@ -451,7 +451,7 @@ def test_arrays_that_can_not_be_are_refused(saved: Path, tmp_path: Path) -> None
     for name, array in arrays.items():
         for wrong, reason in spoilt(name, array):
             with pytest.raises(ValueError, match=re.escape(reason)):
-                state.go_on_from({**arrays, name: wrong}, state.next_id)
+                state.restore({**arrays, name: wrong}, state.next_id)
             assert state.world is world
             told[reason.split()[-1]] += 1
     assert all(told[word] > 5 for word in ("shape", "finite", "holds", "scene"))

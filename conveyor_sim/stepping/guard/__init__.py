@@ -1,7 +1,7 @@
 """The guard: looks at every tick for what no bottle can do, has it done again in shorter steps, or stops the run.
 
-`guard.py` looks and decides, `memory.py` keeps the state to go back to, `violation.py` and `squeeze.py` find the words,
-`chatter.py` hears friction that shakes from step to step. What it looks at: `engine/observers/guard_probe.py`.
+`guard.py` looks and decides, `world_snapshot.py` keeps the state to go back to, `violation.py` and `squeeze.py` find
+the words, `chatter.py` hears friction that shakes from step to step. It looks at `engine/observers/guard_probe.py`.
 """
 
 from conveyor_sim.stepping.guard.guard import Guard

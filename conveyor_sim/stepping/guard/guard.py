@@ -12,9 +12,9 @@ from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.observers.guard_probe import look
 from conveyor_sim.engine.observers.stored_energy import find_stored_energy
 from conveyor_sim.state import State
-from conveyor_sim.stepping.guard.memory import Memory
 from conveyor_sim.stepping.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.stepping.guard.violation import GuardEvent, Violation, Words
+from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
 DEEPEST = 0.75
 """Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""
@@ -41,7 +41,7 @@ class Guard:
         self._state = state
         self._model = state.model
         self._found = found
-        self._memory = Memory()
+        self._memory = WorldSnapshot()
         self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
         tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
         self._friction = tick * self._model.largest_base_friction
@@ -61,7 +61,7 @@ class Guard:
         surface_speed: m/s, the largest of any belt's surface; rail_speed: m/s, of any rail that moves.
         """
         model, world = self._model, self._state.world
-        self._memory.keep(world)
+        self._memory.take(world)
         if tick % self._every == 0:
             world.probe.due[0] = 1
         bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
@@ -130,22 +130,22 @@ class Guard:
 
     def _grown(self) -> tuple[float, float] | None:
         """Energy (J) before and after the tick if it grew by too much: a contact that opened may explain a speed."""
-        after = Memory()
-        after.keep(self._state.world)
+        after = WorldSnapshot()
+        after.take(self._state.world)
         total = self._energy()
         self._put_back()
         before = self._energy()
-        after.put_back(self._state)
+        after.restore(self._state)
         return (before, total) if total > GROWTH * before + self._work else None
 
     def _was_deep(self) -> bool:
         """Whether bottles were put in so deep before the tick: they may part."""
-        after, watch = Memory(), self._state.world.probe
+        after, watch = WorldSnapshot(), self._state.world.probe
         bottle, other = watch.bottle.copy(), watch.other.copy()
-        after.keep(self._state.world)
+        after.take(self._state.world)
         self._put_back()
         deep = deepest_overlap(self._state.world, self._found)
-        after.put_back(self._state)
+        after.restore(self._state)
         watch.bottle[:], watch.other[:] = bottle, other
         return deep > DEEPEST
 
@@ -172,5 +172,5 @@ class Guard:
 
     def _put_back(self) -> None:
         """Have the state as it was at the beginning of the tick."""
-        self._memory.put_back(self._state)
+        self._memory.restore(self._state)
         self.forget()

@@ -12,14 +12,14 @@ from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.state import State
 
 
-class Memory:
+class WorldSnapshot:
     """One state of the bottles of a State, with peaks, tangential springs, the energy ledger's books and damage."""
 
     def __init__(self) -> None:
         self._world: World | None = None
         self._groups: list[_Group] = []
 
-    def keep(self, world: World) -> None:
+    def take(self, world: World) -> None:
         """Take a copy, in place of the one before."""
         if world is not self._world:
             self._world, self._groups = world, _groups(list(_moving(world)))
@@ -27,7 +27,7 @@ class Memory:
             # One call for all of them: each would cost as much by itself.
             np.concatenate(group.columns, out=group.kept)
 
-    def put_back(self, state: State) -> None:
+    def restore(self, state: State) -> None:
         """Have a State as it was kept; no bottle may have come or gone since."""
         now = list(_moving(state.world))
         for group in self._groups:

@@ -17,26 +17,26 @@ LARGEST = 2**53
 """Of whole numbers: ticks, counts and ids are far below."""
 
 
-def remembered(part: Any) -> Any:
+def snapshot(part: Any) -> Any:
     """An object by its public attributes, or a dict or sequence of such, as data that JSON can hold.
 
     Pieces of a scene are left out, random generators taken by their state.
     """
     if isinstance(part, dict):
-        return {str(key): remembered(value) for key, value in part.items() if not isinstance(value, Part)}
+        return {str(key): snapshot(value) for key, value in part.items() if not isinstance(value, Part)}
     if isinstance(part, np.random.Generator):
         return part.bit_generator.state
     if isinstance(part, np.ndarray):
         return part.tolist()
     if isinstance(part, (list, tuple)):
-        return [remembered(value) for value in part]
+        return [snapshot(value) for value in part]
     if hasattr(part, "__dict__"):
-        return remembered(_public(part))
+        return snapshot(_public(part))
     return part
 
 
-def recall(part: Any, told: Any, name: str = "memory") -> None:
-    """Put what `remembered` told of an object, or of a dict of objects, back into one that is built alike.
+def restore(part: Any, told: Any, name: str = "memory") -> None:
+    """Put what `snapshot` told of an object, or of a dict of objects, back into one that is built alike.
 
     What is told must be alike: the same attributes, of the types of the class's annotations, or else of the values
     that they have now; numbers are finite. Raises ValueError, in words, where it is not.
@@ -52,7 +52,7 @@ def recall(part: Any, told: Any, name: str = "memory") -> None:
         elif isinstance(value, np.ndarray):
             value[...] = _array(value.shape, given, place)
         elif hasattr(value, "__dict__"):
-            recall(value, given, place)
+            restore(value, given, place)
         else:
             if isinstance(value, dict):
                 entries(given, value, place)
