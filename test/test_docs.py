@@ -26,3 +26,15 @@ def test_headings_that_a_page_links_to_are_there(page: Path) -> None:
         headings = re.findall(r"^#+ (.+)$", target.read_text(encoding="utf-8"), re.MULTILINE)
         anchors = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
         assert anchor in anchors, f"{link}#{anchor}"
+
+
+SOURCES = {source.relative_to(ROOT).as_posix() for folder in ("conveyor_sim", "test", "examples", "docs", "tools")
+           for source in (ROOT / folder).rglob("*.py")} | {"setup.py"}  # fmt: skip
+WRITTEN = sorted([*PAGES, *(ROOT / "conveyor_sim").rglob("*.py")])
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_that_a_page_or_a_docstring_names_are_there(page: Path) -> None:
+    """By the end of their path: `near.py`, `engine/lists/near.py`."""
+    named = re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8"))
+    assert [name for name in named if not any(f"/{source}".endswith(f"/{name}") for source in SOURCES)] == []
