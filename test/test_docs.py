@@ -28,7 +28,7 @@ def test_headings_that_a_page_links_to_are_there(page: Path) -> None:
         assert anchor in anchors, f"{link}#{anchor}"
 
 
-SOURCES = {source.relative_to(ROOT).as_posix() for folder in ("conveyor_sim", "test", "examples", "docs", "tools")
+SOURCES = {source.relative_to(ROOT).as_posix() for folder in ("bench", "conveyor_sim", "test", "examples", "docs", "tools")
            for source in (ROOT / folder).rglob("*.py")} | {"setup.py"}  # fmt: skip
 WRITTEN = sorted([*PAGES, *(ROOT / "conveyor_sim").rglob("*.py")])
 
