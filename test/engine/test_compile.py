@@ -100,10 +100,13 @@ def test_a_better_comment_throws_no_kernels_away(copied: Path) -> None:
 def test_a_kept_hash_that_is_damaged_is_found_again(copied: Path) -> None:
     before = hash_of(copied)
     (kept,) = (copied / "cache" / "conveyor_sim" / "sources").iterdir()
-    for damaged in (b"", before.encode()[:-1], b"\xff" * 16):
+    whole = kept.read_bytes()
+    assert whole.startswith(before.encode())
+    other = bytes([whole[3] ^ 1])  # a digit still
+    for damaged in (b"", whole[:-1], b"\xff" * len(whole), whole[:3] + other + whole[4:]):
         kept.write_bytes(damaged)
         assert hash_of(copied) == before
-        assert kept.read_bytes() == before.encode()
+        assert kept.read_bytes() == whole
 
 
 def test_a_second_process_compiles_nothing(copied: Path) -> None:

@@ -92,7 +92,7 @@ def test_interrupted_run_ends_with_a_whole_bag(tmp_path: Path, request_: signal.
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parent,
+        cwd=Path(__file__).parents[1],
     )
     assert process.stdout is not None
     for _ in range(20):

@@ -6,7 +6,6 @@ Parsing takes a quarter of a second at every start. So the hash is kept in a fil
 import ast
 import hashlib
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -21,15 +20,20 @@ def source_hash(root: Path, sources: Iterable[Path], size: int) -> str:
     if folder is None:
         return _parsed(contents, size)
     file = folder / _hash((part for item in contents.items() for part in (item[0].encode(), item[1])), 16)
-    with suppress(OSError, UnicodeDecodeError):
-        if re.fullmatch(f"[0-9a-f]{{{2 * size}}}", known := file.read_text()):
-            return known
+    with suppress(OSError):
+        kept = file.read_bytes()
+        if kept == _with_checksum(kept[: 2 * size]):
+            return kept[: 2 * size].decode()
     found = _parsed(contents, size)
     with suppress(OSError):
         part = file.with_name(f"{file.name}.{os.getpid()}")
-        part.write_text(found)
+        part.write_bytes(_with_checksum(found.encode()))
         part.replace(file)
     return found
+
+
+def _with_checksum(digits: bytes) -> bytes:
+    return digits + b" " + _hash([digits], 16).encode()
 
 
 def _parsed(contents: Mapping[str, bytes], size: int) -> str:
