@@ -42,6 +42,8 @@ OUTCOMES = Qos(depth=1000)
 """As many as one tick may bring (ros/inbox.py)."""
 ALARMS = Qos(depth=100, durability="transient_local")
 """A controller's alarms: who joins late still gets what came and went before."""
+ANSWERS = Qos(depth=1000)
+"""Of the service `lockstep`: each client is sent the answers to all, and a short history could lose it its own."""
 CLOCK = Qos(depth=1)
 """Reliable, because that also matches subscribers that ask for best effort."""
 

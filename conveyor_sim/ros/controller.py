@@ -16,7 +16,7 @@ from conveyor_msgs.msg import Commands, Line, Signals
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.qos import ANSWERS, QOS
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
@@ -78,7 +78,7 @@ class ControllerRun:
         self._has_line = threading.Event()
         self._alarms = Alarms(node)
         node.create_subscription(Line, "line", self._on_line, ros_qos(QOS["line"]))
-        self._lockstep = node.create_client(Lockstep, "lockstep")
+        self._lockstep = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS))
         self._spinner = Spinner(died=self._died)
         self._spinner.start(node)
 

@@ -16,9 +16,11 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
 
+from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.simulation import Simulation
 
@@ -57,7 +59,8 @@ class LockstepService:
         self._stepper = stepper
         self._frame_id = frame_id
         self._waiting = 0
-        node.create_service(Lockstep, "lockstep", self._serve, callback_group=ReentrantCallbackGroup())
+        group = ReentrantCallbackGroup()
+        node.create_service(Lockstep, "lockstep", self._serve, qos_profile=ros_qos(ANSWERS), callback_group=group)
 
     async def _serve(self, request: Any, response: Any) -> Any:
         asked = LockstepRequest(

@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.qos import ANSWERS, QOS
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 
@@ -48,7 +48,7 @@ class LineClient:
     def client(self, kind: Any, name: str) -> Any:
         """A client whose service is there."""
         if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, name)
+            self._clients[name] = self.node.create_client(kind, name, qos_profile=ros_qos(ANSWERS))
         until(self._clients[name].service_is_ready, f"the service {name}")
         return self._clients[name]
 

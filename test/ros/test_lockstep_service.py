@@ -6,13 +6,19 @@ import math
 
 import numpy as np
 import pytest
+import rclpy
 from conveyor_msgs import srv
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.ros.child import Child
+from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -48,6 +54,24 @@ def test_a_request_sent_twice_at_once_is_carried_out_once(line: LineClient) -> N
     assert len(answers[0].outcomes) == 1
     assert answers[1] == answers[0]
     assert answers[2] == answers[0]
+
+
+def test_a_client_that_sleeps_while_another_scans_still_gets_its_answer(line: LineClient) -> None:
+    """Every client is sent the answers to all: 200 of them must not push out the one it waits for."""
+    context = rclpy.Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    sleeper = Node("sleeper", context=context)
+    client = sleeper.create_client(srv.Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS))
+    until(client.service_is_ready, "the service lockstep")
+    answer = client.call_async(srv.Lockstep.Request(run_id="sleeper"))
+    for target in range(1, 201):
+        line.lockstep(target)
+    spinner = Spinner(context)
+    spinner.start(sleeper)
+    assert until(answer.result, "the answer").reason.startswith("stale: target_tick 0")
+    spinner.close()
+    sleeper.destroy_node()
+    rclpy.shutdown(context=context)
 
 
 def test_what_a_reset_breaks_off_is_answered_with_the_new_run(line: LineClient) -> None:
