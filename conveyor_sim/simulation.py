@@ -2,20 +2,21 @@
 
 import hashlib
 import math
-from collections.abc import Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from conveyor_sim.accounts.clogging import Clogging
 from conveyor_sim.accounts.damage import DamageAccount
 from conveyor_sim.accounts.energy import EnergyAccount
-from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
-from conveyor_sim.engine.support.footing import refresh_footing
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.line.line import FAULT, Line
 from conveyor_sim.line.process_image import ProcessImage
@@ -72,21 +73,20 @@ class Simulation:
         self._integration = Integration(self._state, threads, shorten)
         self._every = {output: scene.every(output) for output in scene.TOPICS}
         self._line = Line(scene, self._state)
-        self._centre_radius = np.array(
-            [shape.centre_radius if shape.kind == "curved" else math.inf for shape in self.model.belt_shapes]
-        )
-        self._outermost = np.array([shape.outermost for shape in self.model.belt_shapes])
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
         self._damage: DamageAccount | None = None
-        if self._state.world.damage is not None or scene.limits.clogging_time is not None:
+        if self._state.world.damage is not None:
+            self._damage = DamageAccount(self._state, scene.limits)
+        self._clogging: Clogging | None = None
+        if scene.limits.clogging_time is not None:
             exits = {name: np.array(outfeed.region) for name, outfeed in scene.outfeeds.items()}
-            self._damage = DamageAccount(self._state, scene.limits, exits)
+            self._clogging = Clogging(self._state, scene.limits.clogging_time, exits)
         self._account: EnergyAccount | None = None
         self._feed()
         self._line.end(self.tick)
         self._state.make_lists()
-        self._set_surfaces()
+        self._line.move_belts()
         if self.model.has("energy_ledger"):
             self._account = EnergyAccount(self._state)
 
@@ -146,18 +146,19 @@ class Simulation:
         the state is that at its beginning then.
         """
         for _ in range(ticks):
-            if self._line.begin(self.tick):
-                self._set_surfaces()
+            self._line.begin(self.tick)
             peaks = self._state.world.peaks
             if peaks is not None and self.due("bottles"):
                 peaks.force[:] = 0.0
                 peaks.impulse[:] = 0.0
             if self._damage is not None:
                 self._damage.begin(self.due("damage"))
-            self._integration.take_tick(self.tick, self._fastest_surface())
+            self._integration.take_tick(self.tick, self._line.fastest_surface)
             self.tick += 1
             if self._damage is not None:
-                self._damage.end(self.tick, self._line.removed_by())
+                self._damage.end(self.tick)
+            if self._clogging is not None:
+                self._clogging.end(self.tick, self._line.removed_by())
             self._line.end(self.tick)
             self._remove()
             self._feed()
@@ -166,7 +167,7 @@ class Simulation:
     def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
         """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together.
 
-        What became of them is told by `take_outcomes`. Raises ValueError for the source that faults have.
+        `take_outcomes` returns what became of them. Raises ValueError for the source that faults have.
         """
         if source == FAULT:
             raise ValueError(f"source: {source} given, expected another: faults are injected")
@@ -194,12 +195,14 @@ class Simulation:
         return self._line.take_outcomes()
 
     def take_guard_events(self) -> list[GuardEvent]:
-        """What the guard has to tell since the last call, in order."""
+        """What the guard has reported since the last call, in order."""
         return self._integration.take_events()
 
     def take_damage_events(self) -> list[DamageEvent]:
         """What went beyond a limit of the scene since the last call, in order."""
-        return [] if self._damage is None else self._damage.take_events()
+        watches = (self._damage, self._clogging)
+        events = [event for watch in watches if watch is not None for event in watch.take_events()]
+        return sorted(events, key=lambda event: event.tick)
 
     @property
     def shortened_ticks(self) -> int:
@@ -225,22 +228,18 @@ class Simulation:
         self._line.restore_from(other._line)
         self._state.restore_from(other._state)
         self._integration.put_in()
-        self._set_surfaces()
+        self._line.move_belts()
         if self._account is not None:
             self._account.restart()
 
-    def displace(self, dx: F8, dy: F8, dvx: F8 | None = None, dvy: F8 | None = None) -> None:
-        """Move every bottle by (dx, dy) m and change its velocity by (dvx, dvy) m/s; (bottles,), in order of the ids.
+    @contextmanager
+    def editing(self) -> Iterator[tuple[Bottles, NDArray[np.int64]]]:
+        """The bottles' arrays, to be changed from outside between two ticks, and the slots in them by order of the ids.
 
-        For studies of how a disturbance grows. ValueError if the shapes do not match.
+        The ledger books what that does to the energy as fed.
         """
-        slots, bottles = self._slots(), self._state.world.bottles
         with nullcontext() if self._account is None else self._account.feeding():
-            for column, change in ((bottles.x, dx), (bottles.y, dy), (bottles.vx, dvx), (bottles.vy, dvy)):
-                if change is not None:
-                    if np.shape(change) != slots.shape:
-                        raise ValueError(f"a displacement of shape {np.shape(change)}, expected {slots.shape}")
-                    column[slots] += change
+            yield self._state.world.bottles, self._slots()
             self._state.world.neighbourhood.stale[0] = 1
         self._state.make_lists()
         self._integration.put_in()
@@ -308,7 +307,7 @@ class Simulation:
         return self._line.signals()
 
     def photo_eyes(self) -> dict[str, bool]:
-        """Whether each photo-eye tells that it is blocked, by name ("photo_eyes/exit")."""
+        """Whether each photo-eye reports that it is blocked, by name ("photo_eyes/exit")."""
         return self._line.photo_eyes()
 
     def state_hash(self) -> int:
@@ -330,6 +329,7 @@ class Simulation:
             "line": self._line.snapshot(),
             "account": None if self._account is None else snapshot(self._account),
             "damage": None if self._damage is None else snapshot(self._damage),
+            "clogging": None if self._clogging is None else snapshot(self._clogging),
             "integration": self._integration.snapshot(),
         }
 
@@ -341,7 +341,8 @@ class Simulation:
             if self.tick < 0 or self.stamp_ns > LAST_STAMP_NS:
                 raise ValueError(f"tick {self.tick}, which no message can say")
             self._line.restore(self.tick, memory["line"])
-            for name, account in (("account", self._account), ("damage", self._damage)):
+            accounts = (("account", self._account), ("damage", self._damage), ("clogging", self._clogging))
+            for name, account in accounts:
                 if account is None:
                     typed(type(None), memory[name], name)
                 else:
@@ -365,27 +366,6 @@ class Simulation:
         if self._line.feeds:
             with nullcontext() if self._account is None else self._account.feeding():
                 self._line.feed()
-
-    def _fastest_surface(self) -> float:
-        """Speed of the fastest point of any belt, m/s."""
-        if not self.model.belts:
-            return 0.0
-        return float(np.max(np.abs(self._line.now.speeds) * self._outermost))
-
-    def _set_surfaces(self) -> None:
-        world, surface = self._state.world, self._state.world.surface
-        if surface is None or not self.model.belts:
-            return
-        for index, shape in enumerate(self.model.belt_shapes):
-            speed = self._line.now.speeds[index]
-            if shape.kind == "straight":
-                surface.ux[index] = speed * math.cos(shape.angle)
-                surface.uy[index] = speed * math.sin(shape.angle)
-            elif surface.turn is not None:
-                turn = speed / self._centre_radius[index]
-                surface.turn[index] = turn
-                surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
-        refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)
 
 
 def compile_kernels(scene: Scene) -> None:

@@ -1,8 +1,7 @@
 """Keeps what bottles and rails bear beside what the engine notes in every step: outputs, limits, events."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import astuple
-from typing import Any
 
 import numpy as np
 
@@ -32,30 +31,22 @@ PLACES = {
 }
 """Group and column of the engine."""
 
-SLOW = 0.1
-"""Of the speed of the belt under it: what is slower is held up."""
-
 
 class DamageAccount:
     """What the bottles of a State bear. Public attributes are remembered in checkpoints."""
 
     beyond: dict[str, list[int]]
     """By limit, ids of the bottles that were beyond it at the end of the last tick."""
-    passages: dict[str, tuple[int, int, int]]
-    """By outfeed: bottles removed, tick of the last passage or of nobody waiting, whether that was told."""
     events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
     """Those that nobody has taken."""
 
-    def __init__(self, state: State, limits: Limits, exits: Mapping[str, F8]) -> None:
-        """exits: corners (n, 2) m of each outfeed, by name."""
+    def __init__(self, state: State, limits: Limits) -> None:
         self._state = state
         self._limits: dict[str, float] = {
             name: limit for name in Limits.model_fields if (limit := getattr(limits, name)) is not None
         }
-        self._exits = exits if "clogging_time" in self._limits else {}
         self._places = rail_places(state.model)
         self.beyond = {name: [] for name in WORDS}
-        self.passages = dict.fromkeys(self._exits, (0, 0, 0))
         self.events = []
 
     def begin(self, was_output: bool) -> None:
@@ -65,16 +56,14 @@ class DamageAccount:
             if was_output:
                 worst.output[:] = 0.0
 
-    def end(self, tick: int, removed: Mapping[str, int]) -> None:
-        """A tick has ended: what went beyond a limit in it becomes an event. removed: bottles so far, by device."""
+    def end(self, tick: int) -> None:
+        """A tick has ended: what went beyond a limit in it becomes an event."""
         for worst in self._worst():
             np.maximum(worst.output, worst.tick, out=worst.output)
         damage = self._state.world.damage
         for kind, limit in self._limits.items():
             if damage is not None and (column := _column(damage, kind)) is not None:
                 self._compare(tick, kind, column, limit)
-        for name, corners in self._exits.items():
-            self._look_at_exit(tick, name, corners, removed[f"outfeeds/{name}"])
 
     def take_events(self) -> list[DamageEvent]:
         """What went beyond a limit since the last call, in order."""
@@ -124,12 +113,12 @@ class DamageAccount:
         before = self.beyond[kind]
         self.beyond[kind] = bottles.id[slots].tolist()
         for slot in slots.tolist():
-            # A load that lasts is told once; each blow is one of its own.
+            # A load that lasts is reported once; each blow is one of its own.
             if kind == "impact_speed" or int(bottles.id[slot]) not in before:
                 what, unit = WORDS[kind]
-                self._tell(tick, kind, slot, float(column[slot]), limit, what.format(column[slot]), unit)
+                self._report(tick, kind, slot, float(column[slot]), limit, what.format(column[slot]), unit)
 
-    def _tell(self, tick: int, kind: str, slot: int, value: float, limit: float, what: str, unit: str) -> None:
+    def _report(self, tick: int, kind: str, slot: int, value: float, limit: float, what: str, unit: str) -> None:
         bottles = self._state.world.bottles
         bottle, x, y = int(bottles.id[slot]), float(bottles.x[slot]), float(bottles.y[slot])
         time = tick * self._state.model.tick_ns * 1e-9
@@ -137,34 +126,6 @@ class DamageAccount:
             f"bottle {bottle} {what} at ({x:.4g}, {y:.4g}) m at {time:g} s: limits.{kind} is {limit:g} {unit}".rstrip()
         )
         self.events.append(astuple(DamageEvent(tick, kind, bottle, x, y, value, limit, text)))
-
-    def _look_at_exit(self, tick: int, name: str, corners: F8, removed: int) -> None:
-        bottles, passage = self._state.world.bottles, self.passages[name]
-        waiting = self._held_up()
-        if removed != passage[0] or not len(waiting):
-            self.passages[name] = (removed, tick, 0)
-            return
-        idle = (tick - passage[1]) * self._state.model.tick_ns * 1e-9
-        limit = self._limits["clogging_time"]
-        if idle < limit - 1e-9 or passage[2]:
-            return
-        self.passages[name] = (passage[0], passage[1], 1)
-        centre = corners.mean(axis=0)
-        slot = waiting[np.argmin(np.hypot(bottles.x[waiting] - centre[0], bottles.y[waiting] - centre[1]))]
-        what = f"waits, for outfeed {name} has removed nothing for {idle:.3g} s, nearest to it"
-        self._tell(tick, "clogging_time", int(slot), idle, limit, what, "s")
-
-    def _held_up(self) -> Any:
-        """Slots of the bottles that a running belt does not take along."""
-        world, bottles = self._state.world, self._state.world.bottles
-        if world.footing is None:
-            return np.zeros(0, np.int64)
-        ux, uy = world.footing.ux, world.footing.uy
-        if world.footing.turn is not None:
-            ux, uy = ux - world.footing.turn * bottles.y, uy + world.footing.turn * bottles.x
-        belt, speed = np.hypot(ux, uy), np.hypot(bottles.vx, bottles.vy)
-        runs = belt > world.settings.slip_limit
-        return np.flatnonzero(runs & (speed < SLOW * belt) & (bottles.id >= 0))
 
 
 def _column(damage: Damage, kind: str, output: bool = False) -> F8 | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from conveyor_sim.accuracy.aside import PHASES, RAIL, corner, phases, pitch, rms, simulation_aside
 from conveyor_sim.accuracy.collision import Collision, damping_ratio, duration, peak_force, rebound
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.simulation import Simulation
 
@@ -88,7 +89,7 @@ class HeadOn:
         nearer[0, :PHASES] = pitch(scene) - touching - self._speeds * entries
         nearer[2, :PHASES] = self._speeds
         nearer[3, :PHASES] = self.slip
-        simulation.displace(*nearer)
+        displace(simulation, *nearer)
         simulation.advance(2)
         return simulation
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.candidates import standard_steps
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.reference import reference_setting, reference_simulation
 from conveyor_sim.accuracy.results import Horizon
 from conveyor_sim.accuracy.setting import Setting
@@ -110,7 +111,7 @@ class HorizonFinder:
         """Ticks until a displacement (2, bottles) has grown by GROWTH; None: not in `most` ticks."""
         self.fine.restore_from(begin)
         self.nudged.restore_from(begin)
-        self.nudged.displace(shift[0], shift[1])
+        displace(self.nudged, shift[0], shift[1])
         ids, size = begin.bottles().id, _rms(np.hypot(*shift))
         before, smooth = np.hypot(*shift), np.full(ids.size, True)
         for tick in range(1, most + 1):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.scene import Scene, rail_shapes
 from conveyor_sim.scene.geometry import TOUCH
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
@@ -58,7 +59,7 @@ def disturb(simulation: Simulation, seed: int) -> None:
     share = np.sqrt(random.uniform(0.0, 1.0, len(radius)))
     x, y = share * np.cos(angle), share * np.sin(angle)
     move, speed = np.where(tight, 0.0, reach), np.where(tight, NUDGE * simulation.scene.slip_limit, 0.0)
-    simulation.displace(move * x, move * y, speed * x, speed * y)
+    displace(simulation, move * x, move * y, speed * x, speed * y)
 
 
 def _jitter(scene: Scene, infeed: Infeed) -> dict[str, float]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.accuracy.aside import PHASES, phases, rms, simulation_aside
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -52,7 +53,7 @@ class SetDown:
             self.scene, (self.kind,), integrator, self.duration, steps, floor={"friction": self.friction}
         )
         still = np.zeros(PHASES)
-        simulation.displace(still, still, self._slips, still)
+        displace(simulation, still, still, self._slips, still)
         simulation.advance()
         return simulation
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.belt import BeltDevice
+from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import CommandOutcome, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
@@ -54,6 +55,7 @@ class Line:
             tuple(fault for device in devices for fault in device.faults),
         )
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
+        self._surfaces = BeltSurfaces(state)
         self._pending: list[_Pending] = []
         self._outcomes: list[CommandOutcome] = []
 
@@ -86,6 +88,15 @@ class Line:
         """Whether any device puts bottles onto the line."""
         return bool(self._feeding) and self.now.state.model.has("infeed")
 
+    @property
+    def fastest_surface(self) -> float:
+        """Speed of the fastest point of any belt, m/s."""
+        return self._surfaces.fastest(self.now.speeds)
+
+    def move_belts(self) -> None:
+        """Give the belts' surfaces the speeds that their drives have."""
+        self._surfaces.move(self.now.speeds)
+
     def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
         """Have inputs applied, or refused, together as the next tick begins."""
         self._pending.append((tuple(names), tuple(float(value) for value in values), printable(source)))
@@ -110,8 +121,8 @@ class Line:
         outcomes, self._outcomes = self._outcomes, []
         return outcomes
 
-    def begin(self, tick: int) -> bool:
-        """Apply what was queued and let the devices act before the steps from a tick; whether belts change speed."""
+    def begin(self, tick: int) -> None:
+        """Apply what was queued and let the devices act before the steps from a tick."""
         self._at(tick)
         pending, self._pending = self._pending, []
         for names, values, source in pending:
@@ -127,7 +138,8 @@ class Line:
         before = self.now.speeds.copy()
         for device in self._beginning:
             device.begin(self.now)
-        return not np.array_equal(before, self.now.speeds)
+        if not np.array_equal(before, self.now.speeds):
+            self.move_belts()
 
     def end(self, tick: int) -> None:
         """Let the devices see what the steps up to a tick came to."""

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from hard_cases.case import with_annex
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BottleColumns
@@ -100,7 +101,7 @@ def between_rails() -> dict[str, Any]:
 
 def put_between(simulation: Simulation) -> None:
     """Into the middle, all but 1e-6 m."""
-    simulation.displace(np.array([0.0]), np.array([1e-6 - AWAY]))
+    displace(simulation, np.array([0.0]), np.array([1e-6 - AWAY]))
 
 
 SIDE = 6
@@ -132,7 +133,7 @@ def put_into_packing(simulation: Simulation) -> None:
     j, i = np.divmod(np.arange(SIDE * SIDE), SIDE)
     shake = 1e-6 * np.random.default_rng(0).standard_normal((2, SIDE * SIDE))
     x, y = 2.0 * r * i + r * j, math.sqrt(3.0) * r * j
-    simulation.displace(x + shake[0] - bottles.x, y + shake[1] - bottles.y)
+    displace(simulation, x + shake[0] - bottles.x, y + shake[1] - bottles.y)
 
 
 def on_belt() -> dict[str, Any]:

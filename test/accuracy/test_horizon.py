@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, RADIUS, bottle, contact, kind, scene, segment, stiffness_for
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.horizon import GROWTH, NUDGE, HorizonFinder
 from conveyor_sim.accuracy.results import Horizon
 from conveyor_sim.accuracy.starts import Start
@@ -97,7 +98,7 @@ def test_a_jump_of_force_at_first_touch_is_not_chaos() -> None:
         **NO_FLOOR,
     )
     one, other = Simulation(grazing, threads=1), Simulation(grazing, threads=1)
-    other.displace(np.zeros(3), np.full(3, NUDGE))
+    displace(other, np.zeros(3), np.full(3, NUDGE))
     for simulation in (one, other):
         simulation.advance()
     assert abs(one.bottles().x[0] - other.bottles().x[0]) > 1e5 * NUDGE

@@ -9,6 +9,7 @@ from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment, stiffn
 
 from conveyor_sim.accuracy.candidates import candidates, forbidden, own_setting, softer, standard_steps
 from conveyor_sim.accuracy.deviation import HORIZON, errors_of
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.energy import energies
 from conveyor_sim.accuracy.precision import WorkPrecision
 from conveyor_sim.accuracy.reference import reference_setting
@@ -155,7 +156,7 @@ def test_errors_of_a_run_that_is_displaced(size: float) -> None:
     setting = Setting("semi_implicit_euler", 1)
     start, run = variant(flying, setting), variant(flying, setting)
     reference = follow(run, start, 5)
-    start.displace(np.full(2, 0.6 * size), np.full(2, 0.8 * size))
+    displace(start, np.full(2, 0.6 * size), np.full(2, 0.8 * size))
     errors = errors_of([(follow(run, start, 5), reference)])
     assert errors.position_rms == pytest.approx(size, rel=1e-9)
     assert errors.position_max == pytest.approx(size, rel=1e-9)
@@ -171,7 +172,7 @@ def test_an_impact_that_the_horizon_cuts_off_is_compared_as_a_whole(late: float,
     start.advance(30)
     # Over at 31.4 ticks in one, at 32.4 or 33.6 in the other; the horizon ends at 32.
     reference = follow(run, start, 3)
-    start.displace(np.array([-SPEED * late, 0.0]), np.zeros(2))
+    displace(start, np.array([-SPEED * late, 0.0]), np.zeros(2))
     errors = errors_of([(follow(run, start, 3), reference)])
     assert (errors.peak_force > 0.5) == counts
     assert (errors.impulse > 0.5) == counts
@@ -199,7 +200,7 @@ def test_elastic_energy_is_the_work_of_the_law(law: dict[str, Any], work: Any, o
         **NO_FLOOR,
     )
     simulation = Simulation(still, threads=1)
-    simulation.displace(np.array([0.0, -0.07 - overlap, 0.0]), np.array([0.0, 0.0, 0.035 + overlap]))
+    displace(simulation, np.array([0.0, -0.07 - overlap, 0.0]), np.array([0.0, 0.0, 0.035 + overlap]))
     found = energies(simulation.model, simulation.bottles(), simulation.contacts())
     expected = [0.5 * 0.2 * 0.25 + 0.5 * work(overlap), 0.5 * work(overlap), work(overlap)]
     np.testing.assert_allclose(found, expected, rtol=1e-9)

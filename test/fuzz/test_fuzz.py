@@ -20,6 +20,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from scenes import bottle, contact, kind, scene, segment
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.geometry import ArcPiece, SegmentPiece
@@ -105,7 +106,7 @@ class Passing(Simulation):
     def advance(self, ticks: int = 1) -> None:
         super().advance(ticks)
         if self.tick == 3:
-            self.displace(np.full(1, self.way), np.zeros(1))
+            displace(self, np.full(1, self.way), np.zeros(1))
 
 
 def test_a_bottle_through_a_rail_is_noticed() -> None:
@@ -183,7 +184,7 @@ def test_a_drive_that_does_not_ramp_is_noticed() -> None:
 def test_a_bottle_that_is_nowhere_is_noticed() -> None:
     simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
     watch = GuardProbe(simulation)
-    simulation.displace(np.array([0.0, math.nan]), np.zeros(2))
+    displace(simulation, np.array([0.0, math.nan]), np.zeros(2))
     with pytest.raises(Violation, match="not finite"):
         watch.after_tick([], [])
 

@@ -11,6 +11,7 @@ from hard_cases.case import Case
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.chatter import STEPS, chatter_of
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.errors import SimulationError
@@ -139,7 +140,7 @@ def _act(case: Case, simulation: Simulation, tick: int) -> None:
             by, push = np.zeros((2, count)), np.zeros((2, count))
             by[:, put["bottle"]] = put.get("by", (0.0, 0.0))
             push[:, put["bottle"]] = put.get("push", (0.0, 0.0))
-            simulation.displace(by[0], by[1], push[0], push[1])
+            displace(simulation, by[0], by[1], push[0], push[1])
 
 
 class _Watch:

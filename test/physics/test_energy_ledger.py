@@ -8,6 +8,7 @@ import pytest
 from physics.test_tangential_spring import PULL, SPRING, STIFFNESS, leaning
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, line, scene, segment, simulation
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.simulation import Simulation
@@ -168,7 +169,7 @@ def test_a_bottle_set_down_takes_twice_what_it_gets() -> None:
 
 def test_to_push_bottles_by_hand_is_to_bring_energy() -> None:
     sim = apart(bottle(50.0, 0.0), bottle(60.0, 0.0))
-    sim.displace(np.zeros(2), np.zeros(2), np.array([1.0, 0.0]))
+    displace(sim, np.zeros(2), np.zeros(2), np.array([1.0, 0.0]))
     assert ledger_of(sim).fed == ledger_of(sim).kinetic == pytest.approx(0.5 * MASS)
     assert ledger_of(sim).residual == 0.0
     fresh = apart(bottle(50.0, 0.0), bottle(60.0, 0.0))

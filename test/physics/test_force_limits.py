@@ -11,6 +11,7 @@ import pytest
 from physics.test_moving_rails import INTEGRATORS, SPEED, ledger_of, plant, pusher, queue, signal, with_integrator
 from scenes import MASS, RADIUS, bottle, contact, segment
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.simulation import Simulation
 
 LIMIT, PLATE, ACCELERATION = 20.0, 1.0, 8.0
@@ -139,7 +140,7 @@ def test_it_goes_on_when_the_bottle_is_gone() -> None:
     sim.advance(150)
     stood = place(sim)
     assert signal(sim, "pushers/p/blocked") == 1.0
-    sim.displace(np.array([0.0, 0.0]), np.array([5.0, 0.0]))
+    displace(sim, np.array([0.0, 0.0]), np.array([5.0, 0.0]))
     sim.advance(18)
     speeding = SPEED / ACCELERATION
     assert place(sim) == pytest.approx(stood + SPEED * (0.18 - 0.5 * speeding), abs=1e-4)

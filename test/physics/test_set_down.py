@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scenes import base, belt, bottle, order, phases, rms, simulation
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.simulation import Simulation
 
 MU, G = 0.4, 9.81
@@ -157,7 +158,7 @@ def errors_across_v_lim(steps: int, integrator: str, coarsest: int, **accuracy: 
     for slip in slip_limit + MU * G * end * (0.4 + phases(64) / coarsest):
         state = sim.bottles()
         vx, vy = (speed - slip) * math.cos(ANGLE), (speed - slip) * math.sin(ANGLE)
-        sim.displace(still, still, vx - state.vx, vy - state.vy)
+        displace(sim, still, still, vx - state.vx, vy - state.vy)
         sim.advance()
         errors.append(slip_and_slide(sim, speed)[0] - closed_form(slip, slip_limit, end)[0])
     return errors

@@ -25,6 +25,7 @@ from scenes import (
     stiffness_for,
 )
 
+from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stepping.guard import GuardEvent
@@ -225,7 +226,7 @@ def test_a_scene_too_stiff_for_an_error_control_is_told_in_time() -> None:
         bottles=[bottle(0.0, 0.5, 0.3, 0.0)],
         **NO_FLOOR,
     )
-    sim.displace(np.zeros(1), np.full(1, -0.5))
+    displace(sim, np.zeros(1), np.full(1, -0.5))
     with pytest.raises(SimulationError, match="dormand_prince does not keep an error of 1e-09 m/s within 1,000,000"):
         sim.advance()
     assert sim.tick == 0

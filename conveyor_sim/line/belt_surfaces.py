@@ -1,0 +1,39 @@
+"""The velocity field of each belt's surface, as the engine sees it, set from the speeds that the drives have."""
+
+import math
+
+import numpy as np
+
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.support.footing import refresh_footing
+from conveyor_sim.state import State
+
+
+class BeltSurfaces:
+    """The belts of a State: straight ones move along, curved ones and turn-tables turn."""
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+        shapes = state.model.belt_shapes
+        self._centre_radius = [shape.centre_radius if shape.kind == "curved" else math.inf for shape in shapes]
+        self._outermost = np.array([shape.outermost for shape in shapes])
+
+    def fastest(self, speeds: F8) -> float:
+        """Speed of the fastest point of any belt, m/s. speeds: along each belt's centre line, (belts,) m/s."""
+        return float(np.max(np.abs(speeds) * self._outermost)) if self._state.model.belts else 0.0
+
+    def move(self, speeds: F8) -> None:
+        """Give each belt its speed along the centre line, (belts,) m/s, and each bottle that of its belt."""
+        world, surface = self._state.world, self._state.world.surface
+        if surface is None or not self._state.model.belts:
+            return
+        for index, shape in enumerate(self._state.model.belt_shapes):
+            speed = speeds[index]
+            if shape.kind == "straight":
+                surface.ux[index] = speed * math.cos(shape.angle)
+                surface.uy[index] = speed * math.sin(shape.angle)
+            elif surface.turn is not None:
+                turn = speed / self._centre_radius[index]
+                surface.turn[index] = turn
+                surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
+        refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)
