@@ -24,10 +24,12 @@ def pages() -> Iterator[tuple[Path, str]]:
     sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test")]
     accuracy, promises, stability = (importlib.import_module(name) for name in ("accuracy", "promises", "stability"))
     text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
-    yield DOCS / "accuracy.md", promises.page(accuracy.page(text))
+    yield DOCS / "accuracy.md", accuracy.page(text)
+    yield promises.PAGE, promises.page()
     yield from accuracy.tables().items()
     text = stability.PAGE.read_text(encoding="utf-8")
     yield stability.PAGE, stability.page(text, stability.FOLDER)
+    yield stability.CASES, stability.cases(stability.FOLDER)
 
 
 def main() -> None:

@@ -100,7 +100,8 @@ def section(name: str) -> str:
 
 def tables() -> dict[Path, str]:
     """The page of tables of each study."""
-    return {FOLDER / name / TABLES: f"# The study of {name}\n\n{markdown(of_today(name))}" for name in studied()}
+    pages = {name: markdown(of_today(name)).replace("### ", "## ") for name in studied()}
+    return {FOLDER / name / TABLES: f"# The study of {name}\n\n{page}" for name, page in pages.items()}
 
 
 def studied() -> list[str]:

@@ -27,12 +27,13 @@ with while_importing():
     import stability_limits
     import stability_matrix
     from hard_cases.case import read_table
-    from stability_page import page, picture
+    from stability_page import cases, page, picture
 
     from conveyor_sim.support.machine import machine
 
 PAGE = ROOT / "docs" / "stability.md"
 FOLDER = ROOT / "docs" / "stability"
+CASES = FOLDER / "cases.md"
 ROWS = tuple(case.name for case in read_table())
 
 
@@ -47,6 +48,7 @@ def main(rows: tuple[str, ...], only_tables: bool) -> None:
         (FOLDER / "machine.txt").write_text(machine() + "\n", encoding="utf-8")
         _measure(rows)
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8"), FOLDER), encoding="utf-8")
+    CASES.write_text(cases(FOLDER), encoding="utf-8")
 
 
 def _measure(rows: tuple[str, ...]) -> None:
