@@ -2,11 +2,12 @@
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest)
 # make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about an hour (ARGS=funnel for one)
-# make promises  sets up the same, then holds all shipped scenes and ten unseen ones to the presets' promises, about half an hour
+# make promises  sets up the same, then holds all shipped scenes and ten unseen ones to the presets' promises, 5 to 25 minutes
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
 # make lint    style and types
 # make docs-check  are the pages of docs/ that programs make up to date? make docs writes them anew
+# make site    the pages of docs/ and the Python API as a web site in build/site; fails on a broken link
 # make clean   removes what set-up and builds made, never runs/
 
 DISTRO ?= jazzy
@@ -24,7 +25,7 @@ unexport AMENT_PREFIX_PATH AMENT_CURRENT_PREFIX COLCON_PREFIX_PATH COLCON_CURREN
 unexport PKG_CONFIG_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help run test bench accuracy promises fuzz stability lint docs docs-check clean set-up set-up-test set-up-bench
+.PHONY: help run test bench accuracy promises fuzz stability lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -62,6 +63,10 @@ docs: set-up-test
 docs-check: set-up-test
 	@$(PYTHON) tools/generated_pages.py
 
+site: set-up-docs
+	@$(PYTHON) -m sphinx --fail-on-warning --keep-going --quiet -c docs . build/site
+	@echo "build/site/index.html"
+
 set-up:
 	@sh tools/set_up.sh "$(DISTRO)"
 
@@ -70,6 +75,9 @@ set-up-test:
 
 set-up-bench:
 	@sh tools/set_up.sh "$(DISTRO)" bench
+
+set-up-docs:
+	@sh tools/set_up.sh "$(DISTRO)" docs
 
 clean:
 	rm -rf .venv .venv-kilted build install log dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

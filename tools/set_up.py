@@ -1,4 +1,4 @@
-"""Makes the environment of `make run`, `make test` and `make bench`: set_up.py DISTRO [test|bench]
+"""Makes the environment of `make run`, `make test`, `make bench` and `make site`: set_up.py DISTRO [test|bench|docs]
 
 A virtual environment with the ROS 2 wheels of that distribution, this package (editable) and conveyor_msgs, built
 from msg_defs/. `set-up.json` in the environment holds a key of what each stage was made from; a stage whose key
@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
-TOOLS = {"test": "the test tools", "bench": "what is compared with"}
+TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "what the docs site is built with"}
 SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, where ROS looks for a package's share
 STRIP = ROOT / "tools" / "strip_missing_includes.cmake"
 

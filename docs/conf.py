@@ -1,0 +1,79 @@
+"""The docs site: Sphinx over the Markdown pages of the checkout, README.md first (`make site`).
+
+Pages stay plain Markdown that a forge shows as well: what only the site needs, its navigation, is added here as each
+page is read.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+ROOT = Path(__file__).resolve().parents[1]
+VERSION = ROOT / "conveyor_sim" / "version.py"
+
+project = "conveyor_sim"
+release = re.search(r'^__version__ = "(.+)"$', VERSION.read_text(encoding="utf-8"), re.MULTILINE).group(1)
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinxcontrib.mermaid"]
+root_doc = "README"
+include_patterns = ["*.md", "docs/**.md"]
+exclude_patterns = [folder.name for folder in ROOT.iterdir() if folder.is_dir() and folder.name != "docs"]
+
+html_theme = "furo"
+html_title = f"conveyor_sim {release}"
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True}
+smartquotes = False  # options such as --price stay as they are typed
+
+myst_heading_anchors = 4
+myst_fence_as_directive = ["mermaid"]
+mermaid_height = "auto"
+mermaid_fullscreen = False
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_default_options = {"members": True, "undoc-members": True}
+default_role = "code"  # docstrings are Markdown in this
+
+STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
+NAVIGATION = {
+    "README": {
+        "First steps": ["docs/build_a_line", "docs/testing_control_logic", "docs/ros"],
+        "A line": ["docs/scene", "docs/line", "docs/effects", "docs/base"],
+        "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],
+        "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
+    },
+    "docs/accuracy": {"Tables": ["accuracy/promises", *(f"accuracy/{page.parent.name}/tables" for page in STUDIES)]},
+    "docs/stability": {"Tables": ["stability/cases", "stability/fuzz"]},
+    "docs/api/index": {"Modules": ["simulation", "observations", "testing", "control", "recordings", "errors"]},
+}
+
+
+def add_navigation(app: Sphinx, page: str, source: list[str]) -> None:
+    """Put the pages that come after a page into it, unseen: the sidebar shows them."""
+    for caption, pages in NAVIGATION.get(page, {}).items():
+        source[0] += "\n".join(["", "", "```{toctree}", ":hidden:", f":caption: {caption}", "", *pages, "```", ""])
+
+
+def from_markdown(app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Docstrings are Markdown: an indented example is code, and `for_` in a sentence is no link."""
+    for number, line in enumerate(lines):
+        lines[number] = re.sub(r"(?<=\w)_(?!\w)", r"\_", line)
+        if line.endswith(":") and lines[number + 1 : number + 2] == [""] and lines[number + 2].startswith("    "):
+            lines[number] += ":"
+
+
+def write_start(app: Sphinx, problem: Exception | None) -> None:
+    """The address of the site itself shows the README."""
+    if problem is None and app.builder.name == "html":
+        shutil.copy(app.outdir / "README.html", app.outdir / "index.html")
+
+
+def setup(app: Sphinx) -> None:
+    """Called by Sphinx."""
+    app.connect("source-read", add_navigation)
+    app.connect("autodoc-process-docstring", from_markdown)
+    app.connect("build-finished", write_start)
