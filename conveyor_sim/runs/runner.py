@@ -11,13 +11,13 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from conveyor_sim.runs.force_check import PeakWatch
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.runs.force_check import PeakWatch
+from conveyor_sim.runs.stopped import keep_stopped
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.runs.stopped import keep_stopped
 from conveyor_sim.support.signals import HandledOnce
 
 

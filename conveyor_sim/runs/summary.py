@@ -14,7 +14,6 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from conveyor_sim.runs.force_check import ForceCheck, Pressed, PressWatch, achieved, pressed
 from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
 from conveyor_sim.bag.reader import Bag, open_bag, to_columns
 from conveyor_sim.bag.recorded_scene import recorded_scene
@@ -24,11 +23,12 @@ from conveyor_sim.line.process_image import Role
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.model.step_choice import choose_steps
-from conveyor_sim.observe.load_history import LoadHistory
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.observe.load_history import LoadHistory
+from conveyor_sim.runs.force_check import ForceCheck, Pressed, PressWatch, achieved, pressed
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 
