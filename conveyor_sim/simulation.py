@@ -295,11 +295,11 @@ class Simulation:
         return None if self._account is None else self._account.ledger()
 
     def damage(self) -> DamageColumns | None:
-        """What every bottle present has borne, ordered by id; None where the scene does not ask."""
+        """Loads on every bottle present, ordered by id; None where the scene does not ask."""
         return None if self._damage is None else self._damage.columns(self._slots())
 
     def rail_wear(self) -> RailWearColumns | None:
-        """What the rails have borne since the start; None where the scene does not ask."""
+        """Loads on the rails since the start; None where the scene does not ask."""
         return None if self._damage is None else self._damage.rail_wear()
 
     def signals(self) -> np.ndarray:

@@ -93,7 +93,7 @@ class DamageAccount:
         )
 
     def rail_wear(self) -> RailWearColumns:
-        """What the rails have borne; no bin where nobody asks."""
+        """Loads on the rails; no bin where they are disabled."""
         damage, places = self._state.world.damage, self._places
         if damage is None or damage.scuffing is None or damage.scuffing.bins is None:
             none = np.zeros(0)

@@ -83,7 +83,7 @@ def price_table(prices: PriceList) -> Group:
     lines = [
         f"In ns per bottle and step, of {prices.full:.1f} with all effects: {prices.bottles} bottles "
         f"at {prices.time:g} s, on one thread, each effect with and without, in turn, from the same state and at the "
-        "same time step. Prices overlap; noise is what can't be told from 0."
+        "same time step. Costs overlap; noise is a cost that does not differ from 0."
     ]
     lines += [
         f"{price.effect} takes along {', '.join(price.takes_along)}" for price in prices.prices if price.takes_along
@@ -91,9 +91,9 @@ def price_table(prices: PriceList) -> Group:
     supply = [price.effect for price in prices.prices if price.effect in ("infeed", "outfeed")]
     if supply:
         lines.append(f"{', '.join(supply)}: without, there are other bottles, among whom a step's fixed cost is shared")
-    lines += [f"{name}: not priced, the scene does not run without it: {why}" for name, why in prices.failed.items()]
+    lines += [f"{name}: not measured, the scene does not run without it: {why}" for name, why in prices.failed.items()]
     if prices.fixed:
-        lines.append(f"not priced, as they can't be forced off: {', '.join(prices.fixed)}")
+        lines.append(f"not measured, as they can't be forced off: {', '.join(prices.fixed)}")
     return Group(table, *lines)
 
 

@@ -46,7 +46,7 @@ class Price:
 
     @property
     def certain(self) -> bool:
-        """Whether the cost can be told from 0."""
+        """Whether the cost differs from 0."""
         return self.low > 0.0 or self.high < 0.0
 
 
@@ -99,7 +99,7 @@ class _Variant:
 class Pricing:
     """Runs a scene to a warm state, then prices every effect that is on and can be forced off.
 
-    To be called in this order: `warm_up`, `prepare`, `measure`, `gains`; each tells its progress. Every variant takes
+    To be called in this order: `warm_up`, `prepare`, `measure`, `gains`; each reports its progress. Every variant takes
     the steps a tick that the scene has as it is, but those of `gains`. SceneError or SimulationError if the scene does
     not run.
     """

@@ -24,7 +24,7 @@ _WIDEST: Final = 6.0  # tolerances that an axis shows; what lies beyond stands a
 # Marker, colour and words of a verdict.
 _VERDICTS: Final = {
     "equivalent": ("o", style.SERIES[0], "equivalent: the interval is within the tolerance"),
-    "undecided": ("D", style.SERIES[5], "undecided: it crosses the tolerance, more runs would tell"),
+    "undecided": ("D", style.SERIES[5], "undecided: it crosses the tolerance, more runs would decide"),
     "different": ("X", style.SERIES[1], "different: it is outside"),
 }
 
@@ -76,7 +76,7 @@ def _panel(ax: Axes, rows: Sequence[Comparison], places: Sequence[int]) -> None:
         marker, colour, _ = _VERDICTS[row.verdict]
         low, high = (100.0 * end for end in (row.low, row.high))
         if not (math.isfinite(low) and math.isfinite(high)):
-            ax.text(0.0, place, "too few runs to tell", fontsize=8.0, ha="center", va="center", color=style.MUTED)
+            ax.text(0.0, place, "too few runs to decide", fontsize=8.0, ha="center", va="center", color=style.MUTED)
             continue
         middle = 0.5 * (low + high)
         shown = max(-0.94 * widest, min(middle, 0.94 * widest))

@@ -1,4 +1,4 @@
-"""How integrators and settings look and are called in pictures: colour, marker and line all tell them apart."""
+"""How integrators and settings look and are called in pictures: colour, marker and line all distinguish them."""
 
 from __future__ import annotations
 

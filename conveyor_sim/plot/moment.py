@@ -60,7 +60,7 @@ def moment_figure(
 ) -> Figure:
     """The plant at the time of `frame`; under it the traces, one a row, over `time` (n,) s, which ends at that time.
 
-    text: what happened. blocked: names of the photo-eyes that tell of a bottle then.
+    text: what happened. blocked: names of the photo-eyes that are blocked then.
     """
     box = whole_region(plant, [frame])
     inches = WIDTH - 0.8
@@ -102,7 +102,7 @@ def _speeds(plant: Plant, frame: Frame) -> Normalize:
 
 
 def _draw_blocked(ax: Axes, plant: Plant, blocked: Collection[str]) -> LineCollection:
-    """The beams of the photo-eyes that tell of a bottle: broad and full."""
+    """The beams of the photo-eyes that are blocked: broad and full."""
     beams = [sensor.points for sensor in plant.sensors if sensor.kind == "photo_eye" and sensor.name in blocked]
     lines = LineCollection(beams, colors=style.PHOTO_EYE, linewidths=4.0, zorder=Z_LINE, gid="blocked")
     ax.add_collection(lines)

@@ -1,4 +1,4 @@
-"""Sensors in a drawing: told apart by their shape first, by their colour second."""
+"""Sensors in a drawing: distinguished by their shape first, by their colour second."""
 
 from __future__ import annotations
 

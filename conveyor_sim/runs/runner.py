@@ -45,7 +45,7 @@ def run_scene(
 ) -> Run:
     """Runs a scene for its duration and records it to the folder `bag`, if given.
 
-    progress(simulated time, s) is told after every tick. threads: to step with, None has them chosen. Ctrl-C ends the
+    progress(simulated time, s) is called after every tick. threads: to step with, None has them chosen. Ctrl-C ends the
     run at the next tick, with a whole bag; a second one ends the process.
     Raises SceneError, SimulationError, and BagError if the recording can't be written.
     """

@@ -10,7 +10,7 @@ FILE_NAME = "stopped.npz"
 
 
 def keep_stopped(simulation: Simulation, folder: Path | None, error: SimulationError) -> SimulationError:
-    """Write the state at the beginning of the tick that failed into a folder, if given; an error that tells where."""
+    """Write the state at the beginning of the tick that failed into a folder, if given; an error that says where."""
     if folder is None:
         return error
     path = folder / FILE_NAME

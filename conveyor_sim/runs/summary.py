@@ -145,7 +145,7 @@ class Summary:
     energy: Energy | None
     """None if no energy ledger was recorded."""
     borne: LoadHistory | None
-    """What bottles have borne; None if it was not recorded."""
+    """Loads on the bottles; None if it was not recorded."""
     damage_events: dict[str, int]
     """How often a limit was passed, by limit."""
     damage_texts: list[str]
@@ -383,7 +383,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
 
 def _told(kinds: dict[str, int], texts: list[str]) -> str:
     if not kinds:
-        return "nothing to tell"
+        return "nothing to report"
     counts = ", ".join(f"{count} x {kind.replace('_', ' ')}" for kind, count in kinds.items())
     return "\n".join([counts, *texts])
 

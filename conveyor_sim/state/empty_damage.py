@@ -39,7 +39,7 @@ class RailPlaces:
 
 
 def empty_damage(model: Model, slots: int) -> Damage | None:
-    """Room for that many bottles; None where nobody asks for any of it."""
+    """Room for that many bottles; None where all of it is disabled."""
 
     def reals() -> F8:
         return np.zeros(slots)

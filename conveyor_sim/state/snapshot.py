@@ -36,9 +36,9 @@ def snapshot(part: Any) -> Any:
 
 
 def restore(part: Any, told: Any, name: str = "memory") -> None:
-    """Put what `snapshot` told of an object, or of a dict of objects, back into one that is built alike.
+    """Put what `snapshot` returned of an object, or of a dict of objects, back into one that is built alike.
 
-    What is told must be alike: the same attributes, of the types of the class's annotations, or else of the values
+    What is given must be alike: the same attributes, of the types of the class's annotations, or else of the values
     that they have now; numbers are finite. Raises ValueError, in words, where it is not.
     """
     now = _public(part)

@@ -59,7 +59,7 @@ class Integration:
         return self._guard.deepest
 
     def take_events(self) -> list[GuardEvent]:
-        """What the guard has to tell since the last call."""
+        """What the guard has reported since the last call."""
         events, self._events = self._events, []
         return events
 

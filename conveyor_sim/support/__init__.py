@@ -1,1 +1,1 @@
-"""What every room may use: files from outside, foreign text, signals, progress, the machine and its resources."""
+"""What every package may use: files from outside, foreign text, signals, progress, the machine and its resources."""

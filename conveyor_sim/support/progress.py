@@ -59,7 +59,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
         """`done`: simulated time so far, s; `total`: the whole, where it was not known at first.
 
-        `left`: s of wall time to go, where the caller knows better than what is done so far tells.
+        `left`: s of wall time to go, where the caller knows better than a guess from what is done.
         """
         self._left = left
         if self._start is None:  # building and compiling come before the first tick and would look like slowness

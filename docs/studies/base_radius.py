@@ -5,7 +5,7 @@
 Each scene runs with bottles that stand on a point and on rings of some shares of their radius, over seeds of its
 infeeds. `rails J` is the sliding work at the rails, `walls J` that at the walls of the bottles (by rails and by other
 bottles), both over the bottles that came; `out` is how many left in the second half of the run. What a ring costs is
-told by `conveyor-sim explain SCENE --price` on the scene with base_radius.
+measured by `conveyor-sim explain SCENE --price` on the scene with base_radius.
 """
 
 import csv

@@ -5,7 +5,7 @@
     make promises ARGS=--tables         # measures nothing: predictions and tables anew, measured figures as they are
 
 Impacts and resting load are measured as in `conveyor-sim accuracy` (docs/accuracy.md). Each preset is run with each of
-the integrators that may be the default, so that the table also tells what the same promise costs with another.
+the integrators that may be the default, so that the table also shows what the same promise costs with another.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The matrix of docs/stability.md: every row of the table of hard cases, by set of effects, integrator and preset.
 
-A run may do so much work and no more: what would take longer ends early, and is told with the time that it reached.
+A run may do so much work and no more: what would take longer ends early, and is listed with the time that it reached.
 Every run is repeated on two threads, as far as a share of that work goes, and its state compared bit for bit. Each is
 in the file as soon as it is finished; runs that are there, of the present sources, are not made again.
 """
@@ -63,7 +63,7 @@ class Job:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """What tells it from all others."""
+        """What distinguishes it from all others."""
         return self.row, self.effects, self.integrator, self.preset
 
 

@@ -115,8 +115,8 @@ def summary(matrix: Sequence[Line], folder: Path) -> str:
         counts = " | ".join(str(verdicts[verdict]) for verdict in MARKS)
         lines.append(f"| {SHORT[integrator]} | {counts} | {threads['same']} of {threads.total()} |")
     machine = folder / "machine.txt"
-    told = machine.read_text(encoding="utf-8").strip() if machine.exists() else "no machine yet"
-    return "\n".join([*lines, "", f"Measured on {told}."])
+    measured_on = machine.read_text(encoding="utf-8").strip() if machine.exists() else "no machine yet"
+    return "\n".join([*lines, "", f"Measured on {measured_on}."])
 
 
 def rows(matrix: Sequence[Line]) -> str:
@@ -167,16 +167,16 @@ def _few(text: str) -> str:
 
 def exceptions(matrix: Sequence[Line]) -> str:
     """Every run that did not keep what is expected, was not run or was refused, with the sentence; alike ones once."""
-    told: dict[tuple[str, str, str, str], list[str]] = {}
+    alike: dict[tuple[str, str, str, str], list[str]] = {}
     for line in matrix:
         if line["verdict"] in ("broken", "limit", "not run", "refused"):
             # Of one cause, figures differ from preset to preset.
             about = (line["row"], line["effects"], line["integrator"], line["verdict"])
-            told.setdefault(about, []).append(f"{line['preset']}: {line['said']}")
-    if not told:
+            alike.setdefault(about, []).append(f"{line['preset']}: {line['said']}")
+    if not alike:
         return "None."
     lines = ["| row | effects | integrator | | |", "| --- | --- | --- | --- | --- |"]
-    for (row, effects, integrator, verdict), said in told.items():
+    for (row, effects, integrator, verdict), said in alike.items():
         words = said[0].partition(": ")[2] if verdict == "refused" else "; ".join(said)
         lines.append(f"| {row} | {effects} | {SHORT[integrator]} | {MARKS[verdict]} | {words.replace('|', '/')} |")
     return "\n".join(lines)

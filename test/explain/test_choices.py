@@ -130,8 +130,8 @@ def test_prices_tell_what_is_noise() -> None:
         "peaks 50.0 49.6 +0.4 -0.1 .. +0.9 noise",
         "all of these 50.0 20.0 +30.0 +28.0 .. +32.0 not the sum",
         "contact_friction takes along rotation",
-        "belts: not priced, the scene does not run without it: it diverged",
-        "not priced, as they can't be forced off: linear, curved_belts",
+        "belts: not measured, the scene does not run without it: it diverged",
+        "not measured, as they can't be forced off: linear, curved_belts",
     ):
         assert line in lines
     assert "In ns per bottle and step, of 50.0 with all effects: 7 bottles at 1.5 s, on one thread" in " ".join(lines)

@@ -282,7 +282,7 @@ def test_an_interval_without_ends_is_said_in_words() -> None:
     of = study()
     row = replace(of.comparisons[0], low=-math.inf, high=math.inf, verdict="undecided")
     (ax,) = accuracy_figures(replace(of, comparisons=(row,)))["ensembles"].axes
-    assert [text.get_text() for text in ax.texts] == ["too few runs to tell"]
+    assert [text.get_text() for text in ax.texts] == ["too few runs to decide"]
 
 
 def test_peak_force_stands_beside_the_square_root_of_the_stiffness(figures: dict[str, Figure]) -> None:

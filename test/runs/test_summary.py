@@ -105,7 +105,7 @@ def test_what_sets_the_steps_is_told(bag: Path) -> None:
 def test_foreign_text_in_a_recording_is_told_in_printable_words(bag: Path, tmp_path: Path) -> None:
     def forge(topic: str, message: Any) -> None:
         if topic == "line":
-            message.scene_name = "plant\nguard  nothing to tell\x1b[2J" + "x" * 5000
+            message.scene_name = "plant\nguard  nothing to report\x1b[2J" + "x" * 5000
             message.dt_reason = "\r\x1b]0;title\x07" + "y" * 5_000_000
 
     summary = summarize(edited(bag, tmp_path / "forged", forge))

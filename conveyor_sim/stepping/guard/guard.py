@@ -56,7 +56,7 @@ class Guard:
         self.deepest = 0.0
 
     def begin(self, tick: int, surface_speed: float, rail_speed: float) -> Violation | None:
-        """Keep the state at the beginning of a tick; tell of a bottle that is not finite there.
+        """Keep the state at the beginning of a tick; report a bottle that is not finite there.
 
         surface_speed: m/s, the largest of any belt's surface; rail_speed: m/s, of any rail that moves.
         """

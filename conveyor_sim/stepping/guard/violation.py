@@ -21,7 +21,7 @@ REMEDY_DEPTH = 0.1
 
 @dataclass(frozen=True)
 class GuardEvent:
-    """Something the guard tells."""
+    """Something the guard reports."""
 
     tick: int
     """At the end of which it was found; for `stopped`, the last one that was reached."""
