@@ -66,7 +66,10 @@ def main(context: click.Context) -> None:
 @click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def check(scene: str, out: Path, outside_tables: bool) -> None:
-    """Validate SCENE (a file, or the name of a shipped one), list its effects and time step with reasons, draw it."""
+    """Validate SCENE and draw it.
+
+    SCENE is a file, or the name of a shipped scene. Its effects and its time step are listed with their reasons.
+    """
     from conveyor_sim.model import build_model
     from conveyor_sim.runs.report import plot_function
     from conveyor_sim.scene import load_scene
@@ -88,12 +91,17 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 @main.command()
 @click.argument("scene")
 @click.option(
-    "--price", is_flag=True, help="Measure what each effect costs, in ns per bottle and step, and what remedies bring."
+    "--price",
+    is_flag=True,
+    help="Measure what each effect costs, in ns per bottle and step, and what each remedy saves.",
 )
 @click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
-    """Explain why SCENE is simulated as it is: its effects, what bounds the time step; with --price, the cost."""
+    """Explain effects and time step of SCENE.
+
+    Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs.
+    """
     from conveyor_sim.explain.choices import explanation, price_table
     from conveyor_sim.model import build_model
     from conveyor_sim.scene import load_scene
@@ -139,7 +147,10 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
 def run(
     scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None, outside_tables: bool
 ) -> None:
-    """Simulate SCENE as fast as it goes, without ROS, and record what the node would."""
+    """Simulate SCENE without ROS, and record it.
+
+    It runs as fast as possible, and records what the node would.
+    """
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.explain.choices import setting_line, step_rows
@@ -196,9 +207,10 @@ def accuracy(
     write: bool,
     outside_tables: bool,
 ) -> None:
-    """Compare settings by error and run time on SCENE, and recommend the cheapest that meets the tolerance.
+    """Compare settings by error and run time.
 
-    A study that was interrupted goes on where it was when the command is given again.
+    Recommends the cheapest setting that meets the tolerance on SCENE. A study that was interrupted goes on where it was
+    when the command is given again.
     """
     from conveyor_sim.accuracy.apply import apply
     from conveyor_sim.accuracy.lines import summary
@@ -215,7 +227,7 @@ def accuracy(
     folder = out or study_folder(loaded)
     effort = THOROUGH if thorough else DEFAULT
     _say(f"study of {loaded.name} in {folder}; Ctrl-C interrupts it, the same command goes on with it")
-    _say(f"it takes up to {effort.budget / 60.0:.0f} min of processor time, and compiling before")
+    _say(f"it takes up to {effort.budget / 60.0:.0f} min of processor time, after compiling")
     study = run_study(loaded, folder, tolerance, effort, lambda what, counted: ProgressBar(what, 0.0, counted=counted))
     for line in summary(study):
         click.echo(line)
@@ -235,7 +247,10 @@ def accuracy(
 @main.command()
 @click.argument("bag", type=click.Path(path_type=Path))
 def recover(bag: Path) -> None:
-    """Verify BAG; if it was damaged, or killed while it was written, repair it and keep the original."""
+    """Verify a recording, and repair it.
+
+    If BAG is damaged, or its recording was interrupted, a repaired copy takes its place; the original is kept.
+    """
     from conveyor_sim.bag.recover import recover as recover_bag
 
     report = recover_bag(bag)
@@ -271,9 +286,10 @@ def replay(
     start: float | None,
     paused: bool,
 ) -> None:
-    """Run BAG again, with its commands at their ticks, and compare every recorded state.
+    """Simulate a recording again and compare.
 
-    With --publish nothing is simulated: the recorded messages are published over ROS as the live node would.
+    The commands in BAG are applied at their ticks, and every recorded state is compared. With --publish
+    nothing is simulated: the recorded messages are published over ROS as the live node would.
     """
     if publish:
         _publish(bag, 1.0 if rate is None else rate, start, paused, ros_arguments)
@@ -304,7 +320,10 @@ def replay(
 @click.option("--time", "times", type=float, multiple=True, help="Simulated time to draw the plant at, s; repeatable.")
 @click.option("--bottle", "bottles", type=int, multiple=True, help="Id of a bottle to draw over time; repeatable.")
 def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[int, ...]) -> None:
-    """Draw BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces."""
+    """Draw a recording.
+
+    Draws BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces.
+    """
     from conveyor_sim.runs.report import plot_function
 
     plot_bag = plot_function("plot_bag")
