@@ -23,7 +23,7 @@ CODE = "from bench.memory import child; child({n}, {effects!r})"
 
 
 def measure(effort: Effort) -> list[Row]:
-    """Each size in a process of its own; the process's growth is told over that for a tenth of the bottles."""
+    """Each size in a process of its own; the process's growth is taken over that for a tenth of the bottles."""
     rows = []
     for effects in EFFECTS:
         for n in SIZES[: 2 if effort.quick else None]:

@@ -46,7 +46,7 @@ def main(belt: str, scans: int) -> None:
         return response
 
     try:
-        # A target that has passed is refused, and the refusal tells the present tick and the simulation's run.
+        # A target that has passed is refused, and the refusal gives the present tick and the simulation's run.
         present = call(Lockstep.Request(run_id=RUN_ID, target_tick=0))
         tick, run = present.tick, present.sim_run_id
         speed = 0.2

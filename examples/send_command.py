@@ -1,4 +1,4 @@
-"""Sets the speed of a belt of a running simulation, and tells what became of it.
+"""Sets the speed of a belt of a running simulation, and prints what became of it.
 
     python send_command.py BELT SPEED        # m/s, positive forward
 

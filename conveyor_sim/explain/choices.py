@@ -1,4 +1,4 @@
-"""Tells why a scene is simulated as it is: its effects, its time step, its expected errors, what each effect costs."""
+"""Why a scene is simulated as it is: its effects, its time step, its expected errors, what each effect costs."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def _bounds(scene: Scene, model: Model) -> Table | str:
             bound.name,
             _time(bound.dt),
             str(fewest_steps(scene.tick, bound.dt)),
-            f"{bound.reason}{', for stability' if bound.stability else ''}{' (rules)' if rules else ''}",
+            f"{bound.reason}{', for stability' if bound.stability else ''}{' (sets the step)' if rules else ''}",
         )
     return table
 

@@ -35,7 +35,7 @@ class Run:
     peak_force: float | None
     """N, the largest normal contact force; None where the scene has no effect `peaks`."""
     load: float | None
-    """N, that pressed on a bottle for long (`achieved.Pressed`); None where it is not known."""
+    """N, that pressed on a bottle for long (`force_check.Pressed`); None where it is not known."""
     guard: tuple[str, ...]
     """What the guard said."""
 

@@ -1,4 +1,4 @@
-"""Tells how far a run is: a bar on a terminal, a plain line now and then elsewhere."""
+"""Shows how far a run is: a bar on a terminal, a plain line now and then elsewhere."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 With pressure: a backlog is pressed between converging rails and leaves nose to tail. Without: the lanes slide along a
 rail over faster and faster belts, get gaps, and mesh. Both keep the rate; what bottles rub off each other and the rails
-tells them apart: 0.18 J a bottle with pressure, 0.04 J without. It is the room on the discharge belt that does it, not
+is what differs: 0.18 J a bottle with pressure, 0.04 J without. It is the room on the discharge belt that does it, not
 its speed: with all belts at 0.3 m/s the lanes mesh as well at this rate, and rub less (0.02 J), for bottles that a belt
 accelerates slide along the rail. Run it by hand: `pytest examples/scenarios/test_combiners.py`.
 """

@@ -1,4 +1,4 @@
-"""A photo-eye that fails is told from one that works: the right alarm, and a line that is held, within three seconds.
+"""A photo-eye that fails is found: the right alarm, and a line that is held, within three seconds.
 
 Run it by hand: `pytest examples/scenarios/test_failing_eye.py`.
 """

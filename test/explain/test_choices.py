@@ -73,9 +73,9 @@ def test_bounds_are_told_with_the_one_that_rules() -> None:
     names = ("base slip", "impact of two bottles", "base friction 1.274 ms", "lattice stability")
     rows = [line for line in lines if line.startswith(names)]
     assert [row.startswith(name) for row, name in zip(rows, names, strict=True)] == [True] * 4
-    assert rows[0].endswith("79 20 steps in v_lim / (mu g) at mu = 0.4 (rules)")
+    assert rows[0].endswith("79 20 steps in v_lim / (mu g) at mu = 0.4 (sets the step)")
     assert rows[3].endswith("a hexagonal packing at k = 5000 N/m, for stability")
-    assert not any(row.endswith("(rules)") for row in rows[1:])
+    assert not any(row.endswith("(sets the step)") for row in rows[1:])
     assert "integrator leapfrog" in lines
     assert "accuracy standard (1 % in contact force)" in lines
     assert any(line.startswith("time step 126.6 us: 79 steps a tick: standard (1 % in") for line in lines)
