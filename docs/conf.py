@@ -1,7 +1,7 @@
 """The docs site: Sphinx over the Markdown pages of the checkout, README.md first (`make site`).
 
-Pages stay plain Markdown that a forge shows as well: what only the site needs, its navigation, is added here as each
-page is read.
+Pages stay plain Markdown that a forge shows as well: what only the site needs, its navigation and captions, is added
+here as each page is read.
 """
 
 from __future__ import annotations
@@ -58,6 +58,11 @@ def add_navigation(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] += "\n".join(["", "", "```{toctree}", ":hidden:", f":caption: {caption}", "", *pages, "```", ""])
 
 
+def show_titles(app: Sphinx, page: str, source: list[str]) -> None:
+    """The title of a block of code, a file's path, becomes its caption; Markdown by itself does not show it."""
+    source[0] = re.sub(r'^```(\w+) title="(.+)"$', r"```{code-block} \1\n:caption: \2\n", source[0], flags=re.MULTILINE)
+
+
 def from_markdown(app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]) -> None:
     """Docstrings are Markdown: an indented example is code, and `for_` in a sentence is no link."""
     for number, line in enumerate(lines):
@@ -75,5 +80,6 @@ def write_start(app: Sphinx, problem: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("source-read", add_navigation)
+    app.connect("source-read", show_titles)
     app.connect("autodoc-process-docstring", from_markdown)
     app.connect("build-finished", write_start)
