@@ -7,7 +7,7 @@ import numpy as np
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.sensors import Counter
+from conveyor_sim.scene.parts.counter import Counter
 
 
 class CounterDevice(Device):

@@ -19,7 +19,10 @@ from conveyor_sim.line.sink import SinkDevice
 from conveyor_sim.line.source import SourceDevice
 from conveyor_sim.line.spill import SpillDevice
 from conveyor_sim.model import Model
-from conveyor_sim.scene.machines import Inspection, Machine, Sink, Source
+from conveyor_sim.scene.machines import Machine
+from conveyor_sim.scene.parts.inspection import Inspection
+from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.scene.schema import Scene
 
 JITTER, QUALITY, MACHINES, PHOTO_EYES = (), (1,), (2,), (3,)

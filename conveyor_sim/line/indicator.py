@@ -8,7 +8,7 @@ from conveyor_sim.line.counter import CounterDevice
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.zone import ZoneDevice
-from conveyor_sim.scene.indicators import Indicator
+from conveyor_sim.scene.parts.indicator import Indicator
 
 STANDS = 1e-3
 """m/s; a slower belt stands."""

@@ -10,7 +10,7 @@ from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.entry import CLEAR, Entry, Quality
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.schema import Infeed
+from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.state import State
 
 ROUNDING = 1e-9

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.machines import Inspection
+from conveyor_sim.scene.parts.inspection import Inspection
 
 
 class InspectionDevice(Device):

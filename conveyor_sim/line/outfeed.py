@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.schema import Outfeed
+from conveyor_sim.scene.parts.outfeed import Outfeed
 
 
 class OutfeedDevice(Device):

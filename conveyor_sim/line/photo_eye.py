@@ -9,8 +9,8 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.motion import Motion
 from conveyor_sim.line.process_image import Command, Signal, switch
 from conveyor_sim.line.timer import Edge, Timer
+from conveyor_sim.scene.parts.photo_eye import PhotoEye
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.scene.sensors import PhotoEye
 
 FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
 """Hz and s, that can be injected."""

@@ -8,7 +8,7 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.outfeed import in_polygon
 from conveyor_sim.line.process_image import Signal, switch
-from conveyor_sim.scene.machines import Reject
+from conveyor_sim.scene.parts.reject import Reject
 
 
 class RejectDevice(Device):

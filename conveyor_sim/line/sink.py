@@ -8,7 +8,7 @@ from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.machine import MachineDevice
 from conveyor_sim.line.outfeed import in_polygon
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.machines import Sink
+from conveyor_sim.scene.parts.sink import Sink
 
 
 class SinkDevice(MachineDevice):

@@ -6,7 +6,7 @@ from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.entry import Entry, Quality
 from conveyor_sim.line.machine import MachineDevice
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.scene.machines import Source
+from conveyor_sim.scene.parts.source import Source
 
 
 class SourceDevice(MachineDevice):

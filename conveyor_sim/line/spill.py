@@ -6,7 +6,7 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.entry import Entry
 from conveyor_sim.line.process_image import Signal, switch
-from conveyor_sim.scene.machines import Spill
+from conveyor_sim.scene.parts.spill import Spill
 
 
 class SpillDevice(Device):

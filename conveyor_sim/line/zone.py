@@ -7,7 +7,7 @@ import numpy as np
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.outfeed import in_polygon
 from conveyor_sim.line.process_image import Command, Signal
-from conveyor_sim.scene.sensors import Zone
+from conveyor_sim.scene.parts.zone import Zone
 
 MOST_OFFSET = 1000.0
 """Bottles, that can be injected."""

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.observe.damage import RailWearColumns
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
-from conveyor_sim.scene.machines import Reject, Sink, Source, Spill
 from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.scene.schema import Infeed, Outfeed
 from conveyor_sim.scene.sensor_shapes import SensorShape, sensor_shapes
 
 if TYPE_CHECKING:
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 _OUTLINE_POINTS = 96
-_KINDS = {Infeed: "infeed", Source: "source", Spill: "spill", Outfeed: "outfeed", Sink: "sink", Reject: "reject"}
 
 
 @dataclass(frozen=True)
@@ -68,13 +65,13 @@ class Plant:
                 InfeedMark(
                     path[1],
                     np.asarray(entry.position, dtype=np.float64),
-                    0.0 if isinstance(entry, Spill) else float(entry.direction),
-                    _KINDS[type(entry)],
+                    float(entry.heading[0]),
+                    entry.KIND,
                 )
                 for path, entry in scene.entries()
             ),
             outfeeds=tuple(
-                OutfeedMark(path[1], np.asarray(exit_.region, dtype=np.float64), _KINDS[type(exit_)])
+                OutfeedMark(path[1], np.asarray(exit_.region, dtype=np.float64), exit_.KIND)
                 for path, exit_ in scene.exits()
             ),
             sensors=tuple(sensor_shapes(scene)),

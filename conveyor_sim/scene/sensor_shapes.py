@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.scene.machines import Inspection
+from conveyor_sim.scene.parts.inspection import Inspection
 from conveyor_sim.scene.schema import Scene
 
 
