@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import CommandOutcome, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
-from conveyor_sim.line.photo_eye import PhotoEyeDevice
+from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State

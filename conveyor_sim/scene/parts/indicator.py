@@ -1,6 +1,7 @@
 """Indicators of a scene file: what a line engineer wants to know of an exit."""
 
 from collections.abc import Iterator
+from typing import ClassVar
 
 from conveyor_sim.scene.parts.device_part import DevicePart, Others, name_problems
 from conveyor_sim.scene.problems import Path, Problem
@@ -10,6 +11,8 @@ from conveyor_sim.scene.words import shown
 
 class Indicator(DevicePart):
     """Flow, jam, starved and blocked of one exit: a place that bottles leave on a belt."""
+
+    KIND: ClassVar[str] = "indicator"
 
     counter: Name = quantity("Counter over which bottles leave, forward.")
     belt: Name = quantity("Belt that brings them there.")

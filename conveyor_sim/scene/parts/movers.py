@@ -135,6 +135,8 @@ class _Swinging(_Mover):
 class SlidingGate(_Sliding):
     """A gate or a stop that slides open."""
 
+    KIND: ClassVar[str] = "gate"
+
     kind: Literal["slide"] = quantity("The kind of gate.")
     from_: Point = quantity("One end while it is closed.", "m", alias="from")
     to: Point = quantity("The other end while it is closed.", "m")
@@ -144,6 +146,8 @@ class SlidingGate(_Sliding):
 class SwingingGate(_Swinging):
     """A gate or a stop that swings open about its first end."""
 
+    KIND: ClassVar[str] = "gate"
+
     kind: Literal["swing"] = quantity("The kind of gate.")
     from_: Point = quantity("The end about which it swings.", "m", alias="from")
     to: Point = quantity("The other end while it is closed.", "m")
@@ -152,6 +156,8 @@ class SwingingGate(_Swinging):
 
 class Pusher(_Sliding):
     """A straight rail that strokes along a direction, and returns."""
+
+    KIND: ClassVar[str] = "pusher"
 
     from_: Point = quantity("One end while it is retracted.", "m", alias="from")
     to: Point = quantity("The other end while it is retracted.", "m")
@@ -165,6 +171,8 @@ class Pusher(_Sliding):
 
 class Diverter(_Swinging):
     """A straight rail that swings about its first end into the way of bottles, and returns."""
+
+    KIND: ClassVar[str] = "diverter"
 
     from_: Point = quantity("The pivot.", "m", alias="from")
     to: Point = quantity("The other end while it does not divert.", "m")

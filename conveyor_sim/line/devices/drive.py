@@ -3,11 +3,12 @@
 import math
 from collections.abc import Sequence
 
-from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.line.ramp import Ramp
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive
 
@@ -21,13 +22,12 @@ class DriveDevice(BeltDevice):
     A trip stops it, at its ramp, until the fault is gone and `reset` has risen since.
     """
 
-    def __init__(self, name: str, index: int, belt: StraightBelt | CurvedBelt, drive: Drive, tick: float) -> None:
-        place = f"belts/{name}"
-        signals = [Signal(f"{place}/{what}", "1", "bool") for what in ("running", "at_speed", "fault")]
+    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
+        signals = [Signal(f"{name}/{what}", "1", "bool") for what in ("running", "at_speed", "fault")]
         if drive.pulses_per_metre is not None:
-            signals.append(Signal(f"{place}/pulses", "1", "count"))
-        commands = [switch(f"{place}/{what}") for what in ("run", "reverse", "reset")]
-        super().__init__(name, index, belt, tick, signals, commands, [switch(f"{place}/trip")])
+            signals.append(Signal(f"{name}/pulses", "1", "count"))
+        commands = [switch(f"{name}/{what}") for what in ("run", "reverse", "reset")]
+        super().__init__(name, belt, setup, signals, commands, [switch(f"{name}/trip")])
         self._drive = drive
         self.ramp = Ramp(belt.speed)
         self.run = True
@@ -78,3 +78,8 @@ class DriveDevice(BeltDevice):
             return 0.0
         setpoint = float(now.setpoints[self._index])
         return -setpoint if self.reverse else setpoint
+
+
+def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: Setup) -> BeltDevice:
+    """A belt, with a drive if it has one."""
+    return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

@@ -6,8 +6,9 @@ import numpy as np
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.machine import MachineDevice
-from conveyor_sim.line.outfeed import in_polygon
+from conveyor_sim.line.polygon import in_polygon
 from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.sink import Sink
 
 
@@ -17,13 +18,12 @@ class SinkDevice(MachineDevice):
     waiting: tuple[int, ...]
     """Ids of the bottles in the region, in the order of their arrival."""
 
-    def __init__(self, name: str, sink: Sink) -> None:
-        place = f"machines/{name}"
+    def __init__(self, name: str, sink: Sink, setup: Setup) -> None:
         signals = [
-            Signal(f"{place}/taken", "1", "count", "removed"),
-            Signal(f"{place}/taken_bad", "1", "count"),
-            Signal(f"{place}/starved", "1", "bool"),
-            Signal(f"{place}/starved_time", "s", "number"),
+            Signal(f"{name}/taken", "1", "count", "removed"),
+            Signal(f"{name}/taken_bad", "1", "count"),
+            Signal(f"{name}/starved", "1", "bool"),
+            Signal(f"{name}/starved_time", "s", "number"),
         ]
         super().__init__(name, sink.rate, sink.rate_limit, signals)
         self._corners = np.array(sink.region)

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.outfeed import in_polygon
+from conveyor_sim.line.polygon import in_polygon
 from conveyor_sim.line.process_image import Command, Signal
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.zone import Zone
 
 MOST_OFFSET = 1000.0
@@ -16,12 +17,11 @@ MOST_OFFSET = 1000.0
 class ZoneDevice(Device):
     """One zone while it runs."""
 
-    def __init__(self, name: str, zone: Zone) -> None:
-        place = f"zones/{name}"
-        signals = [Signal(f"{place}/bottles", "1", "count"), Signal(f"{place}/density", "1/m^2", "number")]
+    def __init__(self, name: str, zone: Zone, setup: Setup) -> None:
+        signals = [Signal(f"{name}/bottles", "1", "count"), Signal(f"{name}/density", "1/m^2", "number")]
         if zone.full_at is not None:
-            signals.append(Signal(f"{place}/full", "1", "bool"))
-        super().__init__(place, signals, (), [Command(f"{place}/offset", "1", "count", -MOST_OFFSET, MOST_OFFSET)])
+            signals.append(Signal(f"{name}/full", "1", "bool"))
+        super().__init__(name, signals, (), [Command(f"{name}/offset", "1", "count", -MOST_OFFSET, MOST_OFFSET)])
         self._corners, self._full_at = np.array(zone.region), zone.full_at
         x, y = self._corners.T
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))

@@ -5,17 +5,17 @@ from collections.abc import Sequence
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.inspection import Inspection
 
 
 class InspectionDevice(Device):
     """One inspection while it runs."""
 
-    def __init__(self, name: str, inspection: Inspection) -> None:
-        place = f"machines/{name}"
-        counts = [Signal(f"{place}/{what}", "1", "count") for what in ("count", "bad")]
-        times = [Signal(f"{place}/{what}", "s", "number") for what in ("time", "bad_time")]
-        super().__init__(place, [*counts, *times])
+    def __init__(self, name: str, inspection: Inspection, setup: Setup) -> None:
+        counts = [Signal(f"{name}/{what}", "1", "count") for what in ("count", "bad")]
+        times = [Signal(f"{name}/{what}", "s", "number") for what in ("time", "bad_time")]
+        super().__init__(name, [*counts, *times])
         self._line = CrossingLine(inspection.from_, inspection.to)
         self.count = self.bad = 0
         self.time = self.bad_time = 0.0

@@ -6,8 +6,8 @@ from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, Mov
 from conveyor_sim.line.course import course_to, later, position_at, resting
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal, switch
-from conveyor_sim.model import Model
-from conveyor_sim.scene.moving import MovingShape
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.movers import Mover as MoverPart
 
 WORDS = {
     "gates": ("open", "is_closed", "is_open"),
@@ -27,20 +27,21 @@ class Mover(Device):
     drive, it is held up or goes back, and goes on from where it is.
     """
 
-    def __init__(self, number: int, shape: MovingShape) -> None:
-        """number: among the rails that move."""
-        kind = shape.name.split("/")[0]
-        order, home, away = WORDS[kind]
+    def __init__(self, name: str, part: MoverPart, setup: Setup) -> None:
+        shapes = setup.model.moving_shapes
+        number = [shape.name for shape in shapes].index(name)
+        shape = shapes[number]
+        order, home, away = WORDS[name.split("/")[0]]
         super().__init__(
-            shape.name,
+            name,
             (
-                Signal(f"{shape.name}/position", "1", "number"),
-                Signal(f"{shape.name}/{home}", "1", "bool"),
-                Signal(f"{shape.name}/{away}", "1", "bool"),
-                Signal(f"{shape.name}/blocked", "1", "bool"),
+                Signal(f"{name}/position", "1", "number"),
+                Signal(f"{name}/{home}", "1", "bool"),
+                Signal(f"{name}/{away}", "1", "bool"),
+                Signal(f"{name}/blocked", "1", "bool"),
             ),
-            (switch(f"{shape.name}/{order}"),),
-            (switch(f"{shape.name}/jammed"),),
+            (switch(f"{name}/{order}"),),
+            (switch(f"{name}/jammed"),),
         )
         self._number, self._shape = number, shape
         self.target = self.position = shape.first
@@ -102,8 +103,3 @@ class Mover(Device):
         moving = now.state.world.moving
         assert moving is not None
         return moving
-
-
-def mover_devices(model: Model) -> tuple[Mover, ...]:
-    """The gates, pushers and diverters of a scene."""
-    return tuple(Mover(number, shape) for number, shape in enumerate(model.moving_shapes))

@@ -3,11 +3,12 @@
 import math
 from collections.abc import Sequence
 
-from conveyor_sim.line.belt import BeltDevice
-from conveyor_sim.line.counter import CounterDevice
 from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.process_image import Signal
-from conveyor_sim.line.zone import ZoneDevice
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.indicator import Indicator
 
 STANDS = 1e-3
@@ -23,27 +24,19 @@ class IndicatorDevice(Device):
     recent: list[int]
     """Ticks of the passages within the window."""
 
-    def __init__(
-        self,
-        name: str,
-        indicator: Indicator,
-        tick: float,
-        counter: CounterDevice,
-        zone: ZoneDevice,
-        belt: BeltDevice,
-        downstream: BeltDevice | None,
-        backup: ZoneDevice | None,
-    ) -> None:
-        """tick: s."""
-        place = f"indicators/{name}"
+    def __init__(self, name: str, indicator: Indicator, setup: Setup) -> None:
+        downstream, backup, tick = indicator.downstream, indicator.backup, setup.scene.tick
         self._can_block = downstream is not None or backup is not None
         kinds = ["jam", "starved", *(["blocked"] if self._can_block else [])]
         super().__init__(
-            place,
-            [Signal(f"{place}/flow", "1/h", "number"), *(Signal(f"{place}/{kind}", "1", "bool") for kind in kinds)],
+            name,
+            [Signal(f"{name}/flow", "1/h", "number"), *(Signal(f"{name}/{kind}", "1", "bool") for kind in kinds)],
         )
-        self._counter, self._zone, self._backup = counter, zone, backup
-        self._belt, self._downstream = belt, downstream
+        self._counter = setup.device(CounterDevice, f"counters/{indicator.counter}")
+        self._zone = setup.device(ZoneDevice, f"zones/{indicator.zone}")
+        self._belt = setup.device(BeltDevice, f"belts/{indicator.belt}")
+        self._downstream = None if downstream is None else setup.device(BeltDevice, f"belts/{downstream}")
+        self._backup = None if backup is None else setup.device(ZoneDevice, f"zones/{backup}")
         starved_time = indicator.jam_time if indicator.starved_time is None else indicator.starved_time
         self._jam_ticks, self._starved_ticks = _ticks(indicator.jam_time, tick), _ticks(starved_time, tick)
         self._window, self._window_ticks = indicator.window, _ticks(indicator.window, tick)

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.entry import CLEAR, Entry, Quality
+from conveyor_sim.line.entry import CLEAR, Quality
 from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import JITTER, QUALITY, Setup
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.state import State
 
@@ -23,14 +24,14 @@ LATE = 2.0
 class InfeedDevice(Device):
     """One infeed while it runs."""
 
-    def __init__(self, name: str, infeed: Infeed, entry: Entry, quality: Quality, random: np.random.Generator) -> None:
-        """random: for the jitter."""
-        place = f"infeeds/{name}"
-        super().__init__(place, [Signal(f"{place}/fed", "1", "count", "fed"), Signal(f"{place}/blocked", "1", "bool")])
-        self._infeed, self._entry, self._radius = infeed, entry, entry.radius
+    def __init__(self, name: str, infeed: Infeed, setup: Setup) -> None:
+        super().__init__(name, [Signal(f"{name}/fed", "1", "count", "fed"), Signal(f"{name}/blocked", "1", "bool")])
+        self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
+        self._radius = self._entry.radius
+        index = setup.index("infeeds", name.rpartition("/")[2])
         self._direction = (math.cos(infeed.direction), math.sin(infeed.direction))
-        self.random = random
-        self.quality = quality
+        self.random = setup.random(JITTER, index)
+        self.quality = Quality(infeed.bad_share, infeed.bad_every, setup.random(QUALITY, index))
         self.fed = 0
         self.blocked = False
         self.blocked_ticks = 0

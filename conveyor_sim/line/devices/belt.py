@@ -7,6 +7,7 @@ import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Command, Signal, speed_command
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.watchdog import Watchdog
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 
@@ -17,26 +18,25 @@ class BeltDevice(Device):
     def __init__(
         self,
         name: str,
-        index: int,
         belt: StraightBelt | CurvedBelt,
-        tick: float,
+        setup: Setup,
         signals: Sequence[Signal] = (),
         commands: Sequence[Command] = (),
         faults: Sequence[Command] = (),
     ) -> None:
-        """index: among the belts of the model. tick: s. The rest: what more a drive has."""
+        """The rest: what more a drive has."""
         low, high = belt.speed_limits
-        place = f"belts/{name}"
+        short_name = name.rpartition("/")[2]
         super().__init__(
-            place,
-            [Signal(f"{place}/speed", "m/s", "number"), Signal(f"{place}/bottles", "1", "count"), *signals],
-            [Command(speed_command(name), "m/s", "number", low, high), *commands],
+            name,
+            [Signal(f"{name}/speed", "m/s", "number"), Signal(f"{name}/bottles", "1", "count"), *signals],
+            [Command(speed_command(short_name), "m/s", "number", low, high), *commands],
             faults,
         )
-        self._index = index
-        self._speed_command = speed_command(name)
+        self._index = setup.index("belts", short_name)
+        self._speed_command = speed_command(short_name)
         timeout = belt.watchdog
-        self.watchdog = None if timeout is None else Watchdog(max(1, math.ceil(timeout / tick - 1e-9)))
+        self.watchdog = None if timeout is None else Watchdog(max(1, math.ceil(timeout / setup.scene.tick - 1e-9)))
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take a setpoint, m/s."""

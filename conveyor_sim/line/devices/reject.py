@@ -6,8 +6,9 @@ import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.outfeed import in_polygon
+from conveyor_sim.line.polygon import in_polygon
 from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.reject import Reject
 
 
@@ -17,12 +18,11 @@ class RejectDevice(Device):
     strokes: tuple[float, ...]
     """s, when the strokes that are still to hit began or begin."""
 
-    def __init__(self, name: str, reject: Reject) -> None:
-        place = f"machines/{name}"
+    def __init__(self, name: str, reject: Reject, setup: Setup) -> None:
         names = ("rejected_bad", "rejected_good", "missed")
-        signals = [Signal(f"{place}/rejected", "1", "count", "rejected")]
-        signals += [Signal(f"{place}/{what}", "1", "count") for what in names]
-        super().__init__(place, signals, [switch(f"{place}/fire")], [switch(f"{place}/stop")])
+        signals = [Signal(f"{name}/rejected", "1", "count", "rejected")]
+        signals += [Signal(f"{name}/{what}", "1", "count") for what in names]
+        super().__init__(name, signals, [switch(f"{name}/fire")], [switch(f"{name}/stop")])
         self._reject = reject
         self._corners = np.array(reject.region)
         self.fire = RisingEdge()

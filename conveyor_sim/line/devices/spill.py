@@ -4,18 +4,17 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.entry import Entry
 from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.spill import Spill
 
 
 class SpillDevice(Device):
     """One place of spills: each rise of its fault drops a bottle, as soon as there is room."""
 
-    def __init__(self, name: str, spill: Spill, entry: Entry) -> None:
-        place = f"spills/{name}"
-        super().__init__(place, [Signal(f"{place}/dropped", "1", "count", "fed")], faults=[switch(f"{place}/drop")])
-        self._spill, self._entry = spill, entry
+    def __init__(self, name: str, spill: Spill, setup: Setup) -> None:
+        super().__init__(name, [Signal(f"{name}/dropped", "1", "count", "fed")], faults=[switch(f"{name}/drop")])
+        self._spill, self._entry = spill, setup.entry(spill.bottle, 0.0, 0.0)
         self.drop = RisingEdge()
         self.due = 0
         self.fed = 0

@@ -7,15 +7,15 @@ import numpy as np
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.counter import Counter
 
 
 class CounterDevice(Device):
     """One counter while it runs."""
 
-    def __init__(self, name: str, counter: Counter) -> None:
-        place = f"counters/{name}"
-        super().__init__(place, [Signal(f"{place}/{way}", "1", "count") for way in ("forward", "backward")])
+    def __init__(self, name: str, counter: Counter, setup: Setup) -> None:
+        super().__init__(name, [Signal(f"{name}/{way}", "1", "count") for way in ("forward", "backward")])
         self._line = CrossingLine(counter.from_, counter.to)
         self.forward = self.backward = 0
 

@@ -3,25 +3,27 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.entry import Entry, Quality
+from conveyor_sim.line.entry import Quality
 from conveyor_sim.line.machine import MachineDevice
 from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import MACHINES, Setup
 from conveyor_sim.scene.parts.source import Source
 
 
 class SourceDevice(MachineDevice):
     """One source while it runs. Blocked: it would run, has a bottle to give, and there is no room for it."""
 
-    def __init__(self, name: str, source: Source, entry: Entry, quality: Quality) -> None:
-        place = f"machines/{name}"
+    def __init__(self, name: str, source: Source, setup: Setup) -> None:
         signals = [
-            Signal(f"{place}/produced", "1", "count", "fed"),
-            Signal(f"{place}/blocked", "1", "bool"),
-            Signal(f"{place}/blocked_time", "s", "number"),
+            Signal(f"{name}/produced", "1", "count", "fed"),
+            Signal(f"{name}/blocked", "1", "bool"),
+            Signal(f"{name}/blocked_time", "s", "number"),
         ]
         super().__init__(name, source.rate, source.rate_limit, signals)
-        self._position, self._entry = source.position, entry
-        self.quality = quality
+        self._position = source.position
+        self._entry = setup.entry(source.bottle, source.direction, source.speed)
+        random = setup.random(MACHINES, setup.index("machines", name.rpartition("/")[2]))
+        self.quality = Quality(source.bad_share, source.bad_every, random)
         self.fed = 0
         self.blocked = False
         self.blocked_ticks = 0

@@ -1,16 +1,14 @@
 """Photo-eyes: a beam, what can go wrong with it, and the delays after which it is believed."""
 
-from collections.abc import Callable, Sequence
-
-import numpy as np
+from collections.abc import Sequence
 
 from conveyor_sim.line.beam import ROUNDING, Beams, Span
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.motion import Motion
 from conveyor_sim.line.process_image import Command, Signal, switch
+from conveyor_sim.line.setup import PHOTO_EYES, Setup
 from conveyor_sim.line.timer import Edge, Timer
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
-from conveyor_sim.scene.schema import Scene
 
 FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
 """Hz and s, that can be injected."""
@@ -22,27 +20,29 @@ class PhotoEyeDevice(Device):
     late: tuple[Edge, ...]
     """Edges that have not come through yet."""
 
-    def __init__(self, name: str, eye: PhotoEye, beams: Beams, index: int, random: np.random.Generator) -> None:
-        """index: of its beam among the beams; random: for its chatter alone."""
-        place = f"photo_eyes/{name}"
+    def __init__(self, name: str, eye: PhotoEye, setup: Setup) -> None:
+        eyes = setup.scene.photo_eyes
+        motion = setup.shared(Motion, Motion)
+        beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()], motion))
+        index = setup.index("photo_eyes", name.rpartition("/")[2])
         super().__init__(
-            place,
+            name,
             [
-                Signal(f"{place}/blocked", "1", "bool"),
-                Signal(f"{place}/rose", "s", "number"),
-                Signal(f"{place}/fell", "s", "number"),
-                Signal(f"{place}/edges", "1", "count"),
+                Signal(f"{name}/blocked", "1", "bool"),
+                Signal(f"{name}/rose", "s", "number"),
+                Signal(f"{name}/fell", "s", "number"),
+                Signal(f"{name}/edges", "1", "count"),
             ],
             (),
             [
-                switch(f"{place}/stuck_on"),
-                switch(f"{place}/stuck_off"),
-                Command(f"{place}/chatter", "Hz", "number", 0.0, FASTEST_CHATTER),
-                Command(f"{place}/delay", "s", "number", 0.0, LONGEST_DELAY),
+                switch(f"{name}/stuck_on"),
+                switch(f"{name}/stuck_off"),
+                Command(f"{name}/chatter", "Hz", "number", 0.0, FASTEST_CHATTER),
+                Command(f"{name}/delay", "s", "number", 0.0, LONGEST_DELAY),
             ],
         )
         self._beams, self._index, self._debounce = beams, index, eye.debounce
-        self.random = random
+        self.random = setup.random(PHOTO_EYES, index)
         self.stuck_on = self.stuck_off = False
         self.chatter = 0.0
         """Hz: full cycles a second."""
@@ -146,14 +146,3 @@ class PhotoEyeDevice(Device):
             self.level = level
             after = self.late[-1][0] if self.late else 0.0
             self.late += ((max(at + self.delay, after), level),)
-
-
-def photo_eye_devices(scene: Scene, random: Callable[[int], np.random.Generator]) -> list[Device]:
-    """One device a photo-eye, behind what they share. random: a stream for each, by its index."""
-    eyes = scene.photo_eyes
-    if not eyes:
-        return []
-    motion = Motion()
-    beams = Beams([(eye.from_, eye.to) for eye in eyes.values()], motion)
-    devices = (PhotoEyeDevice(name, eye, beams, n, random(n)) for n, (name, eye) in enumerate(eyes.items()))
-    return [motion, beams, *devices]
