@@ -51,7 +51,6 @@ setup(
         "console_scripts": [
             "conveyor-sim = conveyor_sim.cli:main",
             "sim_node = conveyor_sim.ros.sim_node:main",
-            "plc_node = conveyor_sim.ros.plc_node:main",
             "controller_node = conveyor_sim.ros.controller_node:main",
         ],
         "pytest11": ["conveyor_sim.testing.plugin = conveyor_sim.testing.plugin"],
