@@ -46,7 +46,12 @@ setup(
     zip_safe=False,
     python_requires=">=3.10",
     install_requires=requirements("run"),
-    extras_require={"plot": requirements("plot"), "bench": requirements("bench"), "test": requirements("pytest")},
+    extras_require={
+        "plot": requirements("plot"),
+        "accuracy": requirements("accuracy"),
+        "bench": requirements("bench"),
+        "test": requirements("pytest"),
+    },
     entry_points={
         "console_scripts": [
             "conveyor-sim = conveyor_sim.cli:main",

@@ -6,6 +6,7 @@ import errno
 import io
 import signal
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -198,6 +199,8 @@ def accuracy(
 
     A study that was interrupted goes on where it was when the command is given again.
     """
+    if find_spec("scipy") is None:
+        raise ConveyorError("accuracy: scipy is not installed, expected it (pip install 'conveyor_sim[accuracy]')")
     from conveyor_sim.accuracy.apply import apply
     from conveyor_sim.accuracy.lines import summary
     from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
