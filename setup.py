@@ -48,6 +48,7 @@ setup(
     install_requires=requirements("run"),
     extras_require={
         "plot": requirements("plot"),
+        "accuracy": requirements("accuracy"),
         "bench": requirements("bench"),
         "test": requirements("pytest"),
         "docs": requirements("docs"),
@@ -56,7 +57,6 @@ setup(
         "console_scripts": [
             "conveyor-sim = conveyor_sim.cli:main",
             "sim_node = conveyor_sim.ros.sim_node:main",
-            "plc_node = conveyor_sim.ros.plc_node:main",
             "controller_node = conveyor_sim.ros.controller_node:main",
         ],
         "pytest11": ["conveyor_sim.testing.plugin = conveyor_sim.testing.plugin"],

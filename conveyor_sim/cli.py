@@ -6,6 +6,7 @@ import errno
 import io
 import signal
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +26,6 @@ with while_importing():
 if TYPE_CHECKING:
     from conveyor_sim.model import Model
     from conveyor_sim.scene import Scene
-    from conveyor_sim.scene.machines import Source, Spill
-    from conveyor_sim.scene.schema import Infeed
 
 # Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
 
@@ -212,6 +211,8 @@ def accuracy(
     Recommends the cheapest setting that meets the tolerance on SCENE. A study that was interrupted goes on where it was
     when the command is given again.
     """
+    if find_spec("scipy") is None:
+        raise ConveyorError("accuracy: scipy is not installed, expected it (pip install 'conveyor_sim[accuracy]')")
     from conveyor_sim.accuracy.apply import apply
     from conveyor_sim.accuracy.lines import summary
     from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
@@ -357,18 +358,13 @@ def _print(content: RenderableType) -> None:
     Console(markup=False, highlight=False).print(content)
 
 
-def _supply(entry: Infeed | Source | Spill) -> str:
-    count = getattr(entry, "count", None)
-    return "without end" if count is None else str(count)
-
-
 def _account(scene: Scene, model: Model) -> Table:
     """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
     from conveyor_sim.explain.choices import accuracy_rows, note_rows, step_rows
     from conveyor_sim.scene import initial_bottles
 
     table = Table.grid(padding=(0, 2))
-    fed = [_supply(entry) for _, entry in scene.entries()]
+    fed = ["without end" if entry.most is None else str(entry.most) for _, entry in scene.entries()]
     table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))
     table.add_row("bottles", f"{len(initial_bottles(scene))} at the start; fed: {', '.join(fed) or 'none'}")
     table.add_row("belts", ", ".join(model.belts) or "none")

@@ -37,9 +37,10 @@ def generate_launch_description() -> LaunchDescription:
     )
     controller = Node(
         package="conveyor_sim",
-        executable="plc_node",
-        name="plc_node",
+        executable="controller_node",
+        name="controller",
         output="screen",
+        parameters=[{"controller": "conveyor_sim.control.level:table_level", "scan_ticks": 10}],
         condition=IfCondition(LaunchConfiguration("controller")),
     )
     # Without the simulation there is nothing left to launch for.
@@ -55,7 +56,7 @@ def generate_launch_description() -> LaunchDescription:
             "controller",
             default_value="false",
             choices=["true", "false"],
-            description="Also start the PLC-like controller of the paper's plant, in lockstep.",
+            description="Also start the controller of the paper's plant, in lockstep.",
         )
     )
     return LaunchDescription([*arguments, simulation, controller, end])

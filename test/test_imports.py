@@ -35,7 +35,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "simulation": "accounts engine line model observe scene state stepping | numpy",
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
     "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
-    "version | numpy rich ruamel",
+    "version | numpy rich ruamel scipy",
     "explain": "effects errors model scene simulation timestep | rich",
     "plot": "accuracy bag errors line observe scene | matplotlib numpy",
     "runs": "bag engine errors line model observe plot scene simulation support timestep | click numpy rich",

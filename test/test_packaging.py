@@ -116,7 +116,7 @@ def test_ros_finds_the_package_in_the_environment_of_make(tmp_path: Path, monkey
     assert (share / "launch" / "line.launch.py").is_file()
     assert ElementTree.parse(share / "package.xml").findtext("name") == "conveyor_sim"
     executables = list((tmp_path / "lib" / "conveyor_sim").iterdir())
-    assert {file.name for file in executables} == {"controller_node", "conveyor-sim", "plc_node", "sim_node"}
+    assert {file.name for file in executables} == {"controller_node", "conveyor-sim", "sim_node"}
     assert all(os.access(file, os.X_OK) for file in executables)
 
 
@@ -141,7 +141,6 @@ def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
     assert {file.name for file in (prefix / "lib" / "conveyor_sim").iterdir()} == {
         "controller_node",
         "conveyor-sim",
-        "plc_node",
         "sim_node",
     }
     assert (prefix / "share" / "conveyor_sim" / "launch" / "line.launch.py").is_file()

@@ -181,6 +181,21 @@ def test_the_seed_decides_the_jitter() -> None:
     assert run(little_line(seed=8), 50).state_hash() != run(little_line(seed=9), 50).state_hash()
 
 
+def test_leapfrog_and_semi_implicit_euler_are_one_where_no_belt_turns() -> None:
+    """What a belt's velocity was at mid-step is a question on turning belts only."""
+    straight = {name: belt for name, belt in line()["belts"].items() if belt["kind"] == "straight"}
+    one, other = (little_line(integrator, belts=straight) for integrator in ("leapfrog", "semi_implicit_euler"))
+    for sim in (one, other):
+        sim.advance(TICKS)
+    assert one.counts.fed > 20
+    assert len(one.contacts().overlap) > 0
+    assert one.state_hash() == other.state_hash()
+    curved, euler = little_line("leapfrog"), little_line("semi_implicit_euler")
+    for sim in (curved, euler):
+        sim.advance(TICKS)
+    assert curved.state_hash() != euler.state_hash()
+
+
 def test_the_hash_tells_states_apart() -> None:
     """Of tick, bottles and belts: also where nothing else differs."""
     one, other = little_line(), little_line()

@@ -171,7 +171,7 @@ def set_up(distro: str, tools: str) -> None:
     environment = Environment(distro)
     requirements = ROOT / "requirements"
     build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
-    lists = ("run", "plot", "pytest")
+    lists = ("run", "plot", "accuracy", "pytest")
     described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/version.py")
     packages = key(*build, *(ROOT / name for name in described))
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
@@ -188,7 +188,7 @@ def set_up(distro: str, tools: str) -> None:
     if environment.state.get("packages") != packages:
         say(f"ROS 2 {distro.capitalize()} and Python packages: about 1 GB on disk, one to three minutes ...")
         environment.pip_install(
-            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot,test]"],
+            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot,accuracy,test]"],
             "installing ROS 2 and Python packages",
         )
         environment.write_state(packages=packages)

@@ -1,14 +1,12 @@
 """Chatter (`guard/chatter.py`) of a scene with a setting, looked for from a state of the scene on."""
 
-import numpy as np
-
 from conveyor_sim.accuracy.failures import place
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard.chatter import chatter_of
+from conveyor_sim.stepping.guard.chatter import ChatterMeter
 
 STEPS = 48
 """Steps that are watched: chatter must fill half of them, no contact at its five steps or more rings so long."""
@@ -37,19 +35,18 @@ class ChatterProbe:
         simulation.restore_from(state)
         bottles = simulation.bottles()
         radius = simulation.model.type_radius[bottles.type]
-        velocities = []
+        meter = ChatterMeter()
         for _ in range(STEPS):
             try:
                 simulation.advance()
             except SimulationError:
                 return ""
             now = simulation.bottles()
-            velocities.append(np.stack([now.vx, now.vy, radius * now.omega]))
-        amplitude = chatter_of(np.array(velocities))
-        if not amplitude.size or amplitude.max() <= LEAST * self.slip_limit:
+            meter.note(now.vx, now.vy, radius * now.omega)
+        worst, amplitude = meter.worst()
+        if amplitude <= LEAST * self.slip_limit:
             return ""
-        worst = int(np.argmax(amplitude))
-        share = amplitude[worst] / self.slip_limit
+        share = amplitude / self.slip_limit
         return (
             f"chattering: {place(bottles, worst)} shakes by {share:.2g} of slip_limit at every step at {state.time:g} s"
         )

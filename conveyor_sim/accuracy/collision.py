@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from conveyor_sim.accuracy.root import ROUNDING, root
 from conveyor_sim.effects import choose_effects
 from conveyor_sim.effects.terms import Meeting, Terms, deepest, table_of
 from conveyor_sim.laws.coefficients import build_laws
@@ -101,16 +102,13 @@ def rebound(collision: Collision, speed: float) -> float | str:
 
 
 def onset_restitution(a: float) -> float:
-    """e of N (1 + lambda v) at a = lambda v: the root of a (1 + e) = ln((1 + a) / (1 - e a)), by bisection."""
-    below, above = 0.0, min(1.0, 1.0 / a)
-    while True:
-        e = 0.5 * (below + above)
-        if not below < e < above:
-            return e
-        if math.log((1.0 + a) / (1.0 - e * a)) < a * (1.0 + e):
-            below = e
-        else:
-            above = e
+    """e of N (1 + lambda v) at a = lambda v: the root of a (1 + e) = ln((1 + a) / (1 - e a))."""
+
+    def rising(e: float) -> float:
+        # By log1p, for a e and a are small where hardly anything is lost.
+        return math.log1p(a) - math.log1p(-e * a) - a * (1.0 + e) if e * a < 1.0 else math.inf
+
+    return root(rising, 0.0, min(1.0, (1.0 + ROUNDING) / a))
 
 
 def peak_force(collision: Collision, speed: float) -> float | None:

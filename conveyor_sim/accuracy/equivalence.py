@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from conveyor_sim.accuracy.ensemble import Ensemble, Progress, Run
 from conveyor_sim.accuracy.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Comparison, Sample
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.student import t_quantile
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
 
@@ -198,7 +198,7 @@ def _interval(candidate: NDArray[np.float64], reference: NDArray[np.float64]) ->
     if sum(parts) == 0.0:
         return ratio - 1.0, ratio - 1.0
     freedom = sum(parts) ** 2 / (parts[0] ** 2 / (len(candidate) - 1) + parts[1] ** 2 / (len(reference) - 1))
-    t = t_quantile(0.5 * (1.0 + CONFIDENCE), freedom)
+    t = float(stdtrit(freedom, 0.5 * (1.0 + CONFIDENCE)))
     below = base**2 - t**2 * base_variance
     if below <= 0.0:
         return _EVERYTHING

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from conveyor_sim.line.mover import WORDS
+from conveyor_sim.line.devices.mover import WORDS
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.simulation import Simulation

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.scene import Scene, rail_shapes
-from conveyor_sim.scene.geometry import TOUCH
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
-from conveyor_sim.scene.schema import Infeed
+from conveyor_sim.scene.parts.infeed import Infeed
+from conveyor_sim.scene.types import TOUCH
 from conveyor_sim.simulation import Simulation
 
 PLACE = 0.01

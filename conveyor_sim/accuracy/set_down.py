@@ -10,6 +10,7 @@ import numpy as np
 
 from conveyor_sim.accuracy.aside import PHASES, phases, rms, simulation_aside
 from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.root import root
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -82,21 +83,14 @@ def _point_slip(slip: float, limit: float, pull: float, time: float) -> float:
 def _ring_slip(slip: float, limit: float, pull: float, time: float) -> float:
     """m/s: a ring that does not spin is pulled by s / S, S = sqrt(s^2 + e^2), e = v_lim / 2, at once all around.
 
-    So S - e artanh(e / S) falls as pull t; solved for S by bisection.
+    So S - e artanh(e / S) falls as pull t; solved for S.
     """
     e = 0.5 * limit
 
     def height(big: float) -> float:
-        return big - e * math.atanh(e / big)
+        return big - e * math.atanh(e / big) if big > e else -math.inf
 
     start = math.hypot(slip, e)
     target = height(start) - pull * time
-    below, above = e, start
-    while True:
-        middle = 0.5 * (below + above)
-        if not below < middle < above:
-            return math.sqrt(max(above * above - e * e, 0.0))
-        if middle > e and height(middle) > target:
-            above = middle
-        else:
-            below = middle
+    big = root(lambda big: height(big) - target, e, start)
+    return math.sqrt(max(big * big - e * e, 0.0))

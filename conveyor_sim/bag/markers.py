@@ -16,7 +16,7 @@ from conveyor_sim.observe.columns import BottleColumns
 
 if TYPE_CHECKING:
     from conveyor_sim.scene.geometry import BeltShape, RailShape
-    from conveyor_sim.scene.sensor_shapes import SensorShape
+    from conveyor_sim.scene.parts.device_part import Look, Mark
 
 ARROW, LINE_STRIP, SPHERE_LIST, TEXT_VIEW_FACING, TRIANGLE_LIST = 0, 4, 7, 9, 11
 ADD, DELETEALL = 0, 3
@@ -31,13 +31,17 @@ BOTTLE_COLOURS: tuple[Colour, ...] = (
     (0.22, 0.42, 0.75, 1.0),
     (0.58, 0.32, 0.60, 1.0),
 )
-SENSOR_LOOKS: dict[str, tuple[float, float, Colour]] = {
-    "photo_eye": (0.06, 0.008, (1.0, 0.45, 0.10, 1.0)),
-    "counter": (0.04, 0.008, (0.72, 0.55, 1.0, 1.0)),
-    "inspection": (0.08, 0.012, (0.35, 0.80, 1.0, 1.0)),
-    "zone": (0.01, 0.006, (0.80, 0.90, 0.30, 1.0)),
+LOOKS: dict[Look, tuple[float, float, Colour]] = {
+    "beam": (0.06, 0.008, (1.0, 0.45, 0.10, 1.0)),
+    "passage": (0.04, 0.008, (0.72, 0.55, 1.0, 1.0)),
+    "check": (0.08, 0.012, (0.35, 0.80, 1.0, 1.0)),
+    "region": (0.01, 0.006, (0.80, 0.90, 0.30, 1.0)),
+    "entry": (0.04, 0.012, (0.25, 0.85, 0.65, 1.0)),
+    "exit": (0.01, 0.008, (0.95, 0.50, 0.80, 1.0)),
 }
-"""By kind: height above the belts, m; thickness, m; colour. All are bright, as the belts are dark."""
+"""By look of a mark: height above the belts, m; thickness, m; colour. All are bright, as the belts are dark."""
+ENTRY_SIZE = 0.1
+"""m, height of the triangle whose tip is where bottles enter."""
 ARC_STEP = math.radians(4.0)
 ARROW_SPACING = 0.5
 """m along a belt from one arrow to the next."""
@@ -114,10 +118,10 @@ def bottles_markers(
 
 
 def plant_markers(
-    belts: Sequence[BeltShape], rails: Sequence[RailShape], sensors: Sequence[SensorShape], header: Header
+    belts: Sequence[BeltShape], rails: Sequence[RailShape], marks: Sequence[Mark], header: Header
 ) -> bytes:
-    """The plant: belt surfaces, arrows along positive speed, rails at rest, sensors, names of belts and sensors."""
-    markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails("rails", rails), *_names(belts), *_sensors(sensors)]
+    """The plant: belt surfaces, arrows along positive speed, rails at rest, marks of devices, names."""
+    markers = [*_belt_surfaces(belts), *_arrows(belts), *_rails("rails", rails), *_names(belts), *_marks(marks)]
     return marker_array(markers, header)
 
 
@@ -179,14 +183,23 @@ def _names(belts: Sequence[BeltShape]) -> Iterator[Marker]:
         yield Marker("names", index, TEXT_VIEW_FACING, size, ARROW_COLOUR, position=(x, y, 0.2), text=belt.name)
 
 
-def _sensors(sensors: Sequence[SensorShape]) -> Iterator[Marker]:
-    for index, sensor in enumerate(sensors):
-        height, thickness, colour = SENSOR_LOOKS[sensor.kind]
-        corners = np.concatenate((sensor.points, sensor.points[:1])) if sensor.kind == "zone" else sensor.points
-        points = xyz_rows(corners, height)
-        yield Marker(f"{sensor.kind}s", index, LINE_STRIP, (thickness, 0.0, 0.0), colour, points)
-        x, y = sensor.points[-1] if sensor.kind != "zone" else sensor.points.mean(axis=0)
+def _marks(marks: Sequence[Mark]) -> Iterator[Marker]:
+    for index, mark in enumerate(marks):
+        height, thickness, colour = LOOKS[mark.look]
+        corners = _triangle(mark) if mark.look == "entry" else mark.points
+        closed = mark.look in ("region", "entry", "exit")
+        points = xyz_rows(np.concatenate((corners, corners[:1])) if closed else corners, height)
+        yield Marker(f"{mark.kind}s", index, LINE_STRIP, (thickness, 0.0, 0.0), colour, points)
+        x, y = corners.mean(axis=0) if closed else corners[-1]
         yield Marker(
-            f"{sensor.kind}_names", index, TEXT_VIEW_FACING, (0.0, 0.0, 0.05), colour, position=(x, y, 0.15),
-            text=sensor.name,
+            f"{mark.kind}_names", index, TEXT_VIEW_FACING, (0.0, 0.0, 0.05), colour, position=(x, y, 0.15),
+            text=mark.name,
         )  # fmt: skip
+
+
+def _triangle(mark: Mark) -> NDArray[np.float64]:
+    """Corners (3, 2) of an entry: its tip is where bottles appear, and points where they go."""
+    ahead = np.array([math.cos(mark.direction), math.sin(mark.direction)])
+    left = np.array([-ahead[1], ahead[0]])
+    base = mark.points[0] - ENTRY_SIZE * ahead
+    return np.stack([mark.points[0], base + 0.5 * ENTRY_SIZE * left, base - 0.5 * ENTRY_SIZE * left])

@@ -11,7 +11,7 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.qos import QOS, Qos
-from conveyor_sim.scene.sensor_shapes import sensor_shapes
+from conveyor_sim.scene.marks import marks_of
 
 if TYPE_CHECKING:
     from conveyor_sim.line.commands import CommandOutcome
@@ -138,9 +138,9 @@ class Outputs:
     def start(self) -> None:
         """Writes what is latched (line, plant) and the state at the present tick."""
         model, header = self._sim.model, self._header(self._sim.tick)
-        sensors = sensor_shapes(self._sim.scene)
+        marks = marks_of(self._sim.scene)
         self._hand_out("line", header, messages.line_message, self._sim, self._run_id)
-        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rails_at_rest, sensors)
+        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rails_at_rest, marks)
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:

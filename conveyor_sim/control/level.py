@@ -96,3 +96,17 @@ class LevelControl:
             speed_command(self.feeder): self.held_speed if self._full(level) else self.feeder_speed,
             speed_command(self.table): self.table_fast if level <= self.low else self.table_slow,
         }
+
+
+def table_level(
+    feeder: str = "feeder",
+    table: str = "table",
+    high_mark: float = 45,
+    low_mark: float = 35,
+    feeder_speed: float = 1.0,
+    table_slow: float = 0.2,
+    table_fast: float = 0.3,
+) -> LevelControl:
+    """Level control by the count of bottles on the belt `table`; as it stands, that of the paper's plant. m/s."""
+    count = Count(f"belts/{table}/bottles")
+    return LevelControl(count, feeder, table, high_mark, low_mark, feeder_speed, table_slow, table_fast)

@@ -20,7 +20,6 @@ from conveyor_sim.effects.terms import (
 )
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.geometry import rail_shapes
-from conveyor_sim.scene.machines import Source
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep.bounds import Bound, lattice_bound, wedge_bound
@@ -43,7 +42,7 @@ def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Co
 
 def _pairs(scene: Scene, on: Collection[str]) -> Cause | None:
     for path, entry in scene.entries():
-        if isinstance(entry, Source) or entry.count is None:
+        if entry.most is None:
             return Cause(path, "without end")
     most = most_bottles(scene) or 0
     return Cause(("bottles" if scene.bottles else "infeeds",), f"{most} bottles in all") if most > 1 else None

@@ -10,7 +10,6 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.laws.coefficients import Laws
 from conveyor_sim.scene.geometry import initial_bottles
-from conveyor_sim.scene.machines import Source, Spill
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import BottleType, Scene, Single
 from conveyor_sim.timestep.bounds import Bound, contact_time, hertz_contact_time, least_steps
@@ -119,8 +118,7 @@ def supply(scene: Scene) -> dict[str, float]:
     for name, *_ in initial_bottles(scene):
         found[name] = found.get(name, 0.0) + 1.0
     for _, entry in scene.entries():
-        count = None if isinstance(entry, Source) else entry.count
-        found[entry.bottle] = found.get(entry.bottle, 0.0) + (math.inf if count is None else count)
+        found[entry.bottle] = found.get(entry.bottle, 0.0) + (math.inf if entry.most is None else entry.most)
     return found
 
 
@@ -137,7 +135,7 @@ def impact_speed(scene: Scene) -> float:
     and a rail that comes against that.
     """
     speeds = [abs(belt.speed) for belt in scene.belts.values()]
-    speeds += [entry.speed for _, entry in scene.entries() if not isinstance(entry, Spill)]
+    speeds += [entry.heading[1] for _, entry in scene.entries()]
     given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
     speeds.append(math.hypot(*np.ptp(given, axis=0)))
     rails = [shape.max_speed * shape.fastest_point for shape in moving_shapes(scene)]

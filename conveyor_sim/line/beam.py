@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.motion import CHORDS, Motion
-from conveyor_sim.scene.geometry import XY
+from conveyor_sim.scene.types import XY
 
 ROUNDING = 1e-9
 """s; shorter than this is nothing."""

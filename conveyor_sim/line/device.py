@@ -54,10 +54,6 @@ class ScanContext:
 class Device:
     """One device while it runs. Its public attributes are what it remembers from tick to tick (checkpoints)."""
 
-    fed = 0
-    """Bottles that it has put onto the line."""
-    removed = 0
-    """Bottles that it has taken off the line."""
     blocked_ticks = 0
     """Ticks at which it had a bottle to put onto the line and no room."""
 

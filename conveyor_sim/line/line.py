@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.line.belt import BeltDevice
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import CommandOutcome, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
-from conveyor_sim.line.photo_eye import PhotoEyeDevice
-from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
+from conveyor_sim.line.process_image import ProcessImage, Role
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 from conveyor_sim.state.snapshot import Unchecked, entries, restore, snapshot, typed
@@ -49,6 +49,7 @@ class Line:
         self._ending = [device for device in devices if type(device).end is not Device.end]
         self._taking = [device for device in devices if type(device).take is not Device.take]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
+        self._counting = [device for device in devices if any(signal.role for signal in device.signals)]
         self.image = ProcessImage(
             tuple(signal for device in devices for signal in device.signals),
             tuple(command for device in devices for command in device.commands),
@@ -62,16 +63,16 @@ class Line:
     @property
     def fed(self) -> int:
         """Bottles put onto the line so far."""
-        return sum(device.fed for device in self._devices)
+        return sum(self._counted("fed").values())
 
     @property
     def removed(self) -> int:
         """Bottles taken off the line so far."""
-        return sum(device.removed for device in self._devices)
+        return sum(self.removed_by().values())
 
     def removed_by(self) -> dict[str, int]:
-        """Bottles taken off the line so far, by the names of the devices."""
-        return {device.name: device.removed for device in self._devices}
+        """Bottles taken off the line so far, by the names of the devices that take them."""
+        return self._counted("removed", "rejected")
 
     @property
     def blocked_ticks(self) -> int:
@@ -201,6 +202,16 @@ class Line:
         restore(speeds, {name: memory[name] for name in speeds}, "line")
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
         restore(self._by_name(), memory["devices"], "line.devices")
+
+    def _counted(self, *roles: Role) -> dict[str, int]:
+        """Sums of the signals of some roles, by the names of the devices that have such."""
+        sums = {}
+        for device in self._counting:
+            values = zip(device.signals, device.values(self.now), strict=True)
+            counts = [int(value) for signal, value in values if signal.role in roles]
+            if counts:
+                sums[device.name] = sum(counts)
+        return sums
 
     def _by_name(self) -> dict[str, Device]:
         return {device.name: device for device in self._devices}

@@ -14,13 +14,12 @@ class MachineDevice(Device):
 
     def __init__(self, name: str, rate: float, rate_limit: float | None, signals: Sequence[Signal]) -> None:
         """rate, rate_limit: 1/s."""
-        place = f"machines/{name}"
         most = rate if rate_limit is None else rate_limit
         super().__init__(
-            place,
-            [Signal(f"{place}/running", "1", "bool"), *signals],
-            [switch(f"{place}/run"), Command(f"{place}/rate", "1/s", "number", 0.0, most)],
-            [switch(f"{place}/stop")],
+            name,
+            [Signal(f"{name}/running", "1", "bool"), *signals],
+            [switch(f"{name}/run"), Command(f"{name}/rate", "1/s", "number", 0.0, most)],
+            [switch(f"{name}/stop")],
         )
         self.run = True
         self.rate = rate

@@ -18,7 +18,8 @@ from conveyor_sim.observe.damage import RailWearColumns
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Damage, Floats, Plant
 from conveyor_sim.plot.heading import heading
-from conveyor_sim.plot.plant import Z_RAIL, draw_belts, draw_infeeds, draw_outfeeds, draw_rails, draw_travel
+from conveyor_sim.plot.marks import draw_entries, draw_exits
+from conveyor_sim.plot.plant import Z_RAIL, draw_belts, draw_rails, draw_travel
 
 HEAT: Final[Colormap] = LinearSegmentedColormap.from_list(
     "heat", matplotlib.colormaps["inferno_r"](np.linspace(0.12, 0.9, 256))
@@ -56,8 +57,8 @@ def rails_figure(plant: Plant, damage: Damage, title: str) -> Figure:
         draw_belts(ax, plant, np.zeros(len(plant.belts)), Normalize(0.0, 1.0))
         draw_travel(ax, plant, plant.speeds, 13.0 * width / (72.0 * panel))
         draw_rails(ax, plant).set_linewidth(0.8)
-        draw_outfeeds(ax, plant)
-        draw_infeeds(ax, plant, 13.0 * width / (72.0 * panel))
+        draw_exits(ax, plant)
+        draw_entries(ax, plant, 13.0 * width / (72.0 * panel))
         _draw_heat(ax, lines, values, gid, unit)
         ax.set_title(f"{what}: {_most(plant, wear, values, unit)}", fontweight="normal")
         ax.set_aspect("equal")

@@ -12,50 +12,25 @@ from numpy.typing import NDArray
 
 from conveyor_sim.observe.damage import RailWearColumns
 from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
-from conveyor_sim.scene.machines import Reject, Sink, Source, Spill
+from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.scene.schema import Infeed, Outfeed
-from conveyor_sim.scene.sensor_shapes import SensorShape, sensor_shapes
+from conveyor_sim.scene.parts.device_part import Look, Mark
 
 if TYPE_CHECKING:
     from conveyor_sim.scene import Scene
 
 Floats = NDArray[np.float64]
 _OUTLINE_POINTS = 96
-_KINDS = {Infeed: "infeed", Source: "source", Spill: "spill", Outfeed: "outfeed", Sink: "sink", Reject: "reject"}
-
-
-@dataclass(frozen=True)
-class InfeedMark:
-    """Where bottles appear: `position` (2,) in m, `direction` in rad."""
-
-    name: str
-    position: Floats
-    direction: float
-    kind: str = "infeed"
-
-
-@dataclass(frozen=True)
-class OutfeedMark:
-    """Where bottles are taken away: corners of `region` (k, 2) in m."""
-
-    name: str
-    region: Floats
-    kind: str = "outfeed"
 
 
 @dataclass(frozen=True)
 class Plant:
-    """What stands still: belts with their speeds in the scene (m/s), rails, infeeds, outfeeds and sensors, in listing
-    order.
-    """
+    """What stands still: belts with their speeds in the scene (m/s) and rails, in listing order; marks of devices."""
 
     belts: tuple[BeltShape, ...]
     speeds: Floats
     rails: tuple[RailShape, ...]
-    infeeds: tuple[InfeedMark, ...] = ()
-    outfeeds: tuple[OutfeedMark, ...] = ()
-    sensors: tuple[SensorShape, ...] = ()
+    marks: tuple[Mark, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene) -> Plant:
@@ -64,21 +39,12 @@ class Plant:
             belts=tuple(belt_shapes(scene)),
             speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
             rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
-            infeeds=tuple(
-                InfeedMark(
-                    path[1],
-                    np.asarray(entry.position, dtype=np.float64),
-                    0.0 if isinstance(entry, Spill) else float(entry.direction),
-                    _KINDS[type(entry)],
-                )
-                for path, entry in scene.entries()
-            ),
-            outfeeds=tuple(
-                OutfeedMark(path[1], np.asarray(exit_.region, dtype=np.float64), _KINDS[type(exit_)])
-                for path, exit_ in scene.exits()
-            ),
-            sensors=tuple(sensor_shapes(scene)),
+            marks=tuple(marks_of(scene)),
         )
+
+    def drawn_as(self, look: Look) -> list[Mark]:
+        """The marks of one look."""
+        return [mark for mark in self.marks if mark.look == look]
 
     def with_moving(self, moving: Sequence[RailShape]) -> Plant:
         """The same with the rails that move, the last ones, somewhere else."""
@@ -93,12 +59,10 @@ class Plant:
         return np.asarray(self.rails[index].outline(_OUTLINE_POINTS), dtype=np.float64)
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Smallest box (x0, y0, x1, y1) in m around belts, rails, infeeds, outfeeds and sensors."""
+        """Smallest box (x0, y0, x1, y1) in m around belts, rails and marks."""
         parts = [self.belt_outline(i) for i in range(len(self.belts))]
         parts += [self.rail_line(i) for i in range(len(self.rails))]
-        parts += [mark.position.reshape(1, 2) for mark in self.infeeds]
-        parts += [mark.region for mark in self.outfeeds]
-        parts += [sensor.points for sensor in self.sensors]
+        parts += [mark.points for mark in self.marks]
         return box_around(np.concatenate(parts)) if parts else (math.inf, math.inf, -math.inf, -math.inf)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Floats, Plant
-from conveyor_sim.plot.sensors import sensor_look
+from conveyor_sim.plot.marks import COLOURS
 from conveyor_sim.scene.geometry import BeltShape
 
 _Z: Final = 8.0
@@ -68,40 +68,39 @@ def rail_labels(plant: Plant) -> list[Label]:
 
 
 def mark_labels(plant: Plant) -> list[Label]:
-    """Names of infeeds and outfeeds."""
+    """Names of where bottles enter and leave."""
     labels = [
-        Label(f"{mark.kind} {mark.name}", style.INFEED, 9.0, np.repeat(mark.position[None], 8, axis=0), _AROUND)
-        for mark in plant.infeeds
+        Label(f"{mark.word} {mark.name}", COLOURS["entry"], 9.0, np.repeat(mark.points, 8, axis=0), _AROUND)
+        for mark in plant.drawn_as("entry")
     ]
-    for outfeed in plant.outfeeds:
-        middles = 0.5 * (outfeed.region + np.roll(outfeed.region, -1, axis=0))
-        away = middles - outfeed.region.mean(axis=0)
-        labels.append(
-            Label(
-                f"{outfeed.kind} {outfeed.name}",
-                style.OUTFEED,
-                9.0,
-                middles,
-                away / np.hypot(*away.T).clip(1e-12)[:, None],
-            )
-        )
+    for mark in plant.drawn_as("exit"):
+        middles, outward = _around(mark.points)
+        labels.append(Label(f"{mark.word} {mark.name}", COLOURS["exit"], 9.0, middles, outward))
     return labels
 
 
 def sensor_labels(plant: Plant) -> list[Label]:
-    """Names of photo-eyes, counters, inspections and zones: off the ends of a line, on the sides of a zone."""
+    """Names of all other marks: off the ends of a line, on the sides of a region."""
     labels = []
-    for sensor in plant.sensors:
-        word, colour = sensor_look(sensor.kind)
-        points = sensor.points
-        if sensor.kind == "zone":
-            anchors = 0.5 * (points + np.roll(points, -1, axis=0))
-            away = anchors - points.mean(axis=0)
-        else:
-            anchors, away = points[::-1], np.array([points[1] - points[0], points[0] - points[1]])
-        outward = away / np.hypot(*away.T).clip(1e-12)[:, None]
-        labels.append(Label(f"{word} {sensor.name}", colour, 8.0, anchors, outward, 0.3))
+    for mark in plant.marks:
+        if mark.look in ("entry", "exit"):
+            continue
+        anchors, outward = _around(mark.points) if mark.look == "region" else _beyond(mark.points)
+        labels.append(Label(f"{mark.word} {mark.name}", COLOURS[mark.look], 8.0, anchors, outward, 0.3))
     return labels
+
+
+def _around(corners: Floats) -> tuple[Floats, Floats]:
+    """Middles of the sides of a region, and the directions away from it."""
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    away = middles - corners.mean(axis=0)
+    return middles, away / np.hypot(*away.T).clip(1e-12)[:, None]
+
+
+def _beyond(ends: Floats) -> tuple[Floats, Floats]:
+    """Ends of a line, the last one first, and the directions beyond them."""
+    away = np.array([ends[1] - ends[0], ends[0] - ends[1]])
+    return ends[::-1], away / np.hypot(*away.T).clip(1e-12)[:, None]
 
 
 def place(ax: Axes, labels: Sequence[Label], plant: Plant, circles: Floats | None = None) -> None:
@@ -174,14 +173,16 @@ def _taken(
     """Two maps (rows, columns) of cells of the axes: 1 where a line, a mark or a bottle is, and 1 where a belt is."""
     x, y = np.meshgrid(x0 + (np.arange(columns) + 0.5) * _CELL, y0 + (np.arange(rows) + 0.5) * _CELL)
     cells = np.stack([x.ravel(), y.ravel()], axis=1)
-    outlines = [plant.belt_outline(i) for i in range(len(plant.belts))] + [mark.region for mark in plant.outfeeds]
+    exits = [mark.points for mark in plant.drawn_as("exit")]
+    outlines = [plant.belt_outline(i) for i in range(len(plant.belts))] + exits
     areas = np.zeros(len(cells))
     for outline in outlines:
         areas[Outline(ax.transData.transform(outline)).contains_points(cells)] = 1.0
-    points = [mark.position[None] for mark in plant.infeeds]
+    points = [mark.points for mark in plant.drawn_as("entry")]
     points += [_dense(plant.rail_line(i), ax) for i in range(len(plant.rails))]
     points += [_dense(np.concatenate([outline, outline[:1]]), ax) for outline in outlines]
-    points += [_dense(np.concatenate([sensor.points, sensor.points[:1]]), ax) for sensor in plant.sensors]
+    sensors = [mark for mark in plant.marks if mark.look not in ("entry", "exit")]
+    points += [_dense(np.concatenate([mark.points, mark.points[:1]]), ax) for mark in sensors]
     if circles is not None:
         points.append(circles)
     lines = np.zeros((rows, columns))

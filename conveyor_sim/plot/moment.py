@@ -20,7 +20,7 @@ from conveyor_sim.plot.bottles import speed_scale
 from conveyor_sim.plot.data import Floats, Frame, Plant
 from conveyor_sim.plot.heading import heading
 from conveyor_sim.plot.labels import belt_labels, mark_labels, place, sensor_labels
-from conveyor_sim.plot.sensors import Z_LINE
+from conveyor_sim.plot.marks import Z_LINE
 from conveyor_sim.plot.views import WIDTH, colour_bar, draw_view, force_scale, instant, whole_region
 
 _ROW: Final = 0.36  # inches, of one trace
@@ -103,7 +103,7 @@ def _speeds(plant: Plant, frame: Frame) -> Normalize:
 
 def _draw_blocked(ax: Axes, plant: Plant, blocked: Collection[str]) -> LineCollection:
     """The beams of the photo-eyes that are blocked: broad and full."""
-    beams = [sensor.points for sensor in plant.sensors if sensor.kind == "photo_eye" and sensor.name in blocked]
+    beams = [mark.points for mark in plant.marks if mark.kind == "photo_eye" and mark.name in blocked]
     lines = LineCollection(beams, colors=style.PHOTO_EYE, linewidths=4.0, zorder=Z_LINE, gid="blocked")
     ax.add_collection(lines)
     return lines

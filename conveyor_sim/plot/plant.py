@@ -12,18 +12,16 @@ from matplotlib.path import Path as Outline
 
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Floats, Plant
-from conveyor_sim.plot.sensors import draw_sensors
+from conveyor_sim.plot.marks import draw_entries, draw_exits, draw_sensors
 from conveyor_sim.scene.geometry import BeltShape
 
 Z_BELT: Final = 1.0
 Z_CHEVRON: Final = 1.2
-Z_OUTFEED: Final = 1.4
 Z_RAIL: Final = 4.0
-Z_INFEED: Final = 5.0
 
 
 def draw_plant(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize, size: float) -> None:
-    """Draw belts, travel, rails, infeeds, outfeeds and sensors of `plant` in m.
+    """Draw belts, travel, rails and marks of `plant` in m.
 
     `speeds` (belts,) in m/s at that instant; `norm` maps a speed in m/s to a colour of the speed scale; `size` in m
     is the height of the largest chevron.
@@ -31,9 +29,9 @@ def draw_plant(ax: Axes, plant: Plant, speeds: Floats, norm: Normalize, size: fl
     draw_belts(ax, plant, speeds, norm)
     draw_travel(ax, plant, speeds, size)
     draw_rails(ax, plant)
-    draw_outfeeds(ax, plant)
+    draw_exits(ax, plant)
     draw_sensors(ax, plant, size)
-    draw_infeeds(ax, plant, size)
+    draw_entries(ax, plant, size)
     ax.set_aspect("equal")
 
 
@@ -116,36 +114,3 @@ def draw_rails(ax: Axes, plant: Plant) -> LineCollection:
     )
     ax.add_collection(collection)
     return collection
-
-
-def draw_outfeeds(ax: Axes, plant: Plant) -> None:
-    """One hatched region an outfeed."""
-    if plant.outfeeds:
-        ax.add_collection(
-            PolyCollection(
-                [mark.region for mark in plant.outfeeds],
-                facecolors="none",
-                edgecolors=style.OUTFEED,
-                hatch="////",
-                linewidths=1.2,
-                linestyles="dashed",
-                zorder=Z_OUTFEED,
-                gid="outfeeds",
-            )
-        )
-
-
-def draw_infeeds(ax: Axes, plant: Plant, size: float) -> None:
-    """One full triangle of height `size` m an infeed: its tip is where bottles appear, and points where they go."""
-    triangles = []
-    for mark in plant.infeeds:
-        ahead = np.array([np.cos(mark.direction), np.sin(mark.direction)])
-        left = np.array([-ahead[1], ahead[0]])
-        base = mark.position - 1.1 * size * ahead
-        triangles.append(np.stack([mark.position, base + 0.6 * size * left, base - 0.6 * size * left]))
-    if triangles:
-        ax.add_collection(
-            PolyCollection(
-                triangles, facecolors=style.INFEED, edgecolors="white", linewidths=0.8, zorder=Z_INFEED, gid="infeeds"
-            )
-        )

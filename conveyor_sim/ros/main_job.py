@@ -1,4 +1,4 @@
-"""The main job (`make run`): the node and the PLC-like controller as two processes in lockstep, recorded and drawn."""
+"""The main job (`make run`): the node and its controller as two processes in lockstep, recorded and drawn."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ with while_importing():
     from conveyor_sim.support.resources import scene_path
 
 LOOK = 0.05  # s of wall time between two looks at the processes
-CONTROLLED = ("feeder", "table")  # belts that plc_node commands unless its parameters say otherwise
+CONTROLLER = {"controller": "conveyor_sim.control.level:table_level", "scan_ticks": 10}
+CONTROLLED = ("feeder", "table")  # belts that it commands
 PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent once a second
 
 
@@ -68,11 +69,11 @@ def run_in_lockstep(
         }
         node = Child("sim_node", node_parameters, environment, logs)
         stack.callback(node.stop)
-        plc = Child("plc_node", {}, environment, logs)
-        stack.callback(plc.stop)
+        controller = Child("controller_node", CONTROLLER, environment, logs)
+        stack.callback(controller.stop)
 
         def going_on() -> bool:
-            return node.exit_code is None and plc.exit_code is None and not stop.requested
+            return node.exit_code is None and controller.exit_code is None and not stop.requested
 
         with told_if_long(compiling(seconds_to_compile(build_model(scene)))):
             while not observer.started and going_on():
@@ -83,10 +84,10 @@ def run_in_lockstep(
                 progress.update(observer.time)
         if stop.requested:
             raise Interrupted(f"interrupted at {observer.time:.2f} s; what was recorded is in {bag}")
-        if plc.exit_code is None or node.exit_code is not None:
+        if controller.exit_code is None or node.exit_code is not None:
             raise ConveyorError(node.obituary())
-        if plc.exit_code != 0:
-            raise ConveyorError(plc.obituary())
+        if controller.exit_code != 0:
+            raise ConveyorError(controller.obituary())
         patience = time.monotonic() + PATIENCE
         while observer.wall is None and time.monotonic() < patience:
             observer.wait(LOOK)

@@ -112,7 +112,7 @@ class Summary:
     wall: float | None
     """s"""
     fed: int | None
-    """By infeeds, sources and spills; None if this version refuses the recorded scene."""
+    """By infeeds, sources and spills; None if this version refuses the recorded scene, or no signals were recorded."""
     removed: int | None
     """By outfeeds, sinks and rejects."""
     rejected: int | None
@@ -347,8 +347,10 @@ def render(summary: Summary) -> Group:
 
 def _account(summary: Summary) -> list[tuple[str, str]]:
     wall, factor = summary.wall, summary.real_time_factor
-    fed = "not recorded" if summary.fed is None else str(summary.fed)
-    removed = "not recorded" if summary.removed is None else str(summary.removed)
+    # Which signals count bottles is known from the scene alone.
+    uncounted = "not known" if summary.predicted is None else "not recorded"
+    fed = uncounted if summary.fed is None else str(summary.fed)
+    removed = uncounted if summary.removed is None else str(summary.removed)
     out = f" ({summary.rejected} rejected)" if summary.rejected else ""
     force = "not recorded"
     if summary.peak_force is not None:

@@ -1,11 +1,14 @@
 """Belts of a scene file: straight ones, and sectors of a ring with their rails."""
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Tag
 
 from conveyor_sim.scene.drives import Drive
 from conveyor_sim.scene.part import Part, one_of
+from conveyor_sim.scene.parts.device_part import DevicePart, Others
+from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import (
     Angle,
     Flag,
@@ -18,9 +21,12 @@ from conveyor_sim.scene.types import (
     Span,
     quantity,
 )
+from conveyor_sim.scene.words import shown
 
 
-class _Belt(Part):
+class _Belt(DevicePart):
+    KIND: ClassVar[str] = "belt"
+
     speed: Number = quantity("Speed at the start, positive forward.", "m/s", default=0.0)
     speed_limits: Limits = quantity("Least and greatest speed that a command may ask for.", "m/s", default=(-3.0, 3.0))
     material: Name = quantity("Material, as named in `base`.")
@@ -30,6 +36,18 @@ class _Belt(Part):
     drive: Drive | None = quantity(
         "What moves it. Left out: it has the commanded speed from one tick to the next.", default=None
     )
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """A speed beyond its limits, or limits in the wrong order."""
+        least, greatest = self.speed_limits
+        if least > greatest:
+            text = f"{shown(self.speed_limits)} given, expected the smaller number first (m/s)"
+            yield Problem((*path, "speed_limits"), text)
+        elif not least <= self.speed <= greatest:
+            yield Problem(
+                (*path, "speed"),
+                f"{shown(self.speed)} given, expected a number from {least:g} to {greatest:g} (m/s), the speed_limits",
+            )
 
 
 class StraightBelt(_Belt):

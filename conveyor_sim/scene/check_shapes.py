@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.scene.belts import CurvedBelt
-from conveyor_sim.scene.check_movers import unsound_movers
 from conveyor_sim.scene.geometry import (
-    TOUCH,
-    XY,
     Array,
     RailShape,
     arc_centre,
@@ -20,21 +17,19 @@ from conveyor_sim.scene.geometry import (
     rail_pieces,
     rails_of_curved,
 )
-from conveyor_sim.scene.machines import Source, Spill
 from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
-from conveyor_sim.scene.polygons import why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.rails import PolylineRail, SegmentRail
-from conveyor_sim.scene.schema import Grid, Infeed, Scene, Single
-from conveyor_sim.scene.types import COORDINATE_LIMIT
+from conveyor_sim.scene.schema import Grid, Scene, Single
+from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.scene.words import shown
 
 _MOST_BOTTLES = 1_000_000  # of one grid
 
 
 def shape_problems(scene: Scene) -> list[Problem]:
-    """Problems of belts, rails, outfeeds, and of where bottles are born."""
+    """Problems of belts, rails, and of where bottles are born."""
     belts = list(_curved_belts(scene))
     rails = list(_rails(scene))
     wrong = {problem.path[:2] for problem in belts + rails}
@@ -43,7 +38,6 @@ def shape_problems(scene: Scene) -> list[Problem]:
     return [
         *belts,
         *rails,
-        *_outfeeds(scene),
         *_grids(scene),
         *_in_rails(groups, shapes),
         *_infeeds_in_rails(scene, shapes),
@@ -115,19 +109,8 @@ def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and ("belts", name) not in wrong:
             shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
-    unsound = unsound_movers(scene)
-    moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if path not in unsound]
+    moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
     return shapes + [shape.shape(shape.first) for shape in moving]
-
-
-def _outfeeds(scene: Scene) -> Iterator[Problem]:
-    for name, outfeed in scene.outfeeds.items():
-        reason = why_not_simple(outfeed.region)
-        if reason is not None:
-            yield Problem(
-                ("outfeeds", name, "region"),
-                f"{shown(outfeed.region)} given, expected a simple polygon ({reason})",
-            )
 
 
 @dataclass(frozen=True)
@@ -212,12 +195,12 @@ def _in_rails(groups: list[_Group], rails: list[RailShape]) -> Iterator[Problem]
 def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]:
     feeds = {path: feed for path, feed in scene.entries() if feed.bottle in scene.bottle_types}
     groups = [
-        _Group((*path, "position"), _births(feed), scene.bottle_types[feed.bottle].radius)
+        _Group((*path, "position"), np.array(feed.births()), scene.bottle_types[feed.bottle].radius)
         for path, feed in feeds.items()
     ]
     for index, rail, _, apart in _inside(_All.of(groups), rails):
         group, feed = groups[index], list(feeds.values())[index]
-        jitter = ", lateral_jitter included" if isinstance(feed, Infeed) and feed.lateral_jitter else ""
+        jitter = ", lateral_jitter included" if len(group.points) > 1 and np.ptp(group.points, axis=0).any() else ""
         yield Problem(
             group.path,
             f"{shown(feed.position)} given, expected at least {group.radius:g} m between a bottle's axis "
@@ -247,15 +230,6 @@ def _inside(every: _All, rails: list[RailShape]) -> Iterator[tuple[int, RailShap
     for some in np.split(np.arange(len(point)), changes) if len(point) else []:
         group = int(every.owner[point[some[0]]])
         yield group, rails[rail[some[0]]], point[some] - every.start[group], distance[some]
-
-
-def _births(feed: Infeed | Source | Spill) -> Array:
-    """The middle and both ends of where bottles appear, (n, 2)."""
-    if not isinstance(feed, Infeed):
-        return np.array([feed.position])
-    sideways = np.array([-math.sin(feed.direction), math.cos(feed.direction)])
-    births: Array = np.array(feed.position) + np.outer([-1.0, 0.0, 1.0], feed.lateral_jitter * sideways)
-    return births
 
 
 def _in_each_other(groups: list[_Group]) -> Iterator[Problem]:

@@ -8,15 +8,15 @@ from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
 from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_limits import limit_problems
-from conveyor_sim.scene.check_machines import machine_problems
-from conveyor_sim.scene.check_movers import mover_problems
-from conveyor_sim.scene.check_sensors import sensor_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.moving import movers_of
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
-from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.words import listed, shown
+
+MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
+"""Integrators that move rails: the others take forces within a step, or solve for what a rail at rest exerts."""
 
 
 def problems_of(scene: Scene) -> list[Problem]:
@@ -30,14 +30,11 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_missing_contacts(scene),
         *_missing_base(scene),
         *_unknown_types(scene),
-        *_belt_speeds(scene),
-        *_infeeds(scene),
         *_rail_names(scene),
-        *machine_problems(scene),
-        *mover_problems(scene),
+        *_devices(scene),
+        *_moving_rails(scene),
         *limit_problems(scene),
         *shape_problems(scene),
-        *sensor_problems(scene),
     ]
 
 
@@ -131,34 +128,22 @@ def _unknown_types(scene: Scene) -> Iterator[Problem]:
             yield Problem(path, f"{shown(name)} given, expected a name from bottle_types: {known}")
 
 
-def _belt_speeds(scene: Scene) -> Iterator[Problem]:
-    for name, belt in scene.belts.items():
-        least, greatest = belt.speed_limits
-        if least > greatest:
-            yield Problem(
-                ("belts", name, "speed_limits"),
-                f"{shown(belt.speed_limits)} given, expected the smaller number first (m/s)",
-            )
-        elif not least <= belt.speed <= greatest:
-            yield Problem(
-                ("belts", name, "speed"),
-                f"{shown(belt.speed)} given, expected a number from {least:g} to {greatest:g} (m/s), the speed_limits",
-            )
+def _devices(scene: Scene) -> Iterator[Problem]:
+    others = scene.named()
+    for path, part in scene.devices():
+        yield from part.problems(path, others)
 
 
-def _infeeds(scene: Scene) -> Iterator[Problem]:
-    for name, feed in scene.infeeds.items():
-        if (feed.gap is None) == (feed.rate is None):
-            given = "neither" if feed.gap is None else "both"
-            yield Problem(("infeeds", name), f"{given} of gap and rate given, expected one of them")
-        if feed.bad_share and feed.bad_every is not None:
-            yield Problem(("infeeds", name), "both of bad_share and bad_every given, expected at most one of them")
-        if feed.rate is not None and feed.timing_jitter > 0.5 / feed.rate:
+def _moving_rails(scene: Scene) -> Iterator[Problem]:
+    chosen = scene.accuracy.integrator
+    for path, _ in movers_of(scene):
+        if chosen not in MOVE_RAILS:
             yield Problem(
-                ("infeeds", name, "timing_jitter"),
-                f"{shown(feed.timing_jitter)} given, expected at most half the time between two bottles, "
-                f"{0.5 / feed.rate:g} (s), so that they stay in order",
+                ("accuracy", "integrator"),
+                f"{shown(chosen)} given, expected {listed(list(MOVE_RAILS))}, as {path[0]}.{path[1]} moves: "
+                "the other integrators take rails to be at rest within a step",
             )
+            return
 
 
 def _rail_names(scene: Scene) -> Iterator[Problem]:

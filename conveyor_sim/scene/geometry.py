@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from conveyor_sim.scene.belts import Belt, CurvedBelt
 from conveyor_sim.scene.rails import ArcRail, PolylineRail, Rail
 from conveyor_sim.scene.schema import Grid, GridOfBottles, Scene
+from conveyor_sim.scene.types import TOUCH, XY
 
 Array = NDArray[np.float64]
-XY = tuple[float, float]
 InitialBottle = tuple[str, float, float, float, float, float, float]
-
-TOUCH = 1e-9  # m; below this two things touch or coincide: rounding of coordinates of some metres is 1e-15
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conveyor_sim.scene.geometry import XY, Array, RailShape, SegmentPiece
-from conveyor_sim.scene.movers import Diverter, Mover, Pusher, SwingingGate
+from conveyor_sim.scene.geometry import Array, RailShape, SegmentPiece
+from conveyor_sim.scene.parts.movers import Diverter, Mover, Pusher, SwingingGate
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.schema import Scene
+from conveyor_sim.scene.types import XY
 
 
 @dataclass(frozen=True)
@@ -82,11 +83,8 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
     """The shape of one mover."""
     if isinstance(mover, (SwingingGate, Diverter)):
         along, turning, stroke = (0.0, 0.0), math.copysign(1.0, mover.angle), abs(mover.angle)
-        limit, rod = mover.torque_limit, math.dist(mover.from_, mover.to) ** 2 / 3.0
-        mass = rod if mover.inertia is None else mover.inertia
     else:
         along, turning, stroke = (math.cos(mover.direction), math.sin(mover.direction)), 0.0, mover.stroke
-        limit, mass = mover.force_limit, mover.moving_mass
     starts_open = not isinstance(mover, (Pusher, Diverter)) and mover.open
     return MovingShape(
         name="/".join(str(part) for part in path),
@@ -99,8 +97,8 @@ def moving_shape(path: Path, mover: Mover) -> MovingShape:
         max_speed=mover.max_speed,
         acceleration=mover.acceleration,
         first=stroke if starts_open else 0.0,
-        limit=None if limit == "none" else limit,
-        mass=mass,
+        limit=mover.drive_limit,
+        mass=mover.drive_mass,
     )
 
 

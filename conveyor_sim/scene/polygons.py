@@ -2,7 +2,7 @@
 
 import math
 
-from conveyor_sim.scene.geometry import TOUCH, XY
+from conveyor_sim.scene.types import TOUCH, XY
 
 
 def why_not_simple(corners: tuple[XY, ...]) -> str | None:

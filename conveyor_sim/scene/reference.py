@@ -1,23 +1,14 @@
 """The reference of a scene file, from the schema: `python -m conveyor_sim.scene.reference > docs/scene.md`."""
 
+from collections.abc import Iterator
 from inspect import getdoc
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import (
-    accuracy,
-    belts,
-    contacts,
-    drives,
-    indicators,
-    limits,
-    machines,
-    movers,
-    rails,
-    schema,
-    sensors,
-)
+from conveyor_sim.scene import accuracy, belts, contacts, drives, limits, schema
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -45,49 +36,59 @@ problem is one line that names the file, the line, the field, the value and what
 - No bottle may be born inside a rail or another bottle; touching is allowed.
 """
 
-SECTIONS: tuple[tuple[str, type[BaseModel]], ...] = (
-    ("The whole file", schema.Scene),
-    ("`accuracy`", accuracy.Accuracy),
-    ("An entry of `contacts`", contacts.Contact),
-    ("`damping` of a contact", contacts.Damping),
-    ("`tangential` of a contact", contacts.Tangential),
-    ("An entry of `base`", contacts.Base),
-    ("`tangential` of an entry of `base`", contacts.BaseSpring),
-    ("An entry of `bottle_types`", schema.BottleType),
-    ("An entry of `belts`: `kind: straight`", belts.StraightBelt),
-    ("An entry of `belts`: `kind: curved`", belts.CurvedBelt),
-    ("`rails` of a curved belt", belts.BeltRails),
-    ("`drive` of a belt", drives.Drive),
-    ("An entry of `rails`: `kind: segment`", rails.SegmentRail),
-    ("An entry of `rails`: `kind: polyline`", rails.PolylineRail),
-    ("An entry of `rails`: `kind: arc`", rails.ArcRail),
-    ("An entry of `gates`: `kind: slide`", movers.SlidingGate),
-    ("An entry of `gates`: `kind: swing`", movers.SwingingGate),
-    ("An entry of `pushers`", movers.Pusher),
-    ("An entry of `diverters`", movers.Diverter),
-    ("`floor`", schema.Floor),
-    ("An entry of `infeeds`", schema.Infeed),
-    ("An entry of `outfeeds`", schema.Outfeed),
-    ("An entry of `machines`: `kind: source`", machines.Source),
-    ("An entry of `machines`: `kind: sink`", machines.Sink),
-    ("An entry of `machines`: `kind: inspection`", machines.Inspection),
-    ("An entry of `machines`: `kind: reject`", machines.Reject),
-    ("An entry of `spills`", machines.Spill),
-    ("An entry of `photo_eyes`", sensors.PhotoEye),
-    ("An entry of `zones`", sensors.Zone),
-    ("An entry of `counters`", sensors.Counter),
-    ("An entry of `indicators`", indicators.Indicator),
-    ("An entry of `bottles`: one bottle", schema.Single),
-    ("An entry of `bottles`: a grid", schema.Grid),
-    ("`grid`", schema.GridOfBottles),
-    ("`outputs`", schema.Outputs),
-    ("`limits`", limits.Limits),
-)
+WITHIN: dict[str, list[tuple[str, type[BaseModel]]]] = {
+    "accuracy": [("`accuracy`", accuracy.Accuracy)],
+    "contacts": [
+        ("An entry of `contacts`", contacts.Contact),
+        ("`damping` of a contact", contacts.Damping),
+        ("`tangential` of a contact", contacts.Tangential),
+    ],
+    "base": [("An entry of `base`", contacts.Base), ("`tangential` of an entry of `base`", contacts.BaseSpring)],
+    "floor": [("`floor`", schema.Floor)],
+    "bottles": [
+        ("An entry of `bottles`: one bottle", schema.Single),
+        ("An entry of `bottles`: a grid", schema.Grid),
+        ("`grid`", schema.GridOfBottles),
+    ],
+    "outputs": [("`outputs`", schema.Outputs)],
+    "limits": [("`limits`", limits.Limits)],
+}
+"""Sections of fields that are no mappings of names to parts, by field."""
+
+BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
+    "belts": [("`rails` of a curved belt", belts.BeltRails), ("`drive` of a belt", drives.Drive)]
+}
+"""Sections that follow those of a mapping's parts."""
+
+
+def sections() -> Iterator[tuple[str, type[BaseModel]]]:
+    """Title and model of each section, in the order of the fields of a scene."""
+    yield "The whole file", schema.Scene
+    for name, field in schema.Scene.model_fields.items():
+        yield from WITHIN.get(name, [])
+        for model in _models(field.annotation) if name not in WITHIN else ():
+            kind = model.model_fields.get("kind")
+            of_kind = "" if kind is None else f": `kind: {get_args(kind.annotation)[0]}`"
+            yield f"An entry of `{name}`{of_kind}", model
+        yield from BEHIND.get(name, [])
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The parts that a mapping of names may hold; none for what is no such mapping."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    elif get_origin(annotation) is Annotated:
+        yield from _models(get_args(annotation)[0])
+    elif get_origin(annotation) is dict:
+        yield from _models(get_args(annotation)[1])
+    elif get_origin(annotation) in (Union, UnionType):
+        for one in get_args(annotation):
+            yield from _models(one)
 
 
 def reference() -> str:
     """The text of docs/scene.md."""
-    return "\n".join([INTRODUCTION, *(_section(title, model) for title, model in SECTIONS)])
+    return "\n".join([INTRODUCTION, *(_section(title, model) for title, model in sections())])
 
 
 def _section(title: str, model: type[BaseModel]) -> str:

@@ -14,13 +14,19 @@ from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.scene.belts import Belt
 from conveyor_sim.scene.contacts import Base, Contact
 from conveyor_sim.scene.effect_names import EffectName, Forced
-from conveyor_sim.scene.indicators import Indicator
 from conveyor_sim.scene.limits import Limits as DamageLimits
-from conveyor_sim.scene.machines import Machine, Reject, Share, Sink, Source, Spill
-from conveyor_sim.scene.movers import Diverter, Gate, Pusher
+from conveyor_sim.scene.machines import Machine
 from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.parts.counter import Counter
+from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit
+from conveyor_sim.scene.parts.indicator import Indicator
+from conveyor_sim.scene.parts.infeed import Infeed
+from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
+from conveyor_sim.scene.parts.outfeed import Outfeed
+from conveyor_sim.scene.parts.photo_eye import PhotoEye
+from conveyor_sim.scene.parts.spill import Spill
+from conveyor_sim.scene.parts.zone import Zone
 from conveyor_sim.scene.rails import Rail
-from conveyor_sim.scene.sensors import Counter, PhotoEye, Zone
 from conveyor_sim.scene.types import (
     Angle,
     Count,
@@ -29,7 +35,6 @@ from conveyor_sim.scene.types import (
     NotNegative,
     Number,
     Point,
-    PolygonList,
     Positive,
     Seed,
     Text,
@@ -80,37 +85,6 @@ class Floor(Part):
         "1",
         default=None,
     )
-
-
-class Infeed(Part):
-    """A place where bottles enter, one behind the other."""
-
-    bottle: Name = quantity("Bottle type.")
-    position: Point = quantity("Where a bottle's axis appears.", "m")
-    direction: Angle = quantity("Direction of its velocity.", "rad")
-    speed: NotNegative = quantity("Its speed at first, along `direction`.", "m/s")
-    count: Count | None = quantity("How many bottles enter. Left out: without end.", "1", default=None)
-    gap: NotNegative | None = quantity(
-        "Clear distance to the bottle before it, in a tightly packed in-line. Or give `rate`.", "m", default=None
-    )
-    rate: Positive | None = quantity("Bottles a second. Or give `gap`.", "1/s", default=None)
-    start: NotNegative = quantity("When the first bottle enters.", "s", default=0.0)
-    timing_jitter: NotNegative = quantity(
-        "Each bottle is early or late by up to this (with `gap`: late, up to this), drawn evenly from the seed.",
-        "s",
-        default=0.0,
-    )
-    lateral_jitter: NotNegative = quantity(
-        "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
-    )
-    bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
-    bad_every: Count | None = quantity("Every so many-th bottle is bad.", "1", default=None)
-
-
-class Outfeed(Part):
-    """A region that removes the bottles whose axis is inside."""
-
-    region: PolygonList = quantity("Corners of the region in order: a simple polygon.", "m")
 
 
 class Single(Part):
@@ -303,16 +277,23 @@ class Scene(Part):
         """Duration (ticks)."""
         return nanoseconds(self.duration) // self.tick_ns
 
-    def entries(self) -> Iterator[tuple[tuple[str, ...], Infeed | Source | Spill]]:
-        """All that bottles come from while it runs, with its path."""
-        yield from ((("infeeds", name), infeed) for name, infeed in self.infeeds.items())
-        yield from ((("machines", name), one) for name, one in self.machines.items() if isinstance(one, Source))
-        yield from ((("spills", name), spill) for name, spill in self.spills.items())
+    def named(self) -> dict[str, dict[str, Part]]:
+        """All that has a name: by the field that it stands in, then by name."""
+        fields = ((name, getattr(self, name)) for name in type(self).model_fields if name != "effects")
+        return {name: value for name, value in fields if isinstance(value, dict)}
 
-    def exits(self) -> Iterator[tuple[tuple[str, ...], Outfeed | Sink | Reject]]:
+    def devices(self) -> Iterator[tuple[tuple[str, str], DevicePart]]:
+        """All that becomes a device, with its path, in the order in which devices act."""
+        for place, parts in self.named().items():
+            yield from (((place, name), part) for name, part in parts.items() if isinstance(part, DevicePart))
+
+    def entries(self) -> Iterator[tuple[tuple[str, str], Entry]]:
+        """All that bottles come from while it runs, with its path."""
+        yield from ((path, part) for path, part in self.devices() if isinstance(part, Entry))
+
+    def exits(self) -> Iterator[tuple[tuple[str, str], Exit]]:
         """All by which bottles leave, with its path."""
-        yield from ((("outfeeds", name), outfeed) for name, outfeed in self.outfeeds.items())
-        yield from ((("machines", name), one) for name, one in self.machines.items() if isinstance(one, Sink | Reject))
+        yield from ((path, part) for path, part in self.devices() if isinstance(part, Exit))
 
     def every(self, topic: str) -> int:
         """Ticks from one output of a topic to the next, 0 if there is none. KeyError if there is no such topic."""

@@ -20,7 +20,11 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 COORDINATE_LIMIT = 1e5  # m; farther out a double no longer resolves a contact, and a static grid would not fit memory
 
+TOUCH = 1e-9  # m; below this two things touch or coincide: rounding of coordinates of some metres is 1e-15
+
 LEAST, MOST = 1e-20, 1e20  # in SI units; products and quotients of several quantities stay within a double
+
+XY = tuple[float, float]
 
 _ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad)\s*")
 
@@ -77,6 +81,7 @@ NotNegative = Annotated[float, Strict(), AllowInfNan(False), Ge(0), Says("a numb
 Restitution = Annotated[
     float, Strict(), AllowInfNan(False), Gt(0), Le(1), Says("a number greater than 0, at most 1"), _sound
 ]
+Share = Annotated[float, Strict(), Ge(0), Le(1), Says("a number from 0 to 1")]
 Tolerance = Annotated[
     float, Strict(), AllowInfNan(False), Gt(0), Le(0.5), Says("a number greater than 0, at most 0.5"), _sound
 ]

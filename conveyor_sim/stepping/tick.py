@@ -5,8 +5,6 @@ import time
 from dataclasses import astuple
 from typing import Any, Literal
 
-import numpy as np
-
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
 from conveyor_sim.engine.threads.thread_choice import ThreadChoice
@@ -159,17 +157,16 @@ class Integration:
         memory = WorldSnapshot()
         memory.take(state.world)
         self._set_clock(model.steps_per_tick)
-        velocities = [chatter.velocities_of(state.world)]
+        meter = chatter.ChatterMeter()
+        chatter.note_world(meter, state.world)
         for _ in range(chatter.STEPS):
             self._pool.advance(self.threads, self._advance, state.world, 1, model.dt, START)
             state.make_lists()
-            velocities.append(chatter.velocities_of(state.world))
+            chatter.note_world(meter, state.world)
         memory.restore(state)
         self._guard.forget()
-        amplitude = chatter.chatter_of(np.array(velocities))
-        amplitude[state.world.bottles.id < 0] = 0.0
-        worst = int(np.argmax(amplitude))
-        share = amplitude[worst] / model.settings.slip_limit
+        worst, amplitude = meter.worst()
+        share = amplitude / model.settings.slip_limit
         if share > chatter.LEAST:
             self._chatters = True
             self._events.append(self._guard.chatters(tick, worst, share))

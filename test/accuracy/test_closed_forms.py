@@ -82,7 +82,7 @@ def test_every_law_with_a_closed_form_is_there(rows: list[Order]) -> None:
 
 
 def test_observed_orders_are_those_expected(rows: list[Order]) -> None:
-    """Within 0.15, as docs/ and the integrators state them: physics.md's table, and what friction adds to it."""
+    """Within 0.15, as docs/accuracy.md and the integrators state them, and what friction adds to it."""
     wrong = [row for row in rows if row.expected is not None and abs(row.observed - row.expected) > 0.15]
     assert not wrong
     # Only where the errors of a ring's smooth friction drown in rounding there is nothing to expect.

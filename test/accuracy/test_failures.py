@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scenes import MASS, NO_FLOOR, RADIUS, base, belt, bottle, contact, line, scene, segment, stiffness_for
 
-from conveyor_sim.accuracy.chatter import ChatterProbe, chatter_of
+from conveyor_sim.accuracy.chatter import ChatterProbe
 from conveyor_sim.accuracy.failures import failure_of
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import follow, variant
 from conveyor_sim.scene import Scene
+from conveyor_sim.stepping.guard.chatter import chatter_of
 
 G, MU, LIMIT = 9.81, 0.4, 0.01
 LEAST_STABLE = LIMIT / (MU * G)

@@ -12,7 +12,7 @@ from conveyor_sim.bag.messages import MARKERS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, belt_shapes, rail_shapes
 from conveyor_sim.scene.geometry import RailShape, SegmentPiece
-from conveyor_sim.scene.sensor_shapes import SensorShape
+from conveyor_sim.scene.parts.device_part import Mark
 
 RADII = np.array([0.03, 0.05, 0.04, 0.06])
 
@@ -90,9 +90,25 @@ def test_arrows_point_along_positive_speed(scene: Scene) -> None:
 def test_sensors_are_lines_with_names() -> None:
     """A zone goes back to where it began."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    shapes = [SensorShape("photo_eye", "entry", corners[:2]), SensorShape("zone", "waiting", corners)]
+    shapes = [Mark("beam", "photo_eye", "entry", corners[:2]), Mark("region", "zone", "waiting", corners)]
     markers = decode(plant_markers([], [], shapes, HEADER))
     assert [marker.ns for marker in markers] == ["photo_eyes", "photo_eye_names", "zones", "zone_names"]
     assert [marker.text for marker in markers] == ["", "entry", "", "waiting"]
     lines = [[(point.x, point.y) for point in marker.points] for marker in markers[::2]]
     assert lines == [[(0.0, 0.0), (1.0, 0.0)], [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)]]
+
+
+def test_entries_are_triangles_and_exits_closed_outlines() -> None:
+    """An entry's tip is where bottles appear; it points where they go."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    shapes = [
+        Mark("entry", "source", "filler", np.array([[2.0, 3.0]]), np.pi / 2.0),
+        Mark("exit", "sink", "end", corners),
+    ]
+    markers = decode(plant_markers([], [], shapes, HEADER))
+    assert [marker.ns for marker in markers] == ["sources", "source_names", "sinks", "sink_names"]
+    tip, left, right, again = [(point.x, point.y) for point in markers[0].points]
+    assert tip == again == (2.0, 3.0)
+    assert (left[1], right[1]) == pytest.approx((2.9, 2.9))
+    assert left[0] < 2.0 < right[0]
+    assert [(point.x, point.y) for point in markers[2].points] == [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)]

@@ -7,6 +7,7 @@ from control.scans import Scans
 
 from conveyor_sim.control import ControlError
 from conveyor_sim.control.level import Count, Counters, Eyes, Level, LevelControl
+from conveyor_sim.control.load import load
 
 FEEDER, TABLE = "belts/in/cmd_speed", "belts/table/cmd_speed"
 
@@ -28,6 +29,18 @@ def test_from_a_count_the_feeder_is_held_between_the_marks_and_the_table_runs_fa
     )
     for bottles, feeder, table in rows:
         assert scans.scan({"zones/table/bottles": bottles}) == {FEEDER: feeder, TABLE: table}
+
+
+def test_the_controller_of_the_papers_plant_counts_the_bottles_on_its_table() -> None:
+    """By name, as a node runs it; other belts, marks and speeds are parameters."""
+    scans = Scans(load("conveyor_sim.control.level:table_level"))
+    for bottles, feeder, table in ((44, 1.0, 0.2), (45, 0.0, 0.2), (36, 0.0, 0.2), (35, 1.0, 0.3)):
+        answer = scans.scan({"belts/table/bottles": bottles})
+        assert answer == {"belts/feeder/cmd_speed": feeder, "belts/table/cmd_speed": table}
+    other = Scans(load("conveyor_sim.control.level:table_level", {"feeder": "in", "high_mark": 5, "low_mark": 4}))
+    assert other.scan({"belts/table/bottles": 5})[FEEDER] == 0.0
+    with pytest.raises(ControlError, match="high: 5 given, expected low, 35, or more"):
+        load("conveyor_sim.control.level:table_level", {"high_mark": 5})
 
 
 def test_from_counters_the_level_is_what_came_less_what_went() -> None:

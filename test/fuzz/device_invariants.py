@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.geometry import SegmentPiece
-from conveyor_sim.scene.machines import Inspection, Reject, Sink, Source
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
+from conveyor_sim.scene.parts.inspection import Inspection
+from conveyor_sim.scene.parts.reject import Reject
+from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.source import Source
 from conveyor_sim.simulation import Simulation
 
 F8 = NDArray[np.float64]

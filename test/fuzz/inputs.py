@@ -7,7 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.machines import Inspection, Reject, Sink, Source
+from conveyor_sim.scene.parts.inspection import Inspection
+from conveyor_sim.scene.parts.reject import Reject
+from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.source import Source
 
 
 @dataclass(frozen=True)

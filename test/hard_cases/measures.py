@@ -10,7 +10,7 @@ import numpy as np
 from hard_cases.case import Case
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.chatter import STEPS, chatter_of
+from conveyor_sim.accuracy.chatter import STEPS
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
@@ -18,6 +18,7 @@ from conveyor_sim.errors import SimulationError
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.stepping.guard.chatter import ChatterMeter
 
 SAMPLES = 1000
 """Ticks that are looked at, at the most, evenly spread; all of them in runs of fewer."""
@@ -270,15 +271,15 @@ def chatter(simulation: Simulation) -> float:
     probe = variant(scene, setting, tick=step, duration=step, effects=supply, outputs={"ledger": 1.0 / step})
     probe.restore_from(simulation)
     radius = simulation.model.type_radius[simulation.bottles().type]
-    velocities = []
+    meter = ChatterMeter()
     for _ in range(STEPS):
         try:
             probe.advance()
         except SimulationError:
             return math.nan
         now = probe.bottles()
-        velocities.append(np.stack([now.vx, now.vy, radius * now.omega]))
-    return float(np.max(chatter_of(np.array(velocities)), initial=0.0)) / scene.slip_limit
+        meter.note(now.vx, now.vy, radius * now.omega)
+    return meter.worst()[1] / scene.slip_limit
 
 
 def residual(simulation: Simulation) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 from scenes import RADIUS, base, belt, contact, segment, simulation
 from worlds import FAR
 
-from conveyor_sim.line.outfeed import in_polygon
+from conveyor_sim.line.polygon import in_polygon
 
 STAR = np.array([[0.0, 1.0], [0.2, 0.3], [1.0, 0.2], [0.3, -0.1], [0.6, -0.9], [0.0, -0.3], [-0.7, -0.8], [-0.3, 0.0],
                  [-1.0, 0.4], [-0.2, 0.3]])  # fmt: skip

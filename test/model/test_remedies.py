@@ -78,6 +78,26 @@ def test_the_hopper_of_1000_bottles_is_told_in_two_lines() -> None:
     assert remedies == f"fewer steps: friction_solver: implicit: {implicit} steps a tick, {fewer:.2g} times fewer"
 
 
+def test_semi_implicit_euler_on_a_turning_belt_has_leapfrog_for_a_remedy() -> None:
+    """It creeps where a belt turns, by one part in the steps of v_lim / (mu g); leapfrog does not."""
+    turning = {"kind": "curved", "centre": [0.0, 0.0], "inner_radius": 0.3, "width": 0.4, "start_angle": 0.0,
+               "span": "360 deg", "material": "chain", "speed": 0.5}  # fmt: skip
+    what = scene(
+        belts={"table": turning}, base=base(0.4), contacts=[contact(5e3, damping=("normal", 10.0))],
+        bottles=[bottle(0.5, 0.0, 0.0, 0.5), bottle(-0.5, 0.0, 0.0, -0.5)],
+        accuracy={"integrator": "semi_implicit_euler"},
+    )  # fmt: skip
+    limit = step_limit(what)
+    checked(limit, what)
+    assert "accuracy: {integrator: leapfrog}" in [remedy.words for remedy in limit.remedies]
+    straight = scene(
+        belts={"table": belt(0.5)}, base=base(0.4), contacts=[contact(5e3, damping=("normal", 10.0))],
+        bottles=[bottle(0.5, 0.0), bottle(-0.5, 0.0)],
+        accuracy={"integrator": "semi_implicit_euler"},
+    )  # fmt: skip
+    assert all("leapfrog" not in remedy.words for remedy in step_limit(straight).remedies)
+
+
 def test_what_is_not_worth_it_is_not_named() -> None:
     """One bound, of impacts without a dashpot: draft would take 9 steps for 20, but a tolerance is given."""
     limit = step_limit(scene(contacts=[contact(1e8)], accuracy={"tolerance": 0.01}, **TWO))

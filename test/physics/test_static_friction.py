@@ -27,6 +27,7 @@ SPRING = {"stiffness": STIFFNESS, "damping": 2.0 * MASS * RATE}
 STOP = 1000.0
 """N/m, of the rail."""
 BOTH = ["semi_implicit_euler", "velocity_verlet"]
+ON_TURNTABLES = ["leapfrog", *BOTH]
 
 
 def sprung(**spring: Any) -> list[dict[str, Any]]:
@@ -70,7 +71,7 @@ def turned(sim: Simulation, omega: float) -> np.ndarray:
     return np.array([[c, s], [-s, c]]) @ place(sim)
 
 
-@pytest.mark.parametrize("integrator", BOTH)
+@pytest.mark.parametrize("integrator", ON_TURNTABLES)
 @pytest.mark.parametrize("share", [0.5, -0.8, 0.99])
 def test_it_stands_still_on_a_turntable(share: float, integrator: str) -> None:
     """`share` = Omega^2 r / (mu g), its sign that of Omega: the spring holds m Omega^2 r, and nothing moves any more.
@@ -87,7 +88,7 @@ def test_it_stands_still_on_a_turntable(share: float, integrator: str) -> None:
     lag = abs(omega) * 4.0 * radius * (omega * sim.model.dt) ** 2 / 12.0
     assert math.dist(turned(sim, omega), place_then) < 1.01 * lag + 1e-10
     # By Euler the velocity lags by half a step, and that slip lies on the dashpot.
-    slip = 0.0 if integrator == "velocity_verlet" else 0.5 * SPRING["damping"] * sim.model.dt / MASS
+    slip = 0.0 if integrator != "semi_implicit_euler" else 0.5 * SPRING["damping"] * sim.model.dt / MASS
     pull = (1.0 - slip) * MASS * omega**2 * start
     assert sim.ledger().springs == pytest.approx(0.5 * pull**2 / STIFFNESS, rel=1e-3)
     if abs(share) < 0.9:  # at 0.99 it slid a little as it was set down

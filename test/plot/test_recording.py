@@ -190,7 +190,7 @@ def test_entries_count_changes_of_belt_and_bottles_that_are_new() -> None:
 
 
 def test_the_plant_is_the_one_that_ran(recording: Recording) -> None:
-    np.testing.assert_allclose(recording.plant.outfeeds[0].region[0], [-1.6, 0.3])
+    np.testing.assert_allclose(recording.plant.drawn_as("exit")[0].points[0], [-1.6, 0.3])
 
 
 def test_plot_bag_writes_every_picture_as_png_and_svg(bag: Path, tmp_path: Path) -> None:

@@ -91,9 +91,8 @@ def test_who_asks_for_security_and_does_not_enforce_it_is_warned(strategy: Mappi
     assert UNPROTECTED in said([*SIM_NODE, "-p", "clock_rate:=-1.0"], environment)
 
 
-@pytest.mark.parametrize("name", ["plc_node", "controller_node"])
-def test_of_a_controller(name: str) -> None:
-    assert refused(["-m", f"conveyor_sim.ros.{name}"], MISSING) == f"{name}: {NO_FOLDER}"
+def test_of_a_controller() -> None:
+    assert refused(["-m", "conveyor_sim.ros.controller_node"], MISSING) == f"controller_node: {NO_FOLDER}"
 
 
 def test_of_a_playback(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def written(file: Path) -> str:
 
 def test_a_main_job_that_is_killed_leaves_no_node_and_a_whole_bag(tmp_path: Path) -> None:
     job, processes = start_main_job(tmp_path / "bag")
-    assert set(processes) == {"sim_node", "plc_node"}
+    assert set(processes) == {"sim_node", "controller_node"}
     job.kill()
     job.wait()
     until(lambda: not any(runs(process) for process in processes.values()), "the end of the nodes")

@@ -43,10 +43,8 @@ def start_main_job(bag: Path) -> tuple[subprocess.Popen[str], dict[str, int]]:
     command += ["--duration", "100000"]
     job = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     until(lambda: bag.is_dir() and sum(file.stat().st_size for file in bag.glob("*.mcap")) > 100_000, "a recording")
-    names = {
-        name: child for child in children_of(job.pid) for name in ("sim_node", "plc_node") if name in command_of(child)
-    }
-    return job, names
+    names = ("sim_node", "controller_node")
+    return job, {name: child for child in children_of(job.pid) for name in names if name in command_of(child)}
 
 
 @pytest.mark.usefixtures("nothing_left")
@@ -59,7 +57,7 @@ def test_two_runs_give_the_same_bytes_and_the_controller_its_commands(tmp_path: 
     assert len(one["outcomes"]) == 40  # a scan every 10 ticks
     with open_bag(tmp_path / "one") as bag:
         assert bag.line.overrides == "duration: 4.0\n"
-    assert {path.name for path in (tmp_path / "one" / "logs").iterdir()} == {"sim_node.log", "plc_node.log"}
+    assert {path.name for path in (tmp_path / "one" / "logs").iterdir()} == {"sim_node.log", "controller_node.log"}
 
 
 @pytest.mark.usefixtures("nothing_left")
@@ -69,7 +67,7 @@ def test_a_scene_without_the_controllers_belts_is_refused_before_anything_starts
     assert not (tmp_path / "bag").exists()
 
 
-@pytest.mark.parametrize("victim", ["sim_node", "plc_node"])
+@pytest.mark.parametrize("victim", ["sim_node", "controller_node"])
 def test_a_process_that_is_killed_ends_the_job_with_its_name(tmp_path: Path, victim: str) -> None:
     job, processes = start_main_job(tmp_path / "bag")
     os.kill(processes[victim], signal.SIGKILL)
@@ -77,7 +75,7 @@ def test_a_process_that_is_killed_ends_the_job_with_its_name(tmp_path: Path, vic
     assert job.returncode == 1
     assert f"main job: {victim} was killed by signal 9; the end of its log:" in output
     assert not any(Path(f"/proc/{process}").exists() for process in processes.values())
-    assert recover(tmp_path / "bag").healthy == (victim == "plc_node")
+    assert recover(tmp_path / "bag").healthy == (victim == "controller_node")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -13,7 +13,7 @@ from rich.console import Console
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.model import build_model
 from conveyor_sim.model.remedies import step_limit
-from conveyor_sim.runs.summary import render, summarize, write_summary
+from conveyor_sim.runs.summary import Summary, render, summarize, write_summary
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 
 TICKS = 100
@@ -42,6 +42,14 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("summary") / "small"
     record(load_scene(SMALL_LINE), folder, TICKS)
     return folder
+
+
+def shown(summary: Summary) -> str:
+    """As on a terminal."""
+    console = Console(width=200)
+    with console.capture() as captured:
+        console.print(render(summary))
+    return captured.get()
 
 
 def test_counts_are_those_of_the_simulation(tmp_path: Path) -> None:
@@ -96,6 +104,8 @@ def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_
     assert summary.predicted is None
     assert summary.achieved is None
     assert summary.peak_force is not None
+    assert (summary.fed, summary.removed, summary.rejected) == (None, None, None)
+    assert "not known fed, not known removed, " in shown(summary)
 
 
 def test_what_sets_the_steps_is_told(bag: Path) -> None:
@@ -162,6 +172,7 @@ def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
     record(load_scene(SMALL_LINE, {"outputs": {"signals": 0}}), tmp_path / "bag", 10)
     summary = summarize(tmp_path / "bag")
     assert summary.fed is None
+    assert "not recorded fed, not recorded removed, " in shown(summary)
     assert summary.energy is None
     assert summary.wall is None
     assert summary.real_time_factor is None
@@ -176,11 +187,9 @@ def test_the_energy_ledger_is_told_with_the_work_of_each_belt(tmp_path: Path) ->
     came = sum(summary.energy.belts.values()) + summary.energy.fed + summary.energy.residual
     dissipated = summary.energy.base_friction + summary.energy.contact_friction + summary.energy.damping
     assert came - dissipated - summary.energy.removed == pytest.approx(summary.energy.stored)
-    console = Console(width=200)
-    with console.capture() as captured:
-        console.print(render(summary))
-    assert f"% of a turnover of {ledger.turnover:.4g} J" in captured.get()
-    assert f"{ledger.belt_work[0]:.4g}" in captured.get()
+    text = shown(summary)
+    assert f"% of a turnover of {ledger.turnover:.4g} J" in text
+    assert f"{ledger.belt_work[0]:.4g}" in text
     assert json.loads(write_summary(summary, tmp_path).read_text())["energy"]["residual"] == ledger.residual
 
 
@@ -194,10 +203,7 @@ def test_summary_is_written_as_json(bag: Path, tmp_path: Path) -> None:
 
 def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
     summary = summarize(bag, wall=2.0)
-    console = Console(width=100)
-    with console.capture() as captured:
-        console.print(render(summary))
-    text = captured.get()
+    text = shown(summary)
     bottles = f"{summary.fed} fed, {summary.removed} removed, {summary.present} present"
     for words in (
         "small_line",

@@ -1,4 +1,4 @@
-"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10; physics.md's additions).
+"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10; docs/effects.md has others').
 
 Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b
 its negative. The laws of a pair of materials add up; what a pair does not have is 0 in its column, what no pair of the

@@ -1,4 +1,4 @@
-"""What bottles and rails bear in every step: scuffing, crushing, impacts, tipping (physics.md). Changes no force.
+"""What bottles and rails bear in every step: scuffing, crushing, impacts, tipping. Changes no force.
 
 A look at the state between two steps: each bottle lists its closed contacts, with the forces that the laws exert
 there, and adds up its own; what it shares with another both add up. So no bottle writes to what is another's, no sum

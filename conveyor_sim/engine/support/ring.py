@@ -1,4 +1,6 @@
-"""Friction of a base that is a ring: sliding and spinning share it (physics.md; the paper's base is a point).
+"""Friction of a base that is a ring: sliding and spinning share it (the paper's base is a point).
+
+For a disc: Farkas, Bartels, Unger and Wolf, Phys. Rev. Lett. 90, 248302 (2003).
 
 Every point of the ring drags with its share of mu m g along its own slip v, smoothed to v/sqrt(v^2 + eps^2) with
 eps = v_lim/2: the slope at rest, 2/v_lim, is that of the regularised point. A ring that spins as well

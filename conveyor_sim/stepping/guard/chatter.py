@@ -33,8 +33,26 @@ def chatter_of(velocities: F8) -> F8:
     return np.asarray(np.sqrt(np.maximum(np.median(against, axis=0), 0.0)) / 4.0)
 
 
-def velocities_of(world: World) -> F8:
-    """Velocities of all slots, (3, S), m/s: vx, vy and that of the rim."""
+class ChatterMeter:
+    """Watches bottles from step to step, for a run that is under way and for a study alike."""
+
+    def __init__(self) -> None:
+        self._velocities: list[F8] = []
+
+    def note(self, vx: F8, vy: F8, rim: F8) -> None:
+        """Velocities of the same bottles after one more step, (bottles,), m/s; rim: radius times angular velocity."""
+        self._velocities.append(np.stack([vx, vy, rim]))
+
+    def worst(self) -> tuple[int, float]:
+        """The bottle that shakes most, by its place in what was noted, and its amplitude, m/s; (-1, 0) of none."""
+        amplitude = chatter_of(np.array(self._velocities))
+        if not amplitude.size:
+            return -1, 0.0
+        worst = int(np.argmax(amplitude))
+        return worst, float(amplitude[worst])
+
+
+def note_world(meter: ChatterMeter, world: World) -> None:
+    """Have a meter note all slots of a World; a free slot rests."""
     bottles, spin = world.bottles, world.spin
-    rim = np.zeros(bottles.vx.size) if spin is None else bottles.radius * spin.omega
-    return np.stack([bottles.vx, bottles.vy, rim])
+    meter.note(bottles.vx, bottles.vy, np.zeros(bottles.vx.size) if spin is None else bottles.radius * spin.omega)

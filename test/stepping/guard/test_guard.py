@@ -130,7 +130,7 @@ def test_a_bottle_that_would_step_over_a_rail_is_caught() -> None:
 
 
 def test_what_no_step_can_stop_is_told_with_the_stiffness_that_can() -> None:
-    """Faster than R sqrt(k/m) = 14.5 m/s, a bottle passes a rail of 10 kN/m by energy alone (physics.md)."""
+    """Faster than R sqrt(k/m) = 14.5 m/s, a bottle passes a rail of 10 kN/m by energy alone: m v^2 > k R^2."""
     stiffness = 1e4
     most = RADIUS * math.sqrt(stiffness / MASS)
     assert most == pytest.approx(14.5, abs=0.05)

@@ -1,0 +1,68 @@
+"""A belt as a device: its speed setpoint, its speed, the bottles on it. One without a drive follows at once."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.process_image import Command, Signal, speed_command
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.watchdog import Watchdog
+from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
+
+
+class BeltDevice(Device):
+    """One belt while it runs."""
+
+    def __init__(
+        self,
+        name: str,
+        belt: StraightBelt | CurvedBelt,
+        setup: Setup,
+        signals: Sequence[Signal] = (),
+        commands: Sequence[Command] = (),
+        faults: Sequence[Command] = (),
+    ) -> None:
+        """The rest: what more a drive has."""
+        low, high = belt.speed_limits
+        short_name = name.rpartition("/")[2]
+        super().__init__(
+            name,
+            [Signal(f"{name}/speed", "m/s", "number"), Signal(f"{name}/bottles", "1", "count"), *signals],
+            [Command(speed_command(short_name), "m/s", "number", low, high), *commands],
+            faults,
+        )
+        self._index = setup.index("belts", short_name)
+        self._speed_command = speed_command(short_name)
+        timeout = belt.watchdog
+        self.watchdog = None if timeout is None else Watchdog(max(1, math.ceil(timeout / setup.scene.tick - 1e-9)))
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Take a setpoint, m/s."""
+        now.setpoints[self._index] = value
+        if self.watchdog is not None:
+            self.watchdog.command(now.tick)
+
+    def watch(self, now: ScanContext) -> str:
+        """The name of its setpoint if its controller has gone silent and it stops at this tick, "" if not."""
+        if self.watchdog is None or not self.watchdog.trips(now.tick):
+            return ""
+        now.setpoints[self._index] = 0.0
+        return self._speed_command
+
+    def begin(self, now: ScanContext) -> None:
+        """Run as commanded."""
+        now.speeds[self._index] = now.setpoints[self._index]
+
+    def speed(self, now: ScanContext) -> float:
+        """The speed that it has, m/s."""
+        return float(now.speeds[self._index])
+
+    def wanted(self, now: ScanContext) -> float:
+        """The speed that it is told to run at, m/s."""
+        return float(now.setpoints[self._index])
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Speed, m/s, and bottles on it."""
+        return now.speeds[self._index], float(np.count_nonzero(now.carriers() == self._index))

@@ -1,0 +1,34 @@
+"""Counters: bottles whose axis passes over a line, by direction."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from conveyor_sim.line.crossing import CrossingLine
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.counter import Counter
+
+
+class CounterDevice(Device):
+    """One counter while it runs."""
+
+    def __init__(self, name: str, counter: Counter, setup: Setup) -> None:
+        super().__init__(name, [Signal(f"{name}/{way}", "1", "count") for way in ("forward", "backward")])
+        self._line = CrossingLine(counter.from_, counter.to)
+        self.forward = self.backward = 0
+
+    def begin(self, now: ScanContext) -> None:
+        """See where the bottles start."""
+        self._line.begin(now)
+
+    def end(self, now: ScanContext) -> None:
+        """Count the passages of this tick; a bottle that comes to the line and goes back within it makes none."""
+        forward = self._line.end(now).forward
+        self.forward += int(np.count_nonzero(forward))
+        self.backward += int(np.count_nonzero(~forward))
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As its signals are listed."""
+        return self.forward, self.backward

@@ -1,0 +1,85 @@
+"""Drives: a belt that ramps to its setpoint, runs, reverses, trips and is reset, and counts its travel."""
+
+import math
+from collections.abc import Sequence
+
+from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.edge import RisingEdge
+from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.ramp import Ramp
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
+from conveyor_sim.scene.drives import Drive
+
+AT_SPEED = 1e-9
+"""m/s, between setpoint and speed."""
+
+
+class DriveDevice(BeltDevice):
+    """One belt with a drive while it runs. It runs at the start, at the speed of the scene.
+
+    A trip stops it, at its ramp, until the fault is gone and `reset` has risen since.
+    """
+
+    def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
+        signals = [Signal(f"{name}/{what}", "1", "bool") for what in ("running", "at_speed", "fault")]
+        if drive.pulses_per_metre is not None:
+            signals.append(Signal(f"{name}/pulses", "1", "count"))
+        commands = [switch(f"{name}/{what}") for what in ("run", "reverse", "reset")]
+        super().__init__(name, belt, setup, signals, commands, [switch(f"{name}/trip")])
+        self._drive = drive
+        self.ramp = Ramp(belt.speed)
+        self.run = True
+        self.reverse = False
+        self.reset = RisingEdge()
+        self.trip = False
+        self.tripped = False
+        self.travel = 0.0
+        """m, forward less backward."""
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Take a setpoint (m/s), run, reverse, reset, or the fault trip."""
+        what = name.removeprefix(f"{self.name}/")
+        if what == "run":
+            self.run = value != 0.0
+        elif what == "reverse":
+            self.reverse = value != 0.0
+        elif what == "reset":
+            if self.reset.rises(value) and not self.trip:
+                self.tripped = False
+        elif what == "trip":
+            self.trip = value != 0.0
+            self.tripped = self.tripped or self.trip
+        else:
+            super().command(name, value, now)
+
+    def begin(self, now: ScanContext) -> None:
+        """Ramp for a tick."""
+        drive = self._drive
+        now.speeds[self._index] = self.ramp.approach(self.wanted(now), drive.acceleration, drive.jerk, now.length)
+
+    def end(self, now: ScanContext) -> None:
+        """Count what was travelled in the tick."""
+        if now.tick > 0:
+            self.travel += self.ramp.value * now.length
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As a belt, then running, at_speed, fault, and pulses."""
+        at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
+        values = [*super().values(now), self.run and not self.tripped, at_speed, self.tripped]
+        if self._drive.pulses_per_metre is not None:
+            values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
+        return values
+
+    def wanted(self, now: ScanContext) -> float:
+        """The speed that it is told to run at, m/s: none while it is stopped or tripped."""
+        if not self.run or self.tripped:
+            return 0.0
+        setpoint = float(now.setpoints[self._index])
+        return -setpoint if self.reverse else setpoint
+
+
+def belt_device(name: str, belt: StraightBelt | CurvedBelt, setup: Setup) -> BeltDevice:
+    """A belt, with a drive if it has one."""
+    return BeltDevice(name, belt, setup) if belt.drive is None else DriveDevice(name, belt, belt.drive, setup)

@@ -1,0 +1,85 @@
+"""Indicators: flow, jam, starved and blocked of an exit, from what its sensors tell."""
+
+import math
+from collections.abc import Sequence
+
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.devices.counter import CounterDevice
+from conveyor_sim.line.devices.zone import ZoneDevice
+from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.indicator import Indicator
+
+STANDS = 1e-3
+"""m/s; a slower belt stands."""
+
+HOUR = 3600.0
+"""s."""
+
+
+class IndicatorDevice(Device):
+    """One exit while it runs. Its times are counted in ticks."""
+
+    recent: list[int]
+    """Ticks of the passages within the window."""
+
+    def __init__(self, name: str, indicator: Indicator, setup: Setup) -> None:
+        downstream, backup, tick = indicator.downstream, indicator.backup, setup.scene.tick
+        self._can_block = downstream is not None or backup is not None
+        kinds = ["jam", "starved", *(["blocked"] if self._can_block else [])]
+        super().__init__(
+            name,
+            [Signal(f"{name}/flow", "1/h", "number"), *(Signal(f"{name}/{kind}", "1", "bool") for kind in kinds)],
+        )
+        self._counter = setup.device(CounterDevice, f"counters/{indicator.counter}")
+        self._zone = setup.device(ZoneDevice, f"zones/{indicator.zone}")
+        self._belt = setup.device(BeltDevice, f"belts/{indicator.belt}")
+        self._downstream = None if downstream is None else setup.device(BeltDevice, f"belts/{downstream}")
+        self._backup = None if backup is None else setup.device(ZoneDevice, f"zones/{backup}")
+        starved_time = indicator.jam_time if indicator.starved_time is None else indicator.starved_time
+        self._jam_ticks, self._starved_ticks = _ticks(indicator.jam_time, tick), _ticks(starved_time, tick)
+        self._window, self._window_ticks = indicator.window, _ticks(indicator.window, tick)
+        self.passed = 0
+        """Bottles out, less those back in, at most so far: one that shakes on the line passes once."""
+        self.recent = []
+        self.stuck = 0
+        """Ticks for which nothing has left that could have."""
+        self.empty = 0
+        """Ticks for which nothing was there to leave."""
+        self.jam = self.starved = self.blocked = False
+
+    def end(self, now: ScanContext) -> None:
+        """Judge this tick."""
+        if now.tick == 0:
+            return
+        out = self._counter.forward - self._counter.backward
+        more = max(0, out - self.passed)
+        self.passed += more
+        oldest = now.tick - self._window_ticks
+        self.recent = [tick for tick in self.recent if tick > oldest] + [now.tick] * more
+        waits, runs = self._zone.count(now) > 0, _runs(self._belt, now)
+        wants = runs or self._belt.wanted(now) != 0.0
+        held = (self._downstream is not None and not _runs(self._downstream, now)) or (
+            self._backup is not None and self._backup.full(now)
+        )
+        self.blocked = bool(waits and wants and held)
+        self.stuck = 0 if more or not waits or not runs or self.blocked else self.stuck + 1
+        # A jam is not cleared by stopping the belt.
+        self.jam = self.stuck >= self._jam_ticks or (self.jam and waits and not more)
+        self.empty = self.empty + 1 if runs and not waits else 0
+        self.starved = self.empty >= self._starved_ticks
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As its signals are listed."""
+        flow = len(self.recent) * HOUR / self._window
+        return flow, self.jam, self.starved, *((self.blocked,) if self._can_block else ())
+
+
+def _runs(belt: BeltDevice, now: ScanContext) -> bool:
+    return abs(belt.speed(now)) >= STANDS
+
+
+def _ticks(seconds: float, tick: float) -> int:
+    """The first tick at which so much time has passed."""
+    return max(1, math.ceil(seconds / tick - 1e-9))

@@ -1,0 +1,160 @@
+"""Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate; never onto another bottle."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.entry import CLEAR, Quality
+from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import JITTER, QUALITY, Setup
+from conveyor_sim.scene.parts.infeed import Infeed
+from conveyor_sim.state import State
+
+ROUNDING = 1e-9
+"""s; sums of 1 / rate must not miss the tick they fall on."""
+
+LATE = 2.0
+"""Of the time a bottle takes to enter from a moving in-line: after that without one, the infeed is blocked."""
+
+
+class InfeedDevice(Device):
+    """One infeed while it runs."""
+
+    def __init__(self, name: str, infeed: Infeed, setup: Setup) -> None:
+        super().__init__(name, [Signal(f"{name}/fed", "1", "count", "fed"), Signal(f"{name}/blocked", "1", "bool")])
+        self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
+        self._radius = self._entry.radius
+        index = setup.index("infeeds", name.rpartition("/")[2])
+        self._direction = (math.cos(infeed.direction), math.sin(infeed.direction))
+        self.random = setup.random(JITTER, index)
+        self.quality = Quality(infeed.bad_share, infeed.bad_every, setup.random(QUALITY, index))
+        self.fed = 0
+        self.blocked = False
+        self.blocked_ticks = 0
+        self.last = -1
+        """Id of the bottle fed last."""
+        self.due = infeed.start
+        """s: when the next bottle is due (rate), or when the last one entered (gap)."""
+        self.extra = 0.0
+        """m or s, jitter of the next bottle's place in the in-line."""
+        self.offset = 0.0
+        """m, lateral jitter of the next bottle."""
+        self._draw()
+
+    def feed(self, now: ScanContext) -> None:
+        """Let in what is due."""
+        if now.time < self._infeed.start:
+            return
+        entered = True
+        self.blocked = False
+        while entered and not self._empty():
+            packed = self._infeed.gap is not None
+            entered = self._feed_packed(now) if packed else self._feed_rate(now)
+        self.blocked_ticks += self.blocked
+
+    def _empty(self) -> bool:
+        return self._infeed.count is not None and self.fed >= self._infeed.count
+
+    def _feed_packed(self, now: ScanContext) -> bool:
+        """The in-line moves with its last bottle: the next one enters a pitch behind it."""
+        state, time = now.state, now.time
+        pitch = 2.0 * self._radius + (self._infeed.gap or 0.0)
+        advance = self._infeed.speed * now.length
+        ahead = 0.0
+        if self.fed:
+            ahead = self._progress(state, time) - pitch - self.extra * self._infeed.speed
+            if ahead < 0.0:
+                self.blocked = self._late(time, pitch)
+                return False
+            # Past one tick's travel the last bottle no longer pulls the in-line behind it.
+            ahead = self._way_to_rails(state, min(ahead, advance))
+        if not self._enter(now, ahead):
+            self.blocked = self._late(time, pitch)
+            return False
+        self.due = time
+        return True
+
+    def _progress(self, state: State, time: float) -> float:
+        """How far the bottle fed last has come along the in-line, m; one that is gone goes on at its speed."""
+        slot = np.flatnonzero(state.world.bottles.id == self.last)
+        if not slot.size:
+            return self._infeed.speed * (time - self.due)
+        dx = float(state.world.bottles.x[slot[0]]) - self._infeed.position[0]
+        dy = float(state.world.bottles.y[slot[0]]) - self._infeed.position[1]
+        return dx * self._direction[0] + dy * self._direction[1]
+
+    def _way_to_rails(self, state: State, most: float) -> float:
+        """How far ahead of its place a bottle can be, up to `most` (m), before it meets a rail that stands there."""
+        ways = np.linspace(0.0, most, 2 + int(2.0 * most / self._radius))
+        clear = self._clear_of_rails(state, ways)
+        if clear.all():
+            return most
+        # Rails that it only slides along do not hold it up.
+        first = int(np.argmin(clear))
+        low, high = float(ways[max(0, first - 1)]), float(ways[first])
+        while high - low > CLEAR:
+            middle = 0.5 * (low + high)
+            if self._clear_of_rails(state, np.array([middle]))[0]:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _clear_of_rails(self, state: State, ways: F8) -> NDArray[np.bool_]:
+        """Whether a bottle that far ahead of its place is in no rail; ways: (n,), m."""
+        places = np.array([self._place(float(way)) for way in ways])
+        clear = np.ones(ways.size, dtype=bool)
+        for rail in state.rails():
+            for piece in rail.pieces:
+                clear &= piece.distance(places) >= self._radius - CLEAR
+        return clear
+
+    def _place(self, ahead: float) -> tuple[float, float]:
+        """Where the next bottle is, that far along the in-line, m."""
+        along, across = self._direction, (-self._direction[1], self._direction[0])
+        x = self._infeed.position[0] + ahead * along[0] + self.offset * across[0]
+        y = self._infeed.position[1] + ahead * along[1] + self.offset * across[1]
+        return x, y
+
+    def _late(self, time: float, pitch: float) -> bool:
+        if self._infeed.speed == 0.0:
+            return self.fed > 0
+        return time - self.due > LATE * (pitch / self._infeed.speed + self.extra)
+
+    def _feed_rate(self, now: ScanContext) -> bool:
+        rate, time = self._infeed.rate or 0.0, now.time
+        if time < self.due + self.extra - ROUNDING:
+            return False
+        if not self._enter(now, 0.0):
+            self.blocked = True
+            # A bottle that has to wait shifts the ones behind it: a line does not catch up by itself.
+            self.due = time - self.extra
+            return False
+        self.due += 1.0 / rate
+        return True
+
+    def _enter(self, now: ScanContext, ahead: float) -> bool:
+        x, y = self._place(ahead)
+        if not self._entry.has_room(now.state, x, y):
+            return False
+        self.last = self._entry.enter(now.state, x, y)
+        self.quality.judge(self.last, now)
+        self.fed += 1
+        self._draw()
+        return True
+
+    def _draw(self) -> None:
+        """Jitter of the next bottle. Packed bottles can only be late; timed ones may be early too."""
+        timing, lateral = self._infeed.timing_jitter, self._infeed.lateral_jitter
+        if timing:
+            self.extra = float(self.random.uniform(0.0 if self._infeed.gap is not None else -timing, timing))
+        if lateral:
+            self.offset = float(self.random.uniform(-lateral, lateral))
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Bottles fed so far, and whether one waits for room."""
+        return self.fed, self.blocked

@@ -1,0 +1,39 @@
+"""Inspections: machines that see which of the bottles that pass are bad."""
+
+from collections.abc import Sequence
+
+from conveyor_sim.line.crossing import CrossingLine
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.inspection import Inspection
+
+
+class InspectionDevice(Device):
+    """One inspection while it runs."""
+
+    def __init__(self, name: str, inspection: Inspection, setup: Setup) -> None:
+        counts = [Signal(f"{name}/{what}", "1", "count") for what in ("count", "bad")]
+        times = [Signal(f"{name}/{what}", "s", "number") for what in ("time", "bad_time")]
+        super().__init__(name, [*counts, *times])
+        self._line = CrossingLine(inspection.from_, inspection.to)
+        self.count = self.bad = 0
+        self.time = self.bad_time = 0.0
+        """s, when the last bottle passed, and the last bad one."""
+
+    def begin(self, now: ScanContext) -> None:
+        """Note where the bottles are."""
+        self._line.begin(now)
+
+    def end(self, now: ScanContext) -> None:
+        """Look at those that passed."""
+        passages = self._line.end(now)
+        for bottle, time, forward in zip(passages.id, passages.time, passages.forward, strict=True):
+            if forward:
+                self.count, self.time = self.count + 1, float(time)
+                if int(bottle) in now.bad:
+                    self.bad, self.bad_time = self.bad + 1, float(time)
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Bottles that passed, bad ones among them, and when the last of each did (s)."""
+        return self.count, self.bad, self.time, self.bad_time

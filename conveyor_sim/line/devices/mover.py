@@ -1,0 +1,105 @@
+"""Gates, pushers and diverters: rails that go to and fro on command, with end switches."""
+
+from collections.abc import Sequence
+
+from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
+from conveyor_sim.line.course import course_to, later, position_at, resting
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.movers import Mover as MoverPart
+
+WORDS = {
+    "gates": ("open", "is_closed", "is_open"),
+    "pushers": ("push", "retracted", "extended"),
+    "diverters": ("divert", "at_home", "diverting"),
+}
+"""By kind: the command, and the end switches at home and at the end of the stroke."""
+
+SWITCHED = 1e-3
+"""Of the stroke: within it of an end that end's switch is on, within it of its course it is not blocked."""
+
+
+class Mover(Device):
+    """One rail that moves: to the end of its stroke while its command is on, home while it is off.
+
+    While it is jammed it stands where it was; it goes on when it is free again. Where bottles are too much for its
+    drive, it is held up or goes back, and goes on from where it is.
+    """
+
+    def __init__(self, name: str, part: MoverPart, setup: Setup) -> None:
+        shapes = setup.model.moving_shapes
+        number = [shape.name for shape in shapes].index(name)
+        shape = shapes[number]
+        order, home, away = WORDS[name.split("/")[0]]
+        super().__init__(
+            name,
+            (
+                Signal(f"{name}/position", "1", "number"),
+                Signal(f"{name}/{home}", "1", "bool"),
+                Signal(f"{name}/{away}", "1", "bool"),
+                Signal(f"{name}/blocked", "1", "bool"),
+            ),
+            (switch(f"{name}/{order}"),),
+            (switch(f"{name}/jammed"),),
+        )
+        self._number, self._shape = number, shape
+        self.target = self.position = shape.first
+        """m or rad."""
+        self.speed = 0.0
+        self.jammed = False
+        self.course = resting(shape.first)
+        self.since = 0
+        """Tick at which the course began."""
+        self.limited = False
+        """Whether its drive could not keep it on its course all through the last tick."""
+        self.blocked = False
+        """From when its drive can't keep it near its course, until it has kept that for a tick."""
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Go to the other end, jam or be free again, from where it is on."""
+        if name == self.faults[0].name:
+            self.jammed = value != 0.0
+        else:
+            self.target = self._shape.stroke if value != 0.0 else 0.0
+        self.since = now.tick
+        if self.jammed:
+            self.course = resting(self.position)
+        else:
+            shape = self._shape
+            speed = self.speed
+            self.course = course_to(self.position, speed, self.target, shape.max_speed, shape.acceleration)
+
+    def begin(self, now: ScanContext) -> None:
+        """Tell the engine where the rail is in the steps of this tick."""
+        rails, number = self._rails(now), self._number
+        rails.course[number] = later(self.course, (now.tick - self.since) * now.length)
+        if (actuators := rails.actuators) is not None:
+            actuators.left[number] = 0
+            if self.jammed:
+                actuators.mode[number] = HELD
+            elif actuators.mode[number] == HELD:
+                actuators.mode[number] = ON_PROFILE
+
+    def end(self, now: ScanContext) -> None:
+        """See where it is, and where it is going if its drive was held up."""
+        rails, number = self._rails(now), self._number
+        self.position, self.speed = float(rails.position[number]), float(rails.speed[number])
+        if (actuators := rails.actuators) is None:
+            return
+        self.limited = bool(actuators.left[number])
+        if self.limited:
+            self.course, self.since = rails.course[number].copy(), now.tick - 1
+        away = abs(self.position - position_at(self.course, (now.tick - self.since) * now.length))
+        held_up = bool(actuators.mode[number] == OFF_PROFILE) and away > SWITCHED * self._shape.stroke
+        self.blocked = held_up or (self.blocked and self.limited)
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Position from 0, at home, to 1, both end switches, and whether it is blocked."""
+        share = min(1.0, max(0.0, self.position / self._shape.stroke))
+        return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED), float(self.blocked)
+
+    def _rails(self, now: ScanContext) -> MovingRails:
+        moving = now.state.world.moving
+        assert moving is not None
+        return moving

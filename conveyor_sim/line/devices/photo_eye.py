@@ -1,0 +1,148 @@
+"""Photo-eyes: a beam, what can go wrong with it, and the delays after which it is believed."""
+
+from collections.abc import Sequence
+
+from conveyor_sim.line.beam import ROUNDING, Beams, Span
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.motion import Motion
+from conveyor_sim.line.process_image import Command, Signal, switch
+from conveyor_sim.line.setup import PHOTO_EYES, Setup
+from conveyor_sim.line.timer import Edge, Timer
+from conveyor_sim.scene.parts.photo_eye import PhotoEye
+
+FASTEST_CHATTER, LONGEST_DELAY = 1000.0, 60.0
+"""Hz and s, that can be injected."""
+
+
+class PhotoEyeDevice(Device):
+    """One photo-eye: beam, chatter, stuck, late by a delay, debounced; then on-delay and off-delay, in this order."""
+
+    late: tuple[Edge, ...]
+    """Edges that have not come through yet."""
+
+    def __init__(self, name: str, eye: PhotoEye, setup: Setup) -> None:
+        eyes = setup.scene.photo_eyes
+        motion = setup.shared(Motion, Motion)
+        beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()], motion))
+        index = setup.index("photo_eyes", name.rpartition("/")[2])
+        super().__init__(
+            name,
+            [
+                Signal(f"{name}/blocked", "1", "bool"),
+                Signal(f"{name}/rose", "s", "number"),
+                Signal(f"{name}/fell", "s", "number"),
+                Signal(f"{name}/edges", "1", "count"),
+            ],
+            (),
+            [
+                switch(f"{name}/stuck_on"),
+                switch(f"{name}/stuck_off"),
+                Command(f"{name}/chatter", "Hz", "number", 0.0, FASTEST_CHATTER),
+                Command(f"{name}/delay", "s", "number", 0.0, LONGEST_DELAY),
+            ],
+        )
+        self._beams, self._index, self._debounce = beams, index, eye.debounce
+        self.random = setup.random(PHOTO_EYES, index)
+        self.stuck_on = self.stuck_off = False
+        self.chatter = 0.0
+        """Hz: full cycles a second."""
+        self.delay = 0.0
+        """s."""
+        self.beam = False
+        """Whether a bottle is in the beam."""
+        self.flipped = False
+        """Whether chatter shows the opposite."""
+        self.next_flip = 0.0
+        """s: when chatter turns over next."""
+        self.level = False
+        """What it shows before delays."""
+        self.late = ()
+        self.debounced = Timer(eye.debounce, eye.debounce)
+        self.delayed = Timer(eye.on_delay, eye.off_delay)
+        self.rose = self.fell = 0.0
+        """s: when the beam was last broken and last freed, by the edges that passed the debounce."""
+        self.edges = 0
+
+    @property
+    def blocked(self) -> bool:
+        """What it tells."""
+        return self.delayed.output
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Go wrong, or right again, from this tick on."""
+        fault = name.rpartition("/")[2]
+        setattr(self, fault, bool(value) if fault.startswith("stuck") else float(value))
+        if fault == "chatter":
+            self.flipped = False
+            self.next_flip = now.time
+            self._draw()
+
+    def end(self, now: ScanContext) -> None:
+        """See what happened in this tick."""
+        spans = self._beams.spans(self._index)
+        if now.tick == 0:
+            self.beam = self.level = bool(spans)
+            self.debounced.start(self.level)
+            self.delayed.start(self.level)
+            return
+        begin, time = (now.tick - 1) * now.state.model.tick_ns * 1e-9, now.time
+        changes: list[tuple[float, bool | None]] = [(begin + at, level) for at, level in self._beam(spans, now.length)]
+        changes += [(at, None) for at in self._flips(time)]
+        self._show(begin)
+        for at, level in sorted(changes, key=lambda change: change[0]):
+            if level is None:
+                self.flipped = not self.flipped
+            else:
+                self.beam = level
+            self._show(at)
+        through = [edge for edge in self.late if edge[0] <= time + ROUNDING]
+        self.late = self.late[len(through) :]
+        seen = self.debounced.follow(through, time)
+        for at, level in seen:
+            self.edges += 1
+            if level:
+                self.rose = at - self._debounce
+            else:
+                self.fell = at - self._debounce
+        self.delayed.follow(seen, time)
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As its signals are listed."""
+        return self.blocked, self.rose, self.fell, self.edges
+
+    def _beam(self, spans: Sequence[Span], length: float) -> list[Edge]:
+        """Edges of the beam in a tick, s from its begin on; bottles that came or went between ticks did so at once."""
+        edges: list[Edge] = []
+        level = self.beam
+        if level and (not spans or spans[0][0] > ROUNDING):
+            level = False
+            edges.append((0.0, False))
+        for enter, leave in spans:
+            if not level:
+                level = True
+                edges.append((enter, True))
+            if leave < length - ROUNDING:
+                level = False
+                edges.append((leave, False))
+        return edges
+
+    def _flips(self, time: float) -> list[float]:
+        """When up to a time chatter turns over, s."""
+        flips = []
+        while self.chatter > 0.0 and self.next_flip <= time:
+            flips.append(self.next_flip)
+            self._draw()
+        return flips
+
+    def _draw(self) -> None:
+        """Half a cycle of chatter, half as long or as long again."""
+        if self.chatter > 0.0:
+            self.next_flip += float(self.random.uniform(0.5, 1.5)) * 0.5 / self.chatter
+
+    def _show(self, at: float) -> None:
+        """Note what the eye makes of beam and faults from a time on; edges never overtake each other."""
+        level = self.stuck_on or (not self.stuck_off and self.beam != self.flipped)
+        if level != self.level:
+            self.level = level
+            after = self.late[-1][0] if self.late else 0.0
+            self.late += ((max(at + self.delay, after), level),)

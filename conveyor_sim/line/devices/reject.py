@@ -1,0 +1,64 @@
+"""Rejects: machines that throw out the bottle that is before them when they are fired."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.edge import RisingEdge
+from conveyor_sim.line.polygon import in_polygon
+from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.reject import Reject
+
+
+class RejectDevice(Device):
+    """One reject while it runs."""
+
+    strokes: tuple[float, ...]
+    """s, when the strokes that are still to hit began or begin."""
+
+    def __init__(self, name: str, reject: Reject, setup: Setup) -> None:
+        names = ("rejected_bad", "rejected_good", "missed")
+        signals = [Signal(f"{name}/rejected", "1", "count", "rejected")]
+        signals += [Signal(f"{name}/{what}", "1", "count") for what in names]
+        super().__init__(name, signals, [switch(f"{name}/fire")], [switch(f"{name}/stop")])
+        self._reject = reject
+        self._corners = np.array(reject.region)
+        self.fire = RisingEdge()
+        self.stop = False
+        self.strokes = ()
+        self.removed = 0
+        self.removed_bad = 0
+        self.missed = 0
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Take fire, which counts as it rises, or the fault stop."""
+        if name.endswith("/stop"):
+            self.stop = value != 0.0
+        elif self.fire.rises(value) and not self.stop:
+            self.strokes = (*self.strokes, now.time + self._reject.delay)
+
+    def take(self, now: ScanContext) -> None:
+        """Throw out one bottle a stroke, within its window."""
+        if not self.strokes:
+            return
+        bottles = now.state.world.bottles
+        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
+        targets = sorted((int(bottles.id[slot]), int(slot)) for slot in np.flatnonzero(inside))
+        left = []
+        for stroke in self.strokes:
+            if now.time >= stroke - 1e-9 and targets:
+                bottle, slot = targets.pop(0)
+                now.state.remove(slot)
+                self.removed += 1
+                self.removed_bad += bottle in now.bad
+            elif now.time >= stroke + self._reject.window - 1e-9:
+                self.missed += 1
+            else:
+                left.append(stroke)
+        self.strokes = tuple(left)
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Rejected, bad and good ones among them, and strokes that hit nothing."""
+        return self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed

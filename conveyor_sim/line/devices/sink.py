@@ -1,0 +1,58 @@
+"""Sinks: machines downstream that take one bottle after another at a rate, and are starved where none waits."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from conveyor_sim.line.device import ScanContext
+from conveyor_sim.line.machine import MachineDevice
+from conveyor_sim.line.polygon import in_polygon
+from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.sink import Sink
+
+
+class SinkDevice(MachineDevice):
+    """One sink while it runs. Starved: it would take a bottle, and none is in its region."""
+
+    waiting: tuple[int, ...]
+    """Ids of the bottles in the region, in the order of their arrival."""
+
+    def __init__(self, name: str, sink: Sink, setup: Setup) -> None:
+        signals = [
+            Signal(f"{name}/taken", "1", "count", "removed"),
+            Signal(f"{name}/taken_bad", "1", "count"),
+            Signal(f"{name}/starved", "1", "bool"),
+            Signal(f"{name}/starved_time", "s", "number"),
+        ]
+        super().__init__(name, sink.rate, sink.rate_limit, signals)
+        self._corners = np.array(sink.region)
+        self.waiting = ()
+        self.removed = 0
+        self.removed_bad = 0
+        self.starved = False
+        self.starved_ticks = 0
+
+    def take(self, now: ScanContext) -> None:
+        """Take the bottle that has waited longest, if one is due."""
+        bottles = now.state.world.bottles
+        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
+        slot_of = {int(bottles.id[slot]): int(slot) for slot in np.flatnonzero(inside)}
+        stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
+        self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
+        due = self.turn(now)
+        self.starved = due and not self.waiting
+        if self.starved:
+            self.starved_ticks += 1
+            self.wait()
+        elif due:
+            first, *others = self.waiting
+            now.state.remove(slot_of[first])
+            self.waiting = tuple(others)
+            self.removed += 1
+            self.removed_bad += first in now.bad
+            self.cycle -= 1.0
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Running, taken, taken_bad, starved, starved_time (s)."""
+        return self.runs, self.removed, self.removed_bad, self.starved, self.starved_ticks * now.length

@@ -1,0 +1,36 @@
+"""Spills: bottles that a test has dropped onto the line."""
+
+from collections.abc import Sequence
+
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.edge import RisingEdge
+from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.spill import Spill
+
+
+class SpillDevice(Device):
+    """One place of spills: each rise of its fault drops a bottle, as soon as there is room."""
+
+    def __init__(self, name: str, spill: Spill, setup: Setup) -> None:
+        super().__init__(name, [Signal(f"{name}/dropped", "1", "count", "fed")], faults=[switch(f"{name}/drop")])
+        self._spill, self._entry = spill, setup.entry(spill.bottle, 0.0, 0.0)
+        self.drop = RisingEdge()
+        self.due = 0
+        self.fed = 0
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Take the fault drop."""
+        if self.drop.rises(value) and self.fed + self.due < self._spill.count:
+            self.due += 1
+
+    def feed(self, now: ScanContext) -> None:
+        """Drop the bottles that are due."""
+        while self.due and self._entry.has_room(now.state, *self._spill.position):
+            self._entry.enter(now.state, *self._spill.position)
+            self.due -= 1
+            self.fed += 1
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """Bottles dropped so far."""
+        return (self.fed,)

@@ -1,0 +1,48 @@
+"""Zones: how many bottles have their axis in a region, and whether it is full."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.polygon import in_polygon
+from conveyor_sim.line.process_image import Command, Signal
+from conveyor_sim.line.setup import Setup
+from conveyor_sim.scene.parts.zone import Zone
+
+MOST_OFFSET = 1000.0
+"""Bottles, that can be injected."""
+
+
+class ZoneDevice(Device):
+    """One zone while it runs."""
+
+    def __init__(self, name: str, zone: Zone, setup: Setup) -> None:
+        signals = [Signal(f"{name}/bottles", "1", "count"), Signal(f"{name}/density", "1/m^2", "number")]
+        if zone.full_at is not None:
+            signals.append(Signal(f"{name}/full", "1", "bool"))
+        super().__init__(name, signals, (), [Command(f"{name}/offset", "1", "count", -MOST_OFFSET, MOST_OFFSET)])
+        self._corners, self._full_at = np.array(zone.region), zone.full_at
+        x, y = self._corners.T
+        self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+        self.offset = 0
+
+    def command(self, name: str, value: float, now: ScanContext) -> None:
+        """Count wrongly from this tick on."""
+        self.offset = int(value)
+
+    def count(self, now: ScanContext) -> int:
+        """Bottles that it shows now; never less than none."""
+        bottles = now.state.world.bottles
+        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
+        return max(0, int(np.count_nonzero(inside)) + self.offset)
+
+    def full(self, now: ScanContext) -> bool:
+        """Whether its back-up switch is on; False without one."""
+        return self._full_at is not None and self.count(now) >= self._full_at
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        """As its signals are listed."""
+        count = self.count(now)
+        full = () if self._full_at is None else (count >= self._full_at,)
+        return count, count / self._area, *full

@@ -1,0 +1,54 @@
+"""`Setup`: what a device is made from, beside its part of the scene."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from conveyor_sim.line.device import Device
+from conveyor_sim.line.entry import Entry
+from conveyor_sim.model import Model
+from conveyor_sim.scene.schema import Scene
+
+JITTER, QUALITY, MACHINES, PHOTO_EYES = (), (1,), (2,), (3,)
+"""Branches of random streams: what infeeds draw of places and of bad bottles, what machines draw, chatter."""
+
+D = TypeVar("D", bound=Device)
+
+
+class Setup:
+    """A scene, its model, and the devices made so far."""
+
+    def __init__(self, scene: Scene, model: Model) -> None:
+        self.scene, self.model = scene, model
+        self.devices: dict[str, Device] = {}
+        """By name, in the order in which they act."""
+
+    def device(self, kind: type[D], name: str) -> D:
+        """A device made before, `zones/exit`. KeyError if there is none."""
+        found = self.devices[name]
+        assert isinstance(found, kind)
+        return found
+
+    def shared(self, kind: type[D], make: Callable[[], D]) -> D:
+        """The one device of a kind that several rest on; the first that asks has it made, and it acts before them."""
+        for device in self.devices.values():
+            if isinstance(device, kind):
+                return device
+        made = make()
+        self.devices[made.name] = made
+        return made
+
+    def index(self, field: str, name: str) -> int:
+        """The place of a part in its field of the scene, from 0."""
+        return list(getattr(self.scene, field)).index(name)
+
+    def entry(self, bottle: str, direction: float, speed: float) -> Entry:
+        """Where bottles of a type enter in a direction (rad) at a speed (m/s)."""
+        kind = self.model.bottle_types.index(bottle)
+        return Entry(kind, float(self.model.type_radius[kind]), direction, speed)
+
+    def random(self, branch: tuple[int, ...], index: int) -> np.random.Generator:
+        """A random stream of its own."""
+        seed = np.random.SeedSequence(self.scene.seed, spawn_key=(*branch, index))
+        return np.random.Generator(np.random.PCG64(seed))

@@ -1,0 +1,67 @@
+"""Infeeds of a scene file."""
+
+import math
+from collections.abc import Iterator
+from typing import ClassVar
+
+from conveyor_sim.scene.parts.device_part import Entry, Others
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.types import XY, Angle, Count, Name, NotNegative, Point, Positive, Share, quantity
+from conveyor_sim.scene.words import shown
+
+
+class Infeed(Entry):
+    """A place where bottles enter, one behind the other."""
+
+    KIND: ClassVar[str] = "infeed"
+
+    bottle: Name = quantity("Bottle type.")
+    position: Point = quantity("Where a bottle's axis appears.", "m")
+    direction: Angle = quantity("Direction of its velocity.", "rad")
+    speed: NotNegative = quantity("Its speed at first, along `direction`.", "m/s")
+    count: Count | None = quantity("How many bottles enter. Left out: without end.", "1", default=None)
+    gap: NotNegative | None = quantity(
+        "Clear distance to the bottle before it, in a tightly packed in-line. Or give `rate`.", "m", default=None
+    )
+    rate: Positive | None = quantity("Bottles a second. Or give `gap`.", "1/s", default=None)
+    start: NotNegative = quantity("When the first bottle enters.", "s", default=0.0)
+    timing_jitter: NotNegative = quantity(
+        "Each bottle is early or late by up to this (with `gap`: late, up to this), drawn evenly from the seed.",
+        "s",
+        default=0.0,
+    )
+    lateral_jitter: NotNegative = quantity(
+        "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
+    )
+    bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
+    bad_every: Count | None = quantity("Every so many-th bottle is bad.", "1", default=None)
+
+    @property
+    def most(self) -> int | None:
+        """Bottles that enter."""
+        return self.count
+
+    @property
+    def heading(self) -> tuple[float, float]:
+        """Direction (rad) and speed (m/s) with which bottles appear."""
+        return self.direction, self.speed
+
+    def births(self) -> tuple[XY, ...]:
+        """The middle and both ends of where bottles appear, m."""
+        (x, y), left = self.position, (-math.sin(self.direction), math.cos(self.direction))
+        sideways = (self.lateral_jitter * left[0], self.lateral_jitter * left[1])
+        return (x - sideways[0], y - sideways[1]), (x, y), (x + sideways[0], y + sideways[1])
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """Ways of feeding that exclude each other, and jitter that would change the order."""
+        if (self.gap is None) == (self.rate is None):
+            given = "neither" if self.gap is None else "both"
+            yield Problem(path, f"{given} of gap and rate given, expected one of them")
+        if self.bad_share and self.bad_every is not None:
+            yield Problem(path, "both of bad_share and bad_every given, expected at most one of them")
+        if self.rate is not None and self.timing_jitter > 0.5 / self.rate:
+            yield Problem(
+                (*path, "timing_jitter"),
+                f"{shown(self.timing_jitter)} given, expected at most half the time between two bottles, "
+                f"{0.5 / self.rate:g} (s), so that they stay in order",
+            )

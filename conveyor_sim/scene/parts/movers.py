@@ -1,0 +1,187 @@
+"""Rails of a scene file that move on command: gates, pushers and diverters. All are straight.
+
+Their drives are taken for pneumatic cylinders at 6 bar, of the bores of ISO 6432: 20 mm at gates that slide, 25 mm at
+pushers, and 25 mm at a crank of 50 mm where rails swing. A bore of 20 mm is that of common stop cylinders for single
+bottles; what rejects and diverts is one size larger.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from pydantic import Tag
+
+from conveyor_sim.scene.part import one_of
+from conveyor_sim.scene.parts.device_part import DevicePart, Others, line_problems
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.types import XY, Angle, Flag, Limit, Name, Point, Positive, quantity
+from conveyor_sim.scene.words import shown
+
+PRESSURE = 6e5
+"""Pa, above that of the air: what compressed air in a plant has."""
+
+
+def cylinder_force(bore: float) -> float:
+    """Force (N) of a cylinder of a bore (m) that pushes, without friction, to a tenth: pi/4 bore^2 times PRESSURE."""
+    return round(0.25 * math.pi * bore**2 * PRESSURE, 1)
+
+
+GATE_FORCE, PUSHER_FORCE = cylinder_force(0.020), cylinder_force(0.025)
+"""188.5 N, 294.5 N."""
+
+CRANK_TORQUE = round(0.05 * PUSHER_FORCE, 1)
+"""14.7 N m."""
+
+
+class _Mover(DevicePart):
+    if TYPE_CHECKING:
+        from_: XY
+        to: XY
+        acceleration: float
+
+    DRIVE: ClassVar[tuple[str, str, str, str, str]]
+    """Names and units: limit of the drive, its unit, mass, its unit, unit of the acceleration."""
+
+    material: Name = quantity("Material, as named in `contacts`.")
+
+    @property
+    def drive_limit(self) -> float | None:
+        """N, or N m: the most that its drive can exert; None: whatever it takes."""
+        limit = getattr(self, self.DRIVE[0])
+        return None if limit == "none" else float(limit)
+
+    @property
+    def drive_mass(self) -> float:
+        """kg, or kg m^2 about its start, of all that moves."""
+        raise NotImplementedError
+
+    def shape_problems(self, path: Path) -> Iterator[Problem]:
+        """A geometry that can't be."""
+        yield from line_problems(path, self.from_, self.to)
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """A geometry that can't be, or a drive that is too weak for its own acceleration."""
+        wrong = list(self.shape_problems(path))
+        yield from wrong
+        force = self.drive_limit
+        if wrong or force is None or self.acceleration * self.drive_mass <= force:
+            return
+        limit, force_unit, mass, mass_unit, unit = self.DRIVE
+        yield Problem(
+            (*path, "acceleration"),
+            f"{shown(self.acceleration)} given, expected at most {force / self.drive_mass:.4g} ({unit}), what a "
+            f"{limit} of {force:g} {force_unit} gives to its {mass} of {self.drive_mass:.4g} {mass_unit}, "
+            f"or {limit}: none",
+        )
+
+
+class _Sliding(_Mover):
+    DRIVE = ("force_limit", "N", "moving_mass", "kg", "m/s^2")
+
+    direction: Angle = quantity("Direction in which it slides, from the x-axis, counter-clockwise.", "rad")
+    stroke: Positive = quantity("How far it slides.", "m")
+    max_speed: Positive = quantity("Its greatest speed.", "m/s")
+    acceleration: Positive = quantity("Acceleration with which it starts, turns round and stops.", "m/s^2")
+    force_limit: Limit = quantity(
+        "The most that its drive can push with; what takes more holds it up, or moves it back. Default: a cylinder of "
+        "20 mm bore at 6 bar (ISO 6432).",
+        "N",
+        default=GATE_FORCE,
+    )
+    moving_mass: Positive = quantity(
+        "Mass of all that slides: rail, carriage and piston rod. It counts only beyond the limit.", "kg", default=1.0
+    )
+
+    @property
+    def drive_mass(self) -> float:
+        """kg."""
+        return self.moving_mass
+
+
+class _Swinging(_Mover):
+    DRIVE = ("torque_limit", "N m", "inertia", "kg m^2", "rad/s^2")
+
+    angle: Angle = quantity("Angle through which it swings about `from`, counter-clockwise if positive.", "rad")
+    max_speed: Positive = quantity("Its greatest angular speed.", "rad/s")
+    acceleration: Positive = quantity("Angular acceleration with which it starts, turns round and stops.", "rad/s^2")
+    torque_limit: Limit = quantity(
+        "The most that its drive can turn with; what takes more holds it up, or moves it back. Default: a cylinder of "
+        "25 mm bore at 6 bar (ISO 6432) at a crank of 50 mm.",
+        "N m",
+        default=CRANK_TORQUE,
+    )
+    inertia: Positive | None = quantity(
+        "Moment of inertia about `from` of all that swings. It counts only beyond the limit. Left out: that of a rod "
+        "of 1 kg, length^2 / 3.",
+        "kg m^2",
+        default=None,
+    )
+
+    @property
+    def drive_mass(self) -> float:
+        """kg m^2."""
+        return math.dist(self.from_, self.to) ** 2 / 3.0 if self.inertia is None else self.inertia
+
+    def shape_problems(self, path: Path) -> Iterator[Problem]:
+        """Ends that coincide, and angles that are none."""
+        yield from super().shape_problems(path)
+        if not 1e-6 <= abs(self.angle) <= 2.0 * math.pi:
+            yield Problem(
+                (*path, "angle"),
+                f"{shown(self.angle)} given, expected an angle of 1e-6 rad up to a full turn, to either side",
+            )
+
+
+class SlidingGate(_Sliding):
+    """A gate or a stop that slides open."""
+
+    KIND: ClassVar[str] = "gate"
+
+    kind: Literal["slide"] = quantity("The kind of gate.")
+    from_: Point = quantity("One end while it is closed.", "m", alias="from")
+    to: Point = quantity("The other end while it is closed.", "m")
+    open: Flag = quantity("Whether it is open at the start.", default=False)
+
+
+class SwingingGate(_Swinging):
+    """A gate or a stop that swings open about its first end."""
+
+    KIND: ClassVar[str] = "gate"
+
+    kind: Literal["swing"] = quantity("The kind of gate.")
+    from_: Point = quantity("The end about which it swings.", "m", alias="from")
+    to: Point = quantity("The other end while it is closed.", "m")
+    open: Flag = quantity("Whether it is open at the start.", default=False)
+
+
+class Pusher(_Sliding):
+    """A straight rail that strokes along a direction, and returns."""
+
+    KIND: ClassVar[str] = "pusher"
+
+    from_: Point = quantity("One end while it is retracted.", "m", alias="from")
+    to: Point = quantity("The other end while it is retracted.", "m")
+    force_limit: Limit = quantity(
+        "The most that its drive can push with; what takes more holds it up, or moves it back. Default: a cylinder of "
+        "25 mm bore at 6 bar (ISO 6432).",
+        "N",
+        default=PUSHER_FORCE,
+    )
+
+
+class Diverter(_Swinging):
+    """A straight rail that swings about its first end into the way of bottles, and returns."""
+
+    KIND: ClassVar[str] = "diverter"
+
+    from_: Point = quantity("The pivot.", "m", alias="from")
+    to: Point = quantity("The other end while it does not divert.", "m")
+
+
+Gate = Annotated[
+    Annotated[SlidingGate, Tag("(slide)")] | Annotated[SwingingGate, Tag("(swing)")],
+    one_of({"slide": "(slide)", "swing": "(swing)"}),
+]
+"""The kinds of gate."""
+
+Mover = SlidingGate | SwingingGate | Pusher | Diverter

@@ -1,0 +1,33 @@
+"""Photo-eyes of a scene file."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+from conveyor_sim.scene.parts.device_part import DevicePart, Mark, Others, line_problems
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.types import NotNegative, Point, quantity
+
+
+class PhotoEye(DevicePart):
+    """A beam across the line: blocked while the outline of a bottle crosses it."""
+
+    KIND: ClassVar[str] = "photo_eye"
+    WORD: ClassVar[str] = "eye"
+
+    from_: Point = quantity("Where the beam begins.", "m", alias="from")
+    to: Point = quantity("Where the beam ends.", "m")
+    debounce: NotNegative = quantity(
+        "Changes that do not last this long are not seen at all, either way; those that do are seen so much later.",
+        "s",
+        default=0.0,
+    )
+    on_delay: NotNegative = quantity("`blocked` comes on once the beam was blocked for so long.", "s", default=0.0)
+    off_delay: NotNegative = quantity("`blocked` goes off once the beam was free for so long.", "s", default=0.0)
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """A beam without length."""
+        yield from line_problems(path, self.from_, self.to)
+
+    def mark(self, name: str) -> Mark:
+        """Its beam."""
+        return self._mark("beam", name, (self.from_, self.to))

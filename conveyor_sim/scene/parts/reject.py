@@ -1,0 +1,17 @@
+"""Rejects of a scene file: machines that throw bottles out."""
+
+from typing import ClassVar, Literal
+
+from conveyor_sim.scene.parts.device_part import Exit
+from conveyor_sim.scene.types import NotNegative, PolygonList, Positive, quantity
+
+
+class Reject(Exit):
+    """A machine that throws the bottle out whose axis is in a region first after it has been fired."""
+
+    KIND: ClassVar[str] = "reject"
+
+    kind: Literal["reject"] = quantity("The kind of machine.")
+    region: PolygonList = quantity("Where it hits a bottle: a simple polygon.", "m")
+    delay: NotNegative = quantity("From the command to the stroke.", "s", default=0.0)
+    window: Positive = quantity("How long the stroke can hit.", "s", default=0.02)

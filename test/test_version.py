@@ -1,0 +1,52 @@
+"""The hash over the sources that decide bits: what goes into it, and what does not."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import conveyor_sim
+
+HASH = "from conveyor_sim.version import sources_hash; print(sources_hash())"
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    """A folder with a copy of the package, to edit."""
+    source = Path(conveyor_sim.__file__).parent
+    shutil.copytree(source, tmp_path / "conveyor_sim", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def hash_of(folder: Path) -> str:
+    """As a new interpreter finds it that imports from a folder."""
+    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", HASH], cwd=folder, env=environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def test_what_decides_bits_changes_the_hash_and_nothing_else_does(copied: Path) -> None:
+    package, before = copied / "conveyor_sim", hash_of(copied)
+
+    def edited(file: str, old: str, new: str) -> str:
+        """The hash with one edit."""
+        source = package / file
+        text = source.read_text()
+        assert old in text, f"{file} has no {old!r}"
+        source.write_text(text.replace(old, new, 1))
+        found = hash_of(copied)
+        source.write_text(text)
+        return found
+
+    assert len(before) == 8
+    assert edited("stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74") != before
+    assert edited("simulation.py", "def state_hash(self", "def bits(self") != before
+    assert edited("stepping/guard/guard.py", "\n\n\n", "\n\n\n# A comment.\n") == before
+    assert edited("cli.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
+    assert edited("plot/style.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
+    assert hash_of(copied) == before
