@@ -17,13 +17,16 @@ class BeltSurfaces:
         shapes = state.model.belt_shapes
         self._centre_radius = [shape.centre_radius if shape.kind == "curved" else math.inf for shape in shapes]
         self._outermost = np.array([shape.outermost for shape in shapes])
+        self.fastest = 0.0
+        """Speed of the fastest point of any belt, m/s."""
 
-    def fastest(self, speeds: F8) -> float:
-        """Speed of the fastest point of any belt, m/s. speeds: along each belt's centre line, (belts,) m/s."""
-        return float(np.max(np.abs(speeds) * self._outermost)) if self._state.model.belts else 0.0
+    def note(self, speeds: F8) -> None:
+        """The belts have these speeds along their centre lines already, (belts,) m/s."""
+        self.fastest = float(np.max(np.abs(speeds) * self._outermost)) if self._state.model.belts else 0.0
 
     def move(self, speeds: F8) -> None:
         """Give each belt its speed along the centre line, (belts,) m/s, and each bottle that of its belt."""
+        self.note(speeds)
         world, surface = self._state.world, self._state.world.surface
         if surface is None or not self._state.model.belts:
             return

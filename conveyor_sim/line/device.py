@@ -92,6 +92,9 @@ class Device:
         """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
         raise NotImplementedError(f"{self.name} takes no commands")
 
+    def wake(self) -> None:
+        """Forget what was only kept to save work: what it remembers was restored."""
+
     def begin(self, now: ScanContext) -> None:
         """Act before the steps of a tick; `now` is the tick that they start from."""
 

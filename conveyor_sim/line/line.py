@@ -50,6 +50,10 @@ class Line:
         self._taking = [device for device in devices if type(device).take is not Device.take]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
         self._counting = [device for device in devices if any(signal.role for signal in device.signals)]
+        self.takes = bool(self._taking) and state.model.has("outfeed")
+        """Whether any device takes bottles off the line."""
+        self.feeds = bool(self._feeding) and state.model.has("infeed")
+        """Whether any device puts bottles onto the line."""
         self.image = ProcessImage(
             tuple(signal for device in devices for signal in device.signals),
             tuple(command for device in devices for command in device.commands),
@@ -80,19 +84,9 @@ class Line:
         return sum(device.blocked_ticks for device in self._devices)
 
     @property
-    def takes(self) -> bool:
-        """Whether any device takes bottles off the line."""
-        return bool(self._taking) and self.now.state.model.has("outfeed")
-
-    @property
-    def feeds(self) -> bool:
-        """Whether any device puts bottles onto the line."""
-        return bool(self._feeding) and self.now.state.model.has("infeed")
-
-    @property
     def fastest_surface(self) -> float:
         """Speed of the fastest point of any belt, m/s."""
-        return self._surfaces.fastest(self.now.speeds)
+        return self._surfaces.fastest
 
     def move_belts(self) -> None:
         """Give the belts' surfaces the speeds that their drives have."""
@@ -136,10 +130,10 @@ class Line:
         for belt in self._belts:
             if name := belt.watch(self.now):
                 self._outcomes.append(CommandOutcome(tick, WATCHDOG, (name,), (0.0,), True, ""))
-        before = self.now.speeds.copy()
+        before = self.now.speeds.tolist()
         for device in self._beginning:
             device.begin(self.now)
-        if not np.array_equal(before, self.now.speeds):
+        if before != self.now.speeds.tolist():
             self.move_belts()
 
     def end(self, tick: int) -> None:
@@ -179,7 +173,7 @@ class Line:
         self.now.tick = other.now.tick
         self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
         self.now.bad = set(other.now.bad)
-        restore(self._by_name(), snapshot(other._by_name()))
+        self._restore_devices(snapshot(other._by_name()))
 
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
@@ -200,8 +194,14 @@ class Line:
         self._outcomes = [CommandOutcome(*told) for told in typed(list[_Outcome], memory["outcomes"], "line.outcomes")]
         speeds = {"setpoints": self.now.setpoints, "speeds": self.now.speeds}
         restore(speeds, {name: memory[name] for name in speeds}, "line")
+        self._surfaces.note(self.now.speeds)
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
-        restore(self._by_name(), memory["devices"], "line.devices")
+        self._restore_devices(memory["devices"])
+
+    def _restore_devices(self, memory: Any) -> None:
+        restore(self._by_name(), memory, "line.devices")
+        for device in self._devices:
+            device.wake()
 
     def _counted(self, *roles: Role) -> dict[str, int]:
         """Sums of the signals of some roles, by the names of the devices that have such."""

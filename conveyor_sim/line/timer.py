@@ -25,6 +25,11 @@ class Timer:
         """Begin as if the input had always been so."""
         self.input = self.output = level
 
+    @property
+    def runs(self) -> bool:
+        """Whether its output is still to follow its input."""
+        return self.input != self.output
+
     def follow(self, edges: Sequence[Edge], until: float) -> list[Edge]:
         """The output's edges up to a time (s), after the input's up to then, which are in order."""
         made: list[Edge] = []

@@ -4,7 +4,7 @@ import numpy as np
 from scenes import RADIUS, base, belt, contact, segment, simulation
 from worlds import FAR
 
-from conveyor_sim.line.polygon import in_polygon
+from conveyor_sim.engine.sensors.regions import find_inside
 
 STAR = np.array([[0.0, 1.0], [0.2, 0.3], [1.0, 0.2], [0.3, -0.1], [0.6, -0.9], [0.0, -0.3], [-0.7, -0.8], [-0.3, 0.0],
                  [-1.0, 0.4], [-0.2, 0.3]])  # fmt: skip
@@ -16,6 +16,14 @@ def winding(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     b = np.roll(corners, -1, axis=0)[None] - points[:, None]
     angle = np.arctan2(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=-1))
     return np.abs(angle.sum(axis=1)) > np.pi
+
+
+def in_polygon(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Whether bottles at (x, y) are inside."""
+    slots = np.empty(x.size, np.int64)
+    inside = np.zeros(x.size, dtype=bool)
+    inside[slots[: find_inside(corners, x, y, np.arange(x.size), slots)]] = True
+    return inside
 
 
 def test_points_in_a_concave_polygon() -> None:

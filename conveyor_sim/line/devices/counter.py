@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Signal
@@ -25,9 +23,11 @@ class CounterDevice(Device):
 
     def end(self, now: ScanContext) -> None:
         """Count the passages of this tick; a bottle that comes to the line and goes back within it makes none."""
-        forward = self._line.end(now).forward
-        self.forward += int(np.count_nonzero(forward))
-        self.backward += int(np.count_nonzero(~forward))
+        for passage in self._line.end(now):
+            if passage.forward:
+                self.forward += 1
+            else:
+                self.backward += 1
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""

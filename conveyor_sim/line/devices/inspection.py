@@ -27,12 +27,11 @@ class InspectionDevice(Device):
 
     def end(self, now: ScanContext) -> None:
         """Look at those that passed."""
-        passages = self._line.end(now)
-        for bottle, time, forward in zip(passages.id, passages.time, passages.forward, strict=True):
-            if forward:
-                self.count, self.time = self.count + 1, float(time)
-                if int(bottle) in now.bad:
-                    self.bad, self.bad_time = self.bad + 1, float(time)
+        for passage in self._line.end(now):
+            if passage.forward:
+                self.count, self.time = self.count + 1, passage.time
+                if passage.id in now.bad:
+                    self.bad, self.bad_time = self.bad + 1, passage.time
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Bottles that passed, bad ones among them, and when the last of each did (s)."""

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from conveyor_sim.line.beam import ROUNDING, Beams, Span
+from conveyor_sim.engine.sensors.beams import ROUNDING
+from conveyor_sim.line.beam import Beams, Span
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.motion import Motion
 from conveyor_sim.line.process_image import Command, Signal, switch
 from conveyor_sim.line.setup import PHOTO_EYES, Setup
 from conveyor_sim.line.timer import Edge, Timer
@@ -22,8 +22,7 @@ class PhotoEyeDevice(Device):
 
     def __init__(self, name: str, eye: PhotoEye, setup: Setup) -> None:
         eyes = setup.scene.photo_eyes
-        motion = setup.shared(Motion, Motion)
-        beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()], motion))
+        beams = setup.shared(Beams, lambda: Beams([(each.from_, each.to) for each in eyes.values()]))
         index = setup.index("photo_eyes", name.rpartition("/")[2])
         super().__init__(
             name,
@@ -42,6 +41,7 @@ class PhotoEyeDevice(Device):
             ],
         )
         self._beams, self._index, self._debounce = beams, index, eye.debounce
+        self._quiet = False  # nothing changes before the beam does
         self.random = setup.random(PHOTO_EYES, index)
         self.stuck_on = self.stuck_off = False
         self.chatter = 0.0
@@ -70,6 +70,7 @@ class PhotoEyeDevice(Device):
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Go wrong, or right again, from this tick on."""
+        self._quiet = False
         fault = name.rpartition("/")[2]
         setattr(self, fault, bool(value) if fault.startswith("stuck") else float(value))
         if fault == "chatter":
@@ -77,8 +78,14 @@ class PhotoEyeDevice(Device):
             self.next_flip = now.time
             self._draw()
 
+    def wake(self) -> None:
+        """It was restored, and may have been in the middle of something."""
+        self._quiet = False
+
     def end(self, now: ScanContext) -> None:
         """See what happened in this tick."""
+        if self._quiet and self._beams.state(self._index) == self.beam:  # FREE and not in it, or BLOCKED and in it
+            return
         spans = self._beams.spans(self._index)
         if now.tick == 0:
             self.beam = self.level = bool(spans)
@@ -105,6 +112,7 @@ class PhotoEyeDevice(Device):
             else:
                 self.fell = at - self._debounce
         self.delayed.follow(seen, time)
+        self._quiet = not (self.chatter or self.late or self.debounced.runs or self.delayed.runs)
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""

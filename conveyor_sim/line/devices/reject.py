@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.polygon import in_polygon
 from conveyor_sim.line.process_image import Signal, switch
+from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.reject import Reject
 
@@ -24,7 +22,7 @@ class RejectDevice(Device):
         signals += [Signal(f"{name}/{what}", "1", "count") for what in names]
         super().__init__(name, signals, [switch(f"{name}/fire")], [switch(f"{name}/stop")])
         self._reject = reject
-        self._corners = np.array(reject.region)
+        self._region = Region(reject.region)
         self.fire = RisingEdge()
         self.stop = False
         self.strokes = ()
@@ -44,8 +42,7 @@ class RejectDevice(Device):
         if not self.strokes:
             return
         bottles = now.state.world.bottles
-        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
-        targets = sorted((int(bottles.id[slot]), int(slot)) for slot in np.flatnonzero(inside))
+        targets = sorted((int(bottles.id[slot]), slot) for slot in self._region.inside(bottles).tolist())
         left = []
         for stroke in self.strokes:
             if now.time >= stroke - 1e-9 and targets:

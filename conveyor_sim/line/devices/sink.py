@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.machine import MachineDevice
-from conveyor_sim.line.polygon import in_polygon
 from conveyor_sim.line.process_image import Signal
+from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.sink import Sink
 
@@ -26,7 +24,7 @@ class SinkDevice(MachineDevice):
             Signal(f"{name}/starved_time", "s", "number"),
         ]
         super().__init__(name, sink.rate, sink.rate_limit, signals)
-        self._corners = np.array(sink.region)
+        self._region = Region(sink.region)
         self.waiting = ()
         self.removed = 0
         self.removed_bad = 0
@@ -36,10 +34,11 @@ class SinkDevice(MachineDevice):
     def take(self, now: ScanContext) -> None:
         """Take the bottle that has waited longest, if one is due."""
         bottles = now.state.world.bottles
-        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
-        slot_of = {int(bottles.id[slot]): int(slot) for slot in np.flatnonzero(inside)}
+        slots = self._region.inside(bottles)
+        slot_of = dict(zip(bottles.id[slots].tolist(), slots.tolist(), strict=True))
         stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
-        self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
+        if stayed != self.waiting or len(stayed) < len(slot_of):
+            self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
         due = self.turn(now)
         self.starved = due and not self.waiting
         if self.starved:

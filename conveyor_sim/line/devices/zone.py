@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.polygon import in_polygon
 from conveyor_sim.line.process_image import Command, Signal
+from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.scene.parts.zone import Zone
 
@@ -22,8 +22,8 @@ class ZoneDevice(Device):
         if zone.full_at is not None:
             signals.append(Signal(f"{name}/full", "1", "bool"))
         super().__init__(name, signals, (), [Command(f"{name}/offset", "1", "count", -MOST_OFFSET, MOST_OFFSET)])
-        self._corners, self._full_at = np.array(zone.region), zone.full_at
-        x, y = self._corners.T
+        self._region, self._full_at = Region(zone.region), zone.full_at
+        x, y = self._region.corners.T
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
         self.offset = 0
 
@@ -33,9 +33,7 @@ class ZoneDevice(Device):
 
     def count(self, now: ScanContext) -> int:
         """Bottles that it shows now; never less than none."""
-        bottles = now.state.world.bottles
-        inside = in_polygon(self._corners, bottles.x, bottles.y) & (bottles.id >= 0)
-        return max(0, int(np.count_nonzero(inside)) + self.offset)
+        return max(0, self._region.inside(now.state.world.bottles).size + self.offset)
 
     def full(self, now: ScanContext) -> bool:
         """Whether its back-up switch is on; False without one."""

@@ -1,0 +1,242 @@
+"""From when to when in a tick a bottle's circle blocks each of some beams.
+
+A bottle's way through a tick is the cubic through its places and velocities at both ends (Hermite), cut into chords of
+equal duration. Each slot keeps its bottle through a tick, for bottles come and go between ticks only.
+"""
+
+import math
+
+import numpy as np
+
+from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.compiler.compile import kernel, part
+
+CHORDS = 8
+"""A way is cut into so many straight pieces: at 1 g in a tick of 10 ms they leave it by 2 micrometres."""
+
+STILL = 1e-13
+"""m; a bottle that moves by less in a chord stands."""
+
+ROUNDING = 1e-9
+"""s; shorter than this is nothing."""
+
+FREE, BLOCKED, CHANGES = 0, 1, 2
+"""What becomes of a beam in a tick: free all the time, blocked all the time, or neither."""
+
+
+@kernel
+def block_beams(
+    start: F8,
+    x: F8,
+    y: F8,
+    vx: F8,
+    vy: F8,
+    radius: F8,
+    ids: I8,
+    length: float,
+    beams: F8,
+    near: I8,
+    spans: F8,
+    count: I8,
+    state: I8,
+) -> int:
+    """When in a tick of `length` s bottles blocked each beam.
+
+    start: x, y, vx, vy of each slot at the begin of the tick, (4, slots), m and m/s; the others are those at its end.
+    beams: of each its start, lower and upper corner, direction, m, and length, m: (beams, 9). near: scratch, (2, n).
+    Written: spans, (beams, m, 2), s from the begin of the tick, in order, those that meet are one; count of them and
+    state, (beams,). Returns what is too short for that: 0 nothing, 1 near, 2 spans.
+    """
+    pairs = _near(start, x, y, vx, vy, radius, ids, length / 3.0, beams, near)
+    if pairs < 0:
+        return 1
+    for beam in range(beams.shape[0]):
+        count[beam] = 0
+        state[beam] = FREE
+    for pair in range(pairs):
+        beam, i = near[0, pair], near[1, pair]
+        # What is within reach of a segment is convex: a way whose hull is in it is in it all the time.
+        if state[beam] != BLOCKED and _throughout(start, x, y, vx, vy, radius[i], length / 3.0, beams, beam, i):
+            state[beam] = BLOCKED
+            count[beam] = 1
+            spans[beam, 0, 0], spans[beam, 0, 1] = 0.0, length
+    for pair in range(pairs):
+        beam, i = near[0, pair], near[1, pair]
+        if state[beam] != BLOCKED:
+            if not _follow(start, x, y, vx, vy, radius[i], length, beams, beam, i, spans, count):
+                return 2
+    for beam in range(beams.shape[0]):
+        if state[beam] != BLOCKED and count[beam] > 0:
+            count[beam] = _join(spans[beam], count[beam])
+            first, last = spans[beam, 0, 0], spans[beam, count[beam] - 1, 1]
+            whole = count[beam] == 1 and first <= ROUNDING and last >= length - ROUNDING
+            state[beam] = BLOCKED if whole else CHANGES
+    return 0
+
+
+@part
+def _near(start: F8, x: F8, y: F8, vx: F8, vy: F8, radius: F8, ids: I8, third: float, beams: F8, near: I8) -> int:
+    """Pairs of a beam and a slot whose way may come within reach; -1 if there are more than `near` has room for."""
+    pairs = 0
+    for i in range(x.size):
+        if ids[i] < 0:
+            continue
+        # A cubic lies within the hull of its four control points (Bézier).
+        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * vx[i]
+        low_x = min(min(start[0, i], ahead), min(behind, x[i])) - radius[i]
+        high_x = max(max(start[0, i], ahead), max(behind, x[i])) + radius[i]
+        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * vy[i]
+        low_y = min(min(start[1, i], ahead), min(behind, y[i])) - radius[i]
+        high_y = max(max(start[1, i], ahead), max(behind, y[i])) + radius[i]
+        for beam in range(beams.shape[0]):
+            if high_x >= beams[beam, 2] and low_x <= beams[beam, 4] and high_y >= beams[beam, 3]:
+                if low_y <= beams[beam, 5]:
+                    if pairs == near.shape[1]:
+                        return -1
+                    near[0, pairs], near[1, pairs] = beam, i
+                    pairs += 1
+    return pairs
+
+
+@part
+def _throughout(
+    start: F8, x: F8, y: F8, vx: F8, vy: F8, radius: float, third: float, beams: F8, beam: int, i: int
+) -> bool:
+    """Whether the whole way of slot i is within reach of a beam."""
+    return (
+        _beside(beams, beam, start[0, i], start[1, i]) <= radius
+        and _beside(beams, beam, start[0, i] + third * start[2, i], start[1, i] + third * start[3, i]) <= radius
+        and _beside(beams, beam, x[i] - third * vx[i], y[i] - third * vy[i]) <= radius
+        and _beside(beams, beam, x[i], y[i]) <= radius
+    )
+
+
+@part
+def _beside(beams: F8, beam: int, x: float, y: float) -> float:
+    """From a point to a beam, m."""
+    along, aside = _seen_from(beams, beam, x, y)
+    return math.hypot(along - min(max(along, 0.0), beams[beam, 8]), aside)
+
+
+@part
+def _seen_from(beams: F8, beam: int, x: float, y: float) -> tuple[float, float]:
+    """A point as seen from the start of a beam: along it, and to the left of it, m."""
+    x, y = x - beams[beam, 0], y - beams[beam, 1]
+    ahead, across = beams[beam, 6], beams[beam, 7]
+    return x * ahead + y * across, y * ahead - x * across
+
+
+@part
+def _follow(
+    start: F8,
+    x: F8,
+    y: F8,
+    vx: F8,
+    vy: F8,
+    radius: float,
+    length: float,
+    beams: F8,
+    beam: int,
+    i: int,
+    spans: F8,
+    count: I8,
+) -> bool:
+    """Add the stretches of one way to the spans of a beam, by their begins; whether there was room."""
+    third, share = length / 3.0, length / CHORDS
+    x1, x2 = start[0, i] + third * start[2, i], x[i] - third * vx[i]
+    y1, y2 = start[1, i] + third * start[3, i], y[i] - third * vy[i]
+    a, b = _seen_from(beams, beam, start[0, i], start[1, i])
+    for chord in range(CHORDS):
+        # Ends are exact, so that ticks join without a gap.
+        last = chord == CHORDS - 1
+        end_x = x[i] if last else cubic(start[0, i], x1, x2, x[i], (chord + 1) / CHORDS)
+        end_y = y[i] if last else cubic(start[1, i], y1, y2, y[i], (chord + 1) / CHORDS)
+        next_a, next_b = _seen_from(beams, beam, end_x, end_y)
+        enter, leave = within_reach(a, b, next_a, next_b, beams[beam, 8], radius)
+        if enter <= leave:
+            if count[beam] == spans.shape[1]:
+                return False
+            _insert(spans[beam], count[beam], (chord + enter) * share, (chord + leave) * share)
+            count[beam] += 1
+        a, b = next_a, next_b
+    return True
+
+
+@kernel
+def cubic(c0: float, c1: float, c2: float, c3: float, s: float) -> float:
+    """Where a cubic with these control points is at a parameter."""
+    r = 1.0 - s
+    # By differences from its beginning: what stands stays where it is to the last bit.
+    return c0 + (3.0 * (r * r) * s * (c1 - c0) + 3.0 * r * (s * s) * (c2 - c0) + s * s * s * (c3 - c0))
+
+
+@part
+def _insert(spans: F8, count: int, begin: float, end: float) -> None:
+    place = count
+    while place > 0 and spans[place - 1, 0] > begin:
+        spans[place, 0], spans[place, 1] = spans[place - 1, 0], spans[place - 1, 1]
+        place -= 1
+    spans[place, 0], spans[place, 1] = begin, end
+
+
+@part
+def _join(spans: F8, count: int) -> int:
+    """Make one of spans that meet; how many are left."""
+    kept = 1
+    for n in range(1, count):
+        if spans[n, 0] <= spans[kept - 1, 1] + ROUNDING:
+            spans[kept - 1, 1] = max(spans[n, 1], spans[kept - 1, 1])
+        else:
+            spans[kept, 0], spans[kept, 1] = spans[n, 0], spans[n, 1]
+            kept += 1
+    return kept
+
+
+@kernel
+def within_reach(a: float, b: float, next_a: float, next_b: float, length: float, radius: float) -> tuple[float, float]:
+    """Shares of a chord at which a point comes within a radius of a segment and leaves; enter > leave if never.
+
+    (a, b) to (next_a, next_b): the chord's ends along the segment and to its left, m, seen from its start. What is
+    within a radius of a segment is convex (two discs and a rectangle), so a chord has one such stretch.
+    """
+    u, v = next_a - a, next_b - b
+    if math.hypot(u, v) <= STILL:
+        u, v = 0.0, 0.0
+    enter, leave = np.inf, -np.inf
+    first, last = _slab(a, u, 0.0, length)
+    begin, end = _slab(b, v, -radius, radius)
+    enter, leave = _widen(enter, leave, max(first, begin), min(last, end))
+    for at in (0.0, length):
+        first, last = _disc(a - at, b, u, v, radius)
+        enter, leave = _widen(enter, leave, first, last)
+    return enter, leave
+
+
+@part
+def _widen(enter: float, leave: float, first: float, last: float) -> tuple[float, float]:
+    first, last = max(first, 0.0), min(last, 1.0)
+    if first <= last:
+        return min(enter, first), max(leave, last)
+    return enter, leave
+
+
+@part
+def _slab(place: float, way: float, low: float, high: float) -> tuple[float, float]:
+    """From which share of its way on, and up to which, a coordinate is in [low, high]."""
+    if way == 0.0:
+        return (-np.inf, np.inf) if low <= place <= high else (np.inf, -np.inf)
+    one, other = (low - place) / way, (high - place) / way
+    return min(one, other), max(one, other)
+
+
+@part
+def _disc(a: float, b: float, u: float, v: float, radius: float) -> tuple[float, float]:
+    """From which share of its way on, and up to which, a point is within a radius of the origin."""
+    square, half, out = u * u + v * v, a * u + b * v, a * a + b * b - radius * radius
+    if square == 0.0:
+        return (-np.inf, np.inf) if out <= 0.0 else (np.inf, -np.inf)
+    inside = half * half - square * out
+    if inside < 0.0:
+        return np.inf, -np.inf
+    root = math.sqrt(inside)
+    return (-half - root) / square, (-half + root) / square

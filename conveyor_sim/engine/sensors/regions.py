@@ -1,0 +1,26 @@
+"""Bottles whose axes are in a region."""
+
+from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.compiler.compile import kernel
+
+
+@kernel
+def find_inside(corners: F8, x: F8, y: F8, ids: I8, slots: I8) -> int:
+    """How many bottles are in a simple polygon (n, 2), m; their slots are written, in order, to `slots`, (slots,).
+
+    By the parity of edges crossed on the way to the right.
+    """
+    count = 0
+    for i in range(x.size):
+        if ids[i] < 0:
+            continue
+        inside = False
+        for corner in range(corners.shape[0]):
+            x1, y1 = corners[corner]
+            x2, y2 = corners[(corner + 1) % corners.shape[0]]
+            if y1 != y2 and (y1 > y[i]) != (y2 > y[i]) and x[i] < x1 + (y[i] - y1) * (x2 - x1) / (y2 - y1):
+                inside = not inside
+        if inside:
+            slots[count] = i
+            count += 1
+    return count
