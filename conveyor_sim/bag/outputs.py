@@ -180,6 +180,8 @@ class Outputs:
         self._eyes = eyes
 
     def _write_state(self) -> None:
+        if not self._sinks:
+            return
         self._write_eyes()
         header, now = self._header(self._sim.tick), Snapshot(self._sim)
         for topic, serialize in SERIALIZERS.items():

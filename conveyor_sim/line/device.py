@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.process_image import Command, Signal
 from conveyor_sim.state import State
@@ -28,7 +30,10 @@ class ScanContext:
     tick: int = 0
     bad: set[int] = field(default_factory=set)
     """Ids of the bottles that an inspection would object to."""
-    _carriers: NDArray[np.int32] | None = None
+    _carriers: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    _carried: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    _counts: list[int] | None = None  # None: nobody has looked since the bottles moved
+    _find: Any = None
 
     @property
     def time(self) -> float:
@@ -37,18 +42,29 @@ class ScanContext:
 
     def begin_scan(self) -> None:
         """Forget what was found out about the bottles before."""
-        self._carriers = None
+        self._counts = None
 
     def carriers(self) -> NDArray[np.int32]:
-        """Index of the belt that each slot stands on, (slots,); -1 for the floor and for free slots."""
-        if self._carriers is None:
-            world = self.state.world
-            carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
-            if world.surface is not None:
-                find_carriers(world.bottles, world.belts, world.surface, carriers)
-            nowhere = (carriers == len(self.state.model.belts)) | (world.bottles.id < 0)
-            self._carriers = np.where(nowhere, -1, carriers).astype(np.int32)
+        """Index of the belt that each slot stands on, (slots,), until the next scan; -1 for floor and free slots."""
+        self._look()
         return self._carriers
+
+    def carried(self, belt: int) -> int:
+        """How many bottles stand on a belt, by its index."""
+        return self._look()[belt]
+
+    def _look(self) -> list[int]:
+        if self._counts is None:
+            world = self.state.world
+            if self._carriers.size != world.bottles.id.size:
+                self._carriers = np.full(world.bottles.id.size, -1, dtype=np.int32)
+                self._carried = np.zeros(self.speeds.size, dtype=np.int32)
+            if world.surface is not None:
+                arguments = world.bottles, world.belts, world.surface, self._carriers, self._carried
+                self._find = self._find or entry(find_carriers, *arguments)
+                self._find(*arguments)
+            self._counts = self._carried.tolist()
+        return self._counts
 
 
 class Device:

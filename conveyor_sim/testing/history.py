@@ -44,8 +44,9 @@ class History:
         self._rows = 0
         self._times = array("d")
         self._signals = np.empty((_FIRST_ROWS, len(image.signals)))
-        self._others = {name: array("d") for name in (*image.command_names, *image.fault_names)}
-        self._now = {**dict.fromkeys(image.command_names, math.nan), **dict.fromkeys(image.fault_names, 0.0)}
+        self._other_index = {name: column for column, name in enumerate((*image.command_names, *image.fault_names))}
+        self._now: F8 = np.array([math.nan] * len(image.commands) + [0.0] * len(image.faults))
+        self._others = np.empty((_FIRST_ROWS, len(self._now)))
         self.marks: list[Mark] = []
         """Faults injected and commands given by the test, in order."""
 
@@ -56,7 +57,7 @@ class History:
     @property
     def names(self) -> tuple[str, ...]:
         """All that there is: signals, commands, faults, then the alarms that were raised."""
-        return (*self._index, *self._others)
+        return (*self._index, *self._other_index)
 
     @property
     def time(self) -> F8:
@@ -67,8 +68,8 @@ class History:
         """A column (n,), in the unit of the process image. Raises ConveyorError for a name that there is not."""
         if name in self._index:
             return self._signals[: self._rows, self._index[name]].copy()
-        if name in self._others:
-            return np.array(self._others[name])
+        if name in self._other_index:
+            return self._others[: self._rows, self._other_index[name]].copy()
         raise ConveyorError(f"{name}: not in the history, expected one of {', '.join(self.names)}")
 
     def unit(self, name: str) -> str:
@@ -84,11 +85,11 @@ class History:
         """A tick is reached; commands, faults and alarms go on as they are."""
         if self._rows == len(self._signals):
             self._signals = np.concatenate([self._signals, np.empty_like(self._signals)])
+            self._others = np.concatenate([self._others, np.empty_like(self._others)])
         self._signals[self._rows] = signals
+        self._others[self._rows] = self._now
         self._rows += 1
         self._times.append(time)
-        for name, column in self._others.items():
-            column.append(self._now[name])
 
     def take(self, outcome: CommandOutcome, from_test: bool) -> None:
         """What was applied at the last tick. from_test: by the test itself, not by the controller."""
@@ -100,9 +101,12 @@ class History:
     def alarms(self, alarms: Mapping[str, float]) -> None:
         """The alarms of the last tick, by their whole names."""
         for name, value in alarms.items():
-            if name not in self._others:
-                self._others[name] = array("d", bytes(8 * self._rows))
+            if name not in self._other_index:
+                self._other_index[name] = len(self._now)
+                self._now = np.append(self._now, 0.0)
+                self._others = np.hstack([self._others, np.zeros((len(self._others), 1))])
             self._set(name, value)
 
     def _set(self, name: str, value: float) -> None:
-        self._now[name] = self._others[name][-1] = value
+        column = self._other_index[name]
+        self._now[column] = self._others[self._rows - 1, column] = value

@@ -59,9 +59,11 @@ def expected_carriers(points: np.ndarray, belts: dict[str, Any]) -> np.ndarray:
 
 def carriers(state: State, count: int) -> np.ndarray:
     world = state.world
-    found = np.zeros(world.bottles.id.size, np.int32)
-    find_carriers(world.bottles, world.belts, world.surface, found)
-    return np.where(found == len(state.model.belts), -1, found)[:count]
+    found, carried = np.zeros(world.bottles.id.size, np.int32), np.zeros(len(state.model.belts), np.int32)
+    find_carriers(world.bottles, world.belts, world.surface, found, carried)
+    assert carried.tolist() == [np.count_nonzero(found == belt) for belt in range(len(carried))]
+    assert (found[count:] == -1).all()
+    return found[:count]
 
 
 def test_the_last_listed_belt_under_the_axis_carries() -> None:

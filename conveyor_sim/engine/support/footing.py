@@ -65,8 +65,17 @@ def check_footing(bottles: Bottles, belts: Any, surface: Any, footing: Any, ring
 
 
 @kernel
-def find_carriers(bottles: Bottles, belts: Any, surface: Surface, carriers: Any) -> None:
-    """Write the belt (or floor) under each bottle's axis now; the state stays as it is."""
+def find_carriers(bottles: Bottles, belts: Any, surface: Surface, carriers: Any, carried: Any) -> None:
+    """Write the belt under each bottle's axis now, (slots,), -1 for the floor and free slots, and how many bottles are
+    on each belt, (belts,); the state stays as it is.
+    """
     floor = surface.ux.size - 1
+    for h in range(floor):
+        carried[h] = 0
     for i in range(bottles.x.size):
-        carriers[i] = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
+        carriers[i] = -1
+        if bottles.id[i] >= 0:
+            h = carrier(i, belts, floor, bottles.x[i], bottles.y[i])
+            if h < floor:
+                carriers[i] = h
+                carried[h] += 1

@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import Command, Signal, speed_command
 from conveyor_sim.line.setup import Setup
@@ -65,4 +63,4 @@ class BeltDevice(Device):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Speed, m/s, and bottles on it."""
-        return now.speeds[self._index], float(np.count_nonzero(now.carriers() == self._index))
+        return now.speeds[self._index], now.carried(self._index)
