@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.types import I8
 from conveyor_sim.engine.sensors.regions import find_inside
-from conveyor_sim.scene.geometry import XY
+from conveyor_sim.scene.types import XY
 
 
 class Region:
