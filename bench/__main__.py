@@ -12,7 +12,7 @@ from conveyor_sim.support.interrupt import one_line, while_importing
 with while_importing():
     import click
 
-    from bench import dense, growth, markdown, memory, node, plant, start, targets
+    from bench import control, dense, growth, markdown, memory, node, plant, start, targets
     from bench.measure import Effort, say
     from bench.rows import Row, Rows
     from conveyor_sim.support.machine import PACKAGES, machine
@@ -41,6 +41,7 @@ PARTS: dict[str, Part] = {
     "memory": memory,
     "start": start,
     "node": node,
+    "control": control,
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import dense, growth, node, plant, start
+from bench import control, dense, growth, node, plant, start
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
@@ -49,6 +49,10 @@ def _first_step(rows: Rows) -> float | None:
 
 def _node(rows: Rows) -> float | None:
     return _middle(rows.spread(node.CASE, 1_000, node.REAL_TIME, node.OVERHEAD))
+
+
+def _control(contestant: str, quantity: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(control.CASE, 0, contestant, quantity))
 
 
 def _middle(spread: Spread | None) -> float | None:
@@ -101,6 +105,21 @@ TARGETS = (
     Target("rise of the cost from 1 to 1 000 rails", "growth", MOST, 0.15, _rise(growth.RAILS, 1, 1_000)),
     Target("s to the first step, cached", "start", MOST, 1.0, _first_step),
     Target("cores of the node beside the kernels, N = 1 000, 50 Hz, real time", "node", MOST, 0.1, _node),
+    *(
+        Target(f"{name}, {quantity}", "control", bound, value, _control(name, quantity))
+        for quantity, bound, values in (
+            (control.FACTOR, LEAST, (105.0, 150.0, 85.0, 150.0)),
+            (control.OUTSIDE, MOST, (30.0, 30.0, 30.0, 30.0)),
+        )
+        for name, value in zip(control.LINES, values, strict=True)
+    ),
+    Target(
+        "a scenario of a stopped packer, times real time",
+        "control",
+        LEAST,
+        40.0,
+        _control(control.DOWNSTREAM_STOP, control.FACTOR),
+    ),
 )
 
 

@@ -1,0 +1,101 @@
+"""What control tests wait for: ticks of a line outside the step kernels, and a scenario, in CPU time of one core."""
+
+from __future__ import annotations
+
+import runpy
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bench.markdown import table as markdown
+from bench.measure import Effort, say
+from bench.rows import Row, Rows
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.resources import scene_path
+from conveyor_sim.testing import Scenario
+
+ROOT = Path(__file__).resolve().parent.parent
+BEFORE = ROOT / "docs" / "performance" / "control_before.csv"
+"""The same at the commit before the line's sensors were compiled."""
+
+CASE = "control"
+FACTOR, OUTSIDE, WHOLE = "times real time", "us a tick outside the step kernels", "us a tick"
+LINES = ("zoned_line", "reject_line", "buffer_lane", "watched_eyes")
+DOWNSTREAM_STOP = "scenario of a stopped packer"
+SECONDS, QUICK_SECONDS = 60.0, 2.0
+"""Simulated, from the start of the scene."""
+
+
+def measure(effort: Effort) -> list[Row]:
+    """Lines alone, then a scenario with its controller, conditions and history, without a bag."""
+    rows = []
+    for turn in range(1 if effort.quick else effort.rounds):
+        for name in LINES:
+            say(f"control, round {turn + 1}: {name}")
+            rows += _line(name, QUICK_SECONDS if effort.quick else SECONDS, turn)
+        if not effort.quick:
+            say(f"control, round {turn + 1}: {DOWNSTREAM_STOP}")
+            rows += _scenario(turn)
+    return rows
+
+
+def _line(name: str, seconds: float, turn: int) -> list[Row]:
+    scene = load_scene(scene_path(f"scenarios/{name}"))
+    simulation = Simulation(scene, threads=1)
+    simulation.advance(1)
+    kernels = _Clock()
+    pool: Any = simulation._integration._pool
+    pool.advance = kernels.around(pool.advance)
+    ticks = round(seconds / scene.tick)
+    whole = _Clock()
+    whole.around(simulation.advance)(ticks)
+    return [
+        Row(CASE, 0.0, name, FACTOR, turn, seconds / whole.seconds),
+        Row(CASE, 0.0, name, WHOLE, turn, 1e6 * whole.seconds / ticks),
+        Row(CASE, 0.0, name, OUTSIDE, turn, 1e6 * (whole.seconds - kernels.seconds) / ticks),
+    ]
+
+
+def _scenario(turn: int) -> list[Row]:
+    example = runpy.run_path(str(ROOT / "examples" / "scenarios" / "test_downstream_stop.py"))
+    with Scenario("scenarios/zoned_line") as plant:
+        plant.attach(example["cascade"]())
+        clock = _Clock()
+        clock.around(example["check"])(plant)
+        return [
+            Row(CASE, 0.0, DOWNSTREAM_STOP, FACTOR, turn, plant.time / clock.seconds),
+            Row(CASE, 0.0, DOWNSTREAM_STOP, WHOLE, turn, 1e6 * clock.seconds / plant.simulation.tick),
+        ]
+
+
+class _Clock:
+    """Adds up the processor time of calls, s."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function, timed."""
+
+        def timed(*arguments: Any) -> Any:
+            begin = time.process_time()
+            try:
+                return function(*arguments)
+            finally:
+                self.seconds += time.process_time() - begin
+
+        return timed
+
+
+def tables(rows: Rows) -> str:
+    """One table, with what was measured before."""
+    before = Rows.read(BEFORE)
+    body = []
+    for name in rows.contestants(CASE):
+        for quantity in (FACTOR, WHOLE, OUTSIDE):
+            now = rows.spread(CASE, 0.0, name, quantity)
+            if now is not None:
+                body.append([name, quantity, before.spread(CASE, 0.0, name, quantity), now])
+    return markdown(["", "", "before", "now"], body)
