@@ -299,14 +299,15 @@ def replay(
     for option, is_given in given.items():
         if is_given:
             raise ConveyorError(f"{option}: given without --publish, expected both or neither")
-    from conveyor_sim.bag.compare import TOLERANCE
     from conveyor_sim.bag.replay import replay as replay_bag
+    from conveyor_sim.bag.topics import TOPICS
 
     with ProgressBar(f"replay {bag}", 0.0) as bar:
         report = replay_bag(bag, bar.update)
     for sentence in report.environment:
         click.echo(f"not the same as in the recording: {printable(sentence, SENTENCE)}")
-    near = f"{TOLERANCE['x']:g} m, {TOLERANCE['vx']:g} m/s and {TOLERANCE['peak_force']:g} N"
+    within = TOPICS["bottles"].compare.within
+    near = f"{within['x']:g} m, {within['vx']:g} m/s and {within['peak_force']:g} N"
     how = "bit for bit" if report.exact else f"within {near}"
     count = sum(report.compared.values())
     if report.difference is not None:

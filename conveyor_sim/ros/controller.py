@@ -16,7 +16,8 @@ from conveyor_msgs.msg import Commands, Line, Signals
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import ANSWERS, QOS
+from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
@@ -77,7 +78,7 @@ class ControllerRun:
         self._line: Any = None
         self._has_line = threading.Event()
         self._alarms = Alarms(node)
-        node.create_subscription(Line, "line", self._on_line, ros_qos(QOS["line"]))
+        node.create_subscription(Line, "line", self._on_line, ros_qos(TOPICS["line"].qos))
         self._lockstep = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS))
         self._spinner = Spinner(died=self._died)
         self._spinner.start(node)
@@ -122,7 +123,7 @@ class ControllerRun:
         """Scan what arrives, until asked to stop. Raises ConveyorError if a scan fails."""
         self._find(lambda: True)
         free = _FreeScans(self._node, self._scan_ticks, self._scanner, lambda: self._line)
-        self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(QOS["signals"]))
+        self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(TOPICS["signals"].qos))
         self._node.get_logger().info(f"controls {printable(self._line.scene_name)} as its signals arrive")
         self._stop.wait()
         if self._error is not None:
@@ -187,7 +188,7 @@ class _FreeScans:
     """Scans signals as they arrive, every `scan_ticks` ticks or as seldom as they come."""
 
     def __init__(self, node: Node, scan_ticks: int, scanner: Callable[[Any], Scanner], line: Callable[[], Any]) -> None:
-        self._commands = node.create_publisher(Commands, "commands", ros_qos(QOS["commands"]))
+        self._commands = node.create_publisher(Commands, "commands", ros_qos(TOPICS["commands"].qos))
         self._scan_ticks = scan_ticks
         self._make = scanner
         self._present = line
