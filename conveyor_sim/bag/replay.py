@@ -13,7 +13,8 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import COMPARED, Snapshot
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
+from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG
 from conveyor_sim.simulation import Simulation
 
 

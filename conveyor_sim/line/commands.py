@@ -7,6 +7,15 @@ from dataclasses import dataclass
 from conveyor_sim.line.process_image import Command
 from conveyor_sim.support.printable import printable
 
+FAULT = "fault"
+"""Source of outcomes of faults."""
+
+ALARMS = "alarms/"
+"""What the name of an input begins with that is an alarm of the controller, 0 or 1: it commands nothing."""
+
+MOST_ALARMS = 1000
+"""That stand at once."""
+
 LISTED = 20
 """Names that a refusal lists, of those there are."""
 
@@ -33,6 +42,10 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
     known = {command.name: command for command in table}
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
+        if name.startswith(ALARMS) and what == "command":
+            if value not in (0.0, 1.0):
+                return f"{printable(name)}: {value:g} given, expected 0 or 1"
+            continue
         if name not in known:
             return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
         if name in seen:

@@ -11,7 +11,8 @@ from conveyor_sim.bag.messages import Header, Outcome, to_outcome
 from conveyor_sim.bag.qos import EVENTS, LATCHED, Qos
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
+from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG
 from conveyor_sim.line.process_image import speed_command
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})

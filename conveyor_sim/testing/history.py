@@ -12,8 +12,7 @@ import numpy as np
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.line.line import FAULT
+from conveyor_sim.line.commands import FAULT, CommandOutcome
 from conveyor_sim.line.process_image import Command, Kind, ProcessImage, Signal
 
 _FIRST_ROWS = 1024

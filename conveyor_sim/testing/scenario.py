@@ -15,7 +15,7 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ON, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.line import FAULT
+from conveyor_sim.line.commands import FAULT
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
