@@ -29,11 +29,11 @@ from conveyor_sim.bag.metadata import (
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.salvage import NothingLeft, Salvage
-from conveyor_sim.bag.topics import COMPARED
+from conveyor_sim.bag.topics import STATES
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import BagError
 
-STATE_TYPES = {topic.type for topic in COMPARED.values()}
+STATE_TYPES = {topic.type for topic in STATES.values()}
 
 
 @dataclass(frozen=True)
@@ -284,7 +284,7 @@ def _unusable(path: Path) -> str:
     """Why a bag can't be replayed or drawn, in words; empty if it can."""
     try:
         with open_bag(path) as bag:
-            known = any(bag.counts.get(topic) for topic in COMPARED)
+            known = any(bag.counts.get(topic) for topic in STATES)
     except BagError as error:
         return str(error)
-    return "" if known else f"{path}: holds no message of topics {', '.join(COMPARED)}"
+    return "" if known else f"{path}: holds no message of topics {', '.join(STATES)}"

@@ -11,7 +11,7 @@ from conveyor_sim.bag.compare import Difference, first_difference, outcome_diffe
 from conveyor_sim.bag.messages import Header, Outcome, to_outcome
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.bag.topics import COMPARED, Snapshot
+from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.commands import FAULT
 from conveyor_sim.line.line import ARRIVAL, WATCHDOG
@@ -119,7 +119,7 @@ class _Replay:
         self._compared = dict.fromkeys(topics, 0)
         self._last_tick = -1
         if not self._states:
-            raise BagError(f"{bag.path}: holds no message of topics {', '.join(COMPARED)}; nothing can be compared")
+            raise BagError(f"{bag.path}: holds no message of topics {', '.join(STATES)}; nothing can be compared")
 
     def run(self) -> ReplayReport:
         first_tick = min(tick for state in self._states if (tick := state.next_tick) is not None)

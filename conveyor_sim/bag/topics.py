@@ -321,6 +321,9 @@ OUTPUTS = {name: topic for name, topic in TOPICS.items() if topic.recorded}
 COMPARED = {name: topic for name, topic in TOPICS.items() if topic.compare is not NOT_COMPARED}
 """In the order in which a replay looks for differences of one tick."""
 
+STATES = {name: topic for name, topic in COMPARED.items() if topic.rate is not None}
+"""Those of which a recording needs one at least, to be replayed or drawn."""
+
 
 def photo_eye_topics(names: Iterable[str]) -> dict[str, Topic]:
     """A topic for each photo-eye, by name."""
