@@ -13,6 +13,7 @@ from conveyor_sim.bag.messages import Header, Outcome
 from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.observe.events import EventColumns, event_columns
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.scene.marks import marks_of
 
@@ -258,6 +259,16 @@ _ROWS = (
         state=lambda now: now.sim.rail_wear(),
         columns=RailWearColumns,
         compare=Compare(_bin_name),
+    ),
+    Topic(
+        "events",
+        "conveyor_msgs/msg/Events",
+        "what happened: bottles fed, removed, rejected, alarms, states of machines, faults, refusals, limits",
+        "each tick at which something did",
+        EVENTS,
+        state=lambda now: event_columns(now.sim.happened, now.sim.happened_so_far),
+        columns=EventColumns,
+        compare=Compare(lambda line, message, index: f"{message.kind[index]} of {message.name[index]}"),
     ),
     Topic(
         "photo_eyes/<eye>",

@@ -1,6 +1,11 @@
 """What happens on a line."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 Kind = Literal[
     "bottle_fed",
@@ -32,3 +37,26 @@ class Event(NamedTuple):
     """Of the state, fault, alarm, limit or command; of a bottle's event, how many the device has fed or removed."""
     text: str
     """The reason, or a sentence; empty: nothing to add."""
+
+
+@dataclass(frozen=True)
+class EventColumns:
+    """What happened since the tick before, in order; the fields of conveyor_msgs/Events."""
+
+    total: int
+    """Since the start of the run, these included."""
+    at: NDArray[np.uint64]
+    kind: Sequence[str]
+    name: Sequence[str]
+    bottle: NDArray[np.int64]
+    value: NDArray[np.float64]
+    text: Sequence[str]
+
+
+def event_columns(events: Sequence[Event], total: int) -> EventColumns | None:
+    """None if nothing happened. total: events since the start, these included."""
+    if not events:
+        return None
+    at, kind, name, bottle, value, text = zip(*events, strict=True)
+    ints, floats = np.array(bottle, dtype=np.int64), np.array(value, dtype=np.float64)
+    return EventColumns(total, np.array(at, dtype=np.uint64), kind, name, ints, floats, text)

@@ -15,6 +15,7 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.observe.events import Event, event_columns
 from conveyor_sim.observe.ledger import balance
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -47,6 +48,15 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "damage event": (
         TOPICS["damage_events"].type,
         lambda: TOPICS["damage_events"].pack(DamageEvent(9, "tipping", 3, 0.5, -0.25, 1.5, 1.0, "it tips"), HEADER),
+    ),
+    "events": (
+        TOPICS["events"].type,
+        lambda: TOPICS["events"].pack(
+            event_columns(
+                [Event(9, "bottle_fed", "infeeds/a", 3, 4.0, ""), Event(8, "alarm_raised", "alarms/ü", -1, 1.0, "é")], 7
+            ),
+            HEADER,
+        ),
     ),
     "poses": (TOPICS["poses"].type, lambda: TOPICS["poses"].pack(bottles(7), HEADER)),
     "no poses": (TOPICS["poses"].type, lambda: TOPICS["poses"].pack(bottles(0), HEADER)),

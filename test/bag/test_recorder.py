@@ -36,6 +36,7 @@ COUNTS = {
     "/contacts": 51,
     "/belts": 51,
     "/signals": 101,
+    "/events": 8,
 }
 SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events"), 0)
 """Nothing was to be told, nothing asked for."""
