@@ -318,6 +318,25 @@ def replay(
 
 @main.command()
 @click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--kind", "kinds", multiple=True, help="Only of this kind: alarm_raised, bottle_*, ...; repeatable.")
+@click.option("--name", "names", multiple=True, help="Only of this device, alarm, ...: machines/*, ...; repeatable.")
+@click.option("--from", "start", type=float, help="Only from this simulated time in s on.")
+@click.option("--to", "stop", type=float, help="Only up to this simulated time in s.")
+@click.option("--csv", "file", type=click.Path(path_type=Path), help="Write them to this file and print none.")
+def events(bag: Path, file: Path | None, **chosen: Any) -> None:
+    """Print what happened on the line in BAG: bottles, alarms, states of machines, faults, refusals, limits passed."""
+    from conveyor_sim.runs.events import chosen_events, event_table, write_csv
+
+    rows = chosen_events(bag, **chosen)
+    if file is None:
+        _print(event_table(rows))
+    else:
+        write_csv(rows, file)
+        click.echo(f"{len(rows)} events written to {file}")
+
+
+@main.command()
+@click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/pictures).")
 @click.option("--time", "times", type=float, multiple=True, help="Simulated time to draw the plant at, s; repeatable.")
 @click.option("--bottle", "bottles", type=int, multiple=True, help="Id of a bottle to draw over time; repeatable.")
