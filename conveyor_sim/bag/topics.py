@@ -305,7 +305,7 @@ _ROWS = (
     Topic(
         "commands",
         messages.COMMANDS,
-        "setpoints by name (`line.command_names`), applied together or refused together",
+        "setpoints by name (`line.command_names`), applied together or refused together; alarms",
         qos=EVENTS,
         recorded=False,
         subscribed=True,

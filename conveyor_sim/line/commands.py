@@ -43,8 +43,8 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
         if name.startswith(ALARMS) and what == "command":
-            if value not in (0.0, 1.0):
-                return f"{printable(name)}: {value:g} given, expected 0 or 1"
+            if wrong := alarm_problem(name, value):
+                return wrong
             continue
         if name not in known:
             return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
@@ -60,6 +60,13 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
         if not math.isfinite(value) or not command.low <= value <= command.high:
             return f"{name}: {value:g} given, expected {command.low:g} to {command.high:g}{unit}"
     return ""
+
+
+def alarm_problem(name: str, value: float) -> str:
+    """Why an alarm can't be noted, "" if it can."""
+    if name == ALARMS:
+        return f"{name}: given, expected the name of an alarm behind it"
+    return "" if value in (0.0, 1.0) else f"{printable(name)}: {value:g} given, expected 0 or 1"
 
 
 def shown(names: Sequence[str]) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome
+from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome, alarm_problem
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.observe.events import Event, Kind
 from conveyor_sim.state.snapshot import Unchecked
@@ -82,6 +82,8 @@ class EventLog:
 
     def _note_alarm(self, at: int, name: str, value: float) -> None:
         """Only what changes; what is no alarm, or one too many, was refused."""
+        if alarm_problem(name, value):
+            return
         if value == 1.0 and name not in self.alarms and len(self.alarms) < MOST_ALARMS:
             self.alarms.append(name)
             self.note(at, "alarm_raised", name, value)

@@ -104,7 +104,9 @@ class Line:
 
     def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
         """Have inputs applied, or refused, together as the next tick begins."""
-        self._pending.append((tuple(names), tuple(float(value) for value in values), printable(source)))
+        # Whoever names an alarm makes it up, so it is kept as it can be shown.
+        kept = tuple(printable(name) if name.startswith(ALARMS) else name for name in names)
+        self._pending.append((kept, tuple(float(value) for value in values), printable(source)))
 
     @property
     def waiting(self) -> Sequence[tuple[tuple[str, ...], tuple[float, ...], str]]:

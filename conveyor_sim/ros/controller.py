@@ -18,7 +18,7 @@ from rclpy.node import Node
 
 from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
+from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.publishers import ros_qos
@@ -39,7 +39,9 @@ class Stopped(Exception):
 
 
 class Scanner:
-    """A controller on the line of one run: values in the line's order in, commands out; alarms are published."""
+    """A controller on the line of one run: values in the line's order in, commands out, and alarms, which are published
+    too.
+    """
 
     def __init__(self, controller: Controller, line: Any, alarms: Alarms) -> None:
         """line: conveyor_msgs/Line."""
@@ -47,9 +49,13 @@ class Scanner:
         self._names: Sequence[str] = line.signal_names
         self._tick_ns: int = line.tick_ns
         self._alarms = alarms
+        self._changes = AlarmChanges()
 
     def scan(self, values: Sequence[float], tick: int, ticks: int) -> dict[str, float]:
-        """Commands by name, for the scan at a tick that is so many ticks long. Raises ConveyorError."""
+        """Commands by name, and alarms that come or go, for the scan at a tick that is so many ticks long.
+
+        Raises ConveyorError.
+        """
         signals = dict(zip(self._names, values, strict=True))
         try:
             answer = self._controller.scan(
@@ -58,7 +64,8 @@ class Scanner:
         except ControlError as error:
             raise ConveyorError(f"scan at tick {tick}: {error}") from error
         self._alarms.tell(_alarms(answer), max(1, tick * self._tick_ns))
-        return {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+        commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+        return {**commands, **self._changes.of(answer)}
 
 
 class ControllerRun:

@@ -92,6 +92,8 @@ class History:
     def take(self, outcome: CommandOutcome, from_test: bool) -> None:
         """What was applied at the last tick. from_test: by the test itself, not by the controller."""
         for name, value in zip(outcome.names, outcome.values, strict=True):
+            if name.startswith(ALARMS):  # noted as the controller gave it
+                continue
             self._set(name, value)
             if from_test or outcome.source == FAULT:
                 self.marks.append(Mark(self._times[-1], name, value))

@@ -115,6 +115,27 @@ def test_an_alarm_is_zero_or_one(given: float) -> None:
     assert sim.refusal(("alarms/full",), (1.0,), "fault")  # nobody injects one
 
 
+@pytest.mark.parametrize(
+    ("name", "shown"), [("alarms/a\nb", r"a\nb"), (f"alarms/{'a' * 300}", f"{'a' * 192}…"), ("alarms/voll ü", "voll ü")]
+)
+def test_an_alarm_is_kept_as_it_can_be_shown(name: str, shown: str) -> None:
+    """So that a recording, which holds that name, replays to the same one."""
+    sim = Simulation(REJECT)
+    for _ in range(2):
+        sim.command((name,), (1.0,))
+        sim.advance()
+        (outcome,) = sim.take_outcomes()
+        assert outcome.accepted
+        (name,) = outcome.names
+        assert sim.alarms == {shown}
+    assert sim.happened_so_far == 2  # a bottle, and the alarm once
+
+
+def test_an_alarm_has_a_name() -> None:
+    expected = "alarms/: given, expected the name of an alarm behind it"
+    assert Simulation(REJECT).refusal(("alarms/",), (1.0,)) == expected
+
+
 def test_the_alarms_that_stand_are_bounded() -> None:
     sim = Simulation(REJECT)
     many = tuple(f"alarms/{number}" for number in range(MOST_ALARMS))
