@@ -110,9 +110,9 @@ class _Replay:
         self._environment = environment
         self._exact = not environment
         self._progress = progress
-        recorded = bag.counts
+        recorded, types = bag.counts, bag.types
         here = [row for row in COMPARED.values() if self._exact or row.compare.within]
-        topics = [row.name for row in here if recorded.get(row.name)]
+        topics = [row.name for row in here if recorded.get(row.name) and types[row.name] == row.type]
         end_ns = simulation.scene.duration_ticks * simulation.model.tick_ns
         self._states = [_Messages(bag, topic, end_ns) for topic in topics]
         self._outcomes = _Messages(bag, "outcomes", end_ns) if recorded.get("outcomes") else None

@@ -14,6 +14,7 @@ from rich.console import RenderableType
 from rich.table import Table
 
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.events import Kind
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -65,14 +66,17 @@ def _fits(text: str, patterns: Sequence[str]) -> bool:
 
 def _all(path: Path) -> Iterator[Row]:
     with open_bag(path) as bag, bag.sense():
-        if "events" not in bag.types:
+        expected, found = TOPICS["events"].type, bag.types.get("events")
+        if found is None:
             raise BagError(
                 f"{path}: holds no topic events, expected a recording with it: "
                 "this one was made by an earlier version, or with chosen topics"
             )
+        if found != expected:
+            raise BagError(f"{path}: its topic events is of type {printable(found)}, expected {expected}")
         for frame in bag.read("events"):
-            found = frame.data
-            columns = (found.at, found.kind, found.name, found.bottle, found.value, found.text)
+            data = frame.data
+            columns = (data.at, data.kind, data.name, data.bottle, data.value, data.text)
             for at, kind, name, bottle, value, text in zip(*columns, strict=True):
                 yield Row(
                     round(bag.time(int(at)), 9),

@@ -9,10 +9,13 @@ import pytest
 from bag.small_line import SMALL_LINE
 from click.testing import CliRunner, Result
 
+from conveyor_sim.bag.mcap_file import McapFile, Schema
+from conveyor_sim.bag.messages import Header, bool_message
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import OUTPUTS
+from conveyor_sim.bag.typestore import definition
 from conveyor_sim.cli import main
 from conveyor_sim.runs.events import KINDS
 from conveyor_sim.scene import load_scene
@@ -127,11 +130,19 @@ def test_an_older_or_damaged_bag_is_refused_in_one_sentence(bag: Path, tmp_path:
         for topic, log_time, data in opened.raw():
             if topic != "events":
                 recorder.write(topic, data, log_time)
+    with (tmp_path / "other.mcap").open("wb") as stream, open_bag(bag) as opened:
+        file = McapFile(stream, "other.mcap", "jazzy")
+        for topic, kind in (("line", OUTPUTS["line"].type), ("events", "std_msgs/msg/Bool")):
+            channel = file.add_topic(f"/{topic}", Schema(kind, "ros2msg", definition(kind).encode()), "cdr", {})
+            data = bool_message(True, Header(0, 1, "")) if topic == "events" else next(opened.raw({"line"}))[2]
+            file.add_message(channel, data, 1, 1)
+        file.finish()
     (tmp_path / "cut.mcap").write_bytes((bag / "bag_0.mcap").read_bytes()[:9000])
     for path, words in (
         (tmp_path / "old", "holds no topic events, expected a recording with it"),
         (tmp_path / "cut.mcap", "is damaged"),
         (tmp_path / "gone", "no such bag"),
+        (tmp_path / "other.mcap", "its topic events is of type std_msgs/msg/Bool, expected conveyor_msgs/msg/Events"),
     ):
         result = CliRunner().invoke(main, ["events", str(path)])
         assert result.exit_code == 1
