@@ -17,7 +17,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from bench.packed import SPEED
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.publishers import ros_qos
@@ -39,9 +39,9 @@ class Line:
         self._node = Node("bench", context=self._context)
         self._tick = -1
         self._outcome_at: float | None = None
-        self._node.create_subscription(Signals, "signals", self._on_signals, ros_qos(QOS["signals"]))
-        self._node.create_subscription(CommandOutcome, "outcomes", self._on_outcome, ros_qos(QOS["outcomes"]))
-        self._speed = self._node.create_publisher(Float64, speed_command(BELT), ros_qos(QOS["cmd_speed"]))
+        self._node.create_subscription(Signals, "signals", self._on_signals, ros_qos(TOPICS["signals"].qos))
+        self._node.create_subscription(CommandOutcome, "outcomes", self._on_outcome, ros_qos(TOPICS["outcomes"].qos))
+        self._speed = self._node.create_publisher(Float64, speed_command(BELT), ros_qos(CMD_SPEED.qos))
         self._resume = self._node.create_client(Trigger, "resume")
         self._spinner = Spinner(self._context)
         self._spinner.start(self._node)

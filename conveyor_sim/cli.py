@@ -299,20 +299,40 @@ def replay(
     for option, is_given in given.items():
         if is_given:
             raise ConveyorError(f"{option}: given without --publish, expected both or neither")
-    from conveyor_sim.bag.compare import TOLERANCE
     from conveyor_sim.bag.replay import replay as replay_bag
+    from conveyor_sim.bag.topics import TOPICS
 
     with ProgressBar(f"replay {bag}", 0.0) as bar:
         report = replay_bag(bag, bar.update)
     for sentence in report.environment:
         click.echo(f"not the same as in the recording: {printable(sentence, SENTENCE)}")
-    near = f"{TOLERANCE['x']:g} m, {TOLERANCE['vx']:g} m/s and {TOLERANCE['peak_force']:g} N"
+    within = TOPICS["bottles"].compare.within
+    near = f"{within['x']:g} m, {within['vx']:g} m/s and {within['peak_force']:g} N"
     how = "bit for bit" if report.exact else f"within {near}"
     count = sum(report.compared.values())
     if report.difference is not None:
         raise click.ClickException(f"{bag}: the first difference ({how}) is at {report.difference}")
     began = "" if report.first_tick == 0 else f" from tick {report.first_tick}"
     click.echo(f"{bag}: {count} messages equal {how}{began} up to tick {report.last_tick} ({report.end:.2f} s)")
+
+
+@main.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--kind", "kinds", multiple=True, help="Only of this kind: alarm_raised, bottle_*, ...; repeatable.")
+@click.option("--name", "names", multiple=True, help="Only of this device, alarm, ...: machines/*, ...; repeatable.")
+@click.option("--from", "start", type=float, help="Only from this simulated time in s on.")
+@click.option("--to", "stop", type=float, help="Only up to this simulated time in s.")
+@click.option("--csv", "file", type=click.Path(path_type=Path), help="Write them to this file and print none.")
+def events(bag: Path, file: Path | None, **chosen: Any) -> None:
+    """Print what happened on the line in BAG: bottles, alarms, states of machines, faults, refusals, limits passed."""
+    from conveyor_sim.runs.events import chosen_events, event_table, write_csv
+
+    rows = chosen_events(bag, **chosen)
+    if file is None:
+        _print(event_table(rows))
+    else:
+        write_csv(rows, file)
+        click.echo(f"{len(rows)} events written to {file}")
 
 
 @main.command()

@@ -4,7 +4,6 @@ import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,14 @@ from conveyor_sim.accounts.damage import DamageAccount
 from conveyor_sim.accounts.energy import EnergyAccount
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
-from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.line.line import FAULT, Line
+from conveyor_sim.line.commands import FAULT, CommandOutcome
+from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.counts import Counts
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.observe.events import Event
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
@@ -35,19 +36,6 @@ from conveyor_sim.stepping.tick import Integration
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
 """The seconds of a message header are 32 bits."""
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Bottles so far."""
-
-    fed: int
-    """Entered through infeeds."""
-    removed: int
-    """Left through outfeeds."""
-    present: int
-    blocked_ticks: int
-    """Ticks at which an infeed had a bottle to feed and no room."""
 
 
 class Simulation:
@@ -155,13 +143,13 @@ class Simulation:
                 self._damage.begin(self.due("damage"))
             self._integration.take_tick(self.tick, self._line.fastest_surface)
             self.tick += 1
-            if self._damage is not None:
-                self._damage.end(self.tick)
+            passed = [] if self._damage is None else self._damage.end(self.tick)
             if self._clogging is not None:
-                self._clogging.end(self.tick, self._line.removed_by())
+                passed += self._clogging.end(self.tick, self._line.removed_by())
             self._line.end(self.tick)
             self._remove()
             self._feed()
+            self._line.close(passed)
             self._state.make_lists()
 
     def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
@@ -193,6 +181,21 @@ class Simulation:
     def take_outcomes(self) -> list[CommandOutcome]:
         """What became of commands since the last call, in order."""
         return self._line.take_outcomes()
+
+    @property
+    def happened(self) -> Sequence[Event]:
+        """What has happened on the line since the tick before, in order."""
+        return self._line.happened
+
+    @property
+    def happened_so_far(self) -> int:
+        """How many events there were since the start of the run."""
+        return self._line.happened_so_far
+
+    @property
+    def alarms(self) -> frozenset[str]:
+        """The controllers' alarms that stand, by name: given as commands "alarms/<name>", 1 to raise, 0 to clear."""
+        return self._line.alarms
 
     def take_guard_events(self) -> list[GuardEvent]:
         """What the guard has reported since the last call, in order."""

@@ -31,10 +31,12 @@ class Clogging:
         self.passages = dict.fromkeys(exits, (0, 0, 0))
         self.events = []
 
-    def end(self, tick: int, removed: Mapping[str, int]) -> None:
-        """A tick has ended. removed: bottles so far, by device."""
+    def end(self, tick: int, removed: Mapping[str, int]) -> list[DamageEvent]:
+        """A tick has ended; the outfeeds that clogged in it. removed: bottles so far, by device."""
+        told = len(self.events)
         for name, corners in self._exits.items():
             self._look_at(tick, name, corners, removed[f"outfeeds/{name}"])
+        return [DamageEvent(*event) for event in self.events[told:]]
 
     def take_events(self) -> list[DamageEvent]:
         """Outfeeds that clogged since the last call, in order."""

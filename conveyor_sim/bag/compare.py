@@ -3,37 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.reader import Outcome
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
-from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.bag.messages import Outcome
+from conveyor_sim.bag.topics import COMPARED
 
-TOLERANCE = {
-    "x": 1e-6,
-    "y": 1e-6,
-    "theta": 1e-5,
-    "vx": 1e-4,
-    "vy": 1e-4,
-    "omega": 1e-3,
-    "peak_force": 1e-2,
-    "impulse": 1e-4,
-    "commanded": 1e-9,
-    "actual": 1e-9,
-    "values": 1e-4,
-}
-"""Absolute, in the SI unit of the field (m, rad, m/s, rad/s, N, N s), plus RELATIVE of the value; other fields exactly.
-
-Wide against rounding, narrow against a collision that went another way: a dense line is chaotic, so runs on different
-machines do part in the end.
-"""
 RELATIVE = 1e-6
+"""Of the value, beside the absolute tolerance of a field (topics.Compare)."""
 
 
 @dataclass(frozen=True)
@@ -60,67 +41,27 @@ class Difference:
         )
 
 
-def _bottle_name(line: Any, message: Any, index: int) -> str:
-    return f"bottle {message.id[index]}"
-
-
-def _contact_name(line: Any, message: Any, index: int) -> str:
-    other = int(message.b[index])
-    if message.kind[index] == 0:
-        return f"the contact of bottles {message.a[index]} and {other}"
-    rail = line.rails[other] if other < len(line.rails) else other
-    return f"the contact of bottle {message.a[index]} and rail {rail}"
-
-
-def _bin_name(line: Any, message: Any, index: int) -> str:
-    return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"
-
-
-@dataclass(frozen=True)
-class _Comparer:
-    """The columns of a topic, how to name an entry of them, and the column that holds its bottle's id."""
-
-    columns: tuple[str, ...]
-    name: Callable[[Any, Any, int], str]
-    bottle: str | None = None
-
-
-def _columns(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
-
-
-COMPARERS = {
-    "bottles": _Comparer(_columns(BottleColumns), _bottle_name, "id"),
-    "contacts": _Comparer(_columns(ContactColumns), _contact_name, "a"),
-    "belts": _Comparer(_columns(BeltColumns), lambda line, _, index: f"belt {line.belts[index]}"),
-    "signals": _Comparer(("values",), lambda line, _, index: f"signal {line.signal_names[index]}"),
-    "ledger": _Comparer(_columns(Ledger), lambda *_: ""),
-    "damage": _Comparer(_columns(DamageColumns), _bottle_name, "id"),
-    "rail_wear": _Comparer(_columns(RailWearColumns), _bin_name),
-}
-"""By topic, in the order in which differences of one tick are looked for."""
-
-
 def first_difference(topic: str, line: Any, recorded: Any, replayed: Any, *, exact: bool) -> Difference | None:
     """Compares two decoded messages; `replayed` gives the tick and names the entries. None if they are equal."""
-    comparer = COMPARERS[topic]
+    row = COMPARED[topic]
+    compare = row.compare
     tick = int(replayed.tick)
     time = tick * line.tick_ns * 1e-9
 
     def found(field: str, then: object, now: object, index: int | None = None) -> Difference:
-        bottle = None if index is None or comparer.bottle is None else int(getattr(replayed, comparer.bottle)[index])
-        part = "" if index is None else comparer.name(line, replayed, index)
+        bottle = None if index is None or compare.bottle is None else int(getattr(replayed, compare.bottle)[index])
+        part = "" if index is None else compare.entry(line, replayed, index)
         return Difference(tick, time, topic, field, str(then), str(now), bottle, part)
 
     if recorded.tick != replayed.tick:
         return found("tick", recorded.tick, replayed.tick)
     if exact and recorded.header.stamp != replayed.header.stamp:
         return found("header.stamp", _seconds(recorded), _seconds(replayed))
-    for field in comparer.columns:
+    for field in row.fields:
         then, now = np.atleast_1d(getattr(recorded, field)), np.atleast_1d(getattr(replayed, field))
         if len(then) != len(now):
             return found(f"the number of entries ({field})", len(then), len(now))
-        unequal = np.flatnonzero(_unequal(then, now, None if exact else TOLERANCE.get(field)))
+        unequal = np.flatnonzero(_unequal(then, now, None if exact else compare.within.get(field)))
         if len(unequal):
             index = int(unequal[0])
             return found(field, repr(then[index].item()), repr(now[index].item()), index)

@@ -1,4 +1,4 @@
-"""Columns to messages: one function a message, each returning CDR bytes to publish and to record alike."""
+"""Columns to messages: CDR bytes to publish and to record alike."""
 
 from __future__ import annotations
 
@@ -12,26 +12,13 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.typestore import typestore
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.observe.columns import BottleColumns
 
 if TYPE_CHECKING:
-    from conveyor_sim.line.commands import CommandOutcome
     from conveyor_sim.simulation import Simulation
-    from conveyor_sim.stepping.guard import GuardEvent
 
-BOTTLES = "conveyor_msgs/msg/Bottles"
-CONTACTS = "conveyor_msgs/msg/Contacts"
-BELTS = "conveyor_msgs/msg/Belts"
 SIGNALS = "conveyor_msgs/msg/Signals"
-LEDGER = "conveyor_msgs/msg/Ledger"
-DAMAGE = "conveyor_msgs/msg/Damage"
-RAIL_WEAR = "conveyor_msgs/msg/RailWear"
-DAMAGE_EVENT = "conveyor_msgs/msg/DamageEvent"
-OUTCOME = "conveyor_msgs/msg/CommandOutcome"
 COMMANDS = "conveyor_msgs/msg/Commands"
-GUARD_EVENT = "conveyor_msgs/msg/GuardEvent"
 LINE = "conveyor_msgs/msg/Line"
 BOOL = "std_msgs/msg/Bool"
 SPEED = "std_msgs/msg/Float64"
@@ -76,23 +63,11 @@ def _serialize(type_name: str, header: Header, values: dict[str, Any]) -> bytes:
     return bytes(store.serialize_cdr(message, type_name, little_endian=True))
 
 
-def _by_field(columns: Any) -> dict[str, Any]:
-    return {field.name: getattr(columns, field.name) for field in fields(columns)}
-
-
-def bottles_message(columns: BottleColumns, header: Header) -> bytes:
-    """conveyor_msgs/Bottles."""
-    return _serialize(BOTTLES, header, _by_field(columns))
-
-
-def contacts_message(columns: ContactColumns, header: Header) -> bytes:
-    """conveyor_msgs/Contacts."""
-    return _serialize(CONTACTS, header, _by_field(columns))
-
-
-def belts_message(columns: BeltColumns, header: Header) -> bytes:
-    """conveyor_msgs/Belts."""
-    return _serialize(BELTS, header, _by_field(columns))
+def columns_message(type_name: str, columns: Any, header: Header) -> bytes:
+    """A message of the fields of a dataclass; of something with a tick of its own, the header belongs to that."""
+    values = {field.name: getattr(columns, field.name) for field in fields(columns) if field.name != "tick"}
+    texts = {name: list(value) for name, value in values.items() if isinstance(value, tuple)}
+    return _serialize(type_name, header, {**values, **texts})
 
 
 def signals_message(values: NDArray[np.float64], header: Header) -> bytes:
@@ -100,38 +75,21 @@ def signals_message(values: NDArray[np.float64], header: Header) -> bytes:
     return _serialize(SIGNALS, header, {"values": values})
 
 
-def ledger_message(ledger: Ledger, header: Header) -> bytes:
-    """conveyor_msgs/Ledger."""
-    return _serialize(LEDGER, header, _by_field(ledger))
+@dataclass(frozen=True)
+class Outcome:
+    """One recorded CommandOutcome."""
+
+    source: str
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    accepted: bool
+    reason: str
 
 
-def damage_message(columns: DamageColumns, header: Header) -> bytes:
-    """conveyor_msgs/Damage."""
-    return _serialize(DAMAGE, header, _by_field(columns))
-
-
-def rail_wear_message(columns: RailWearColumns, header: Header) -> bytes:
-    """conveyor_msgs/RailWear."""
-    return _serialize(RAIL_WEAR, header, _by_field(columns))
-
-
-def damage_event_message(event: DamageEvent, header: Header) -> bytes:
-    """conveyor_msgs/DamageEvent; the header belongs to the tick of the event."""
-    values = _by_field(event)
-    del values["tick"]
-    return _serialize(DAMAGE_EVENT, header, values)
-
-
-def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
-    """conveyor_msgs/CommandOutcome; the header belongs to the tick at which it was applied or refused."""
-    values = {
-        "source": outcome.source,
-        "names": list(outcome.names),
-        "values": outcome.values,
-        "accepted": outcome.accepted,
-        "reason": outcome.reason,
-    }
-    return _serialize(OUTCOME, header, values)
+def to_outcome(message: Any) -> Outcome:
+    """The outcome that a CommandOutcome message holds."""
+    values = tuple(float(value) for value in message.values)
+    return Outcome(message.source, tuple(message.names), values, bool(message.accepted), message.reason)
 
 
 def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:
@@ -144,12 +102,6 @@ def speed_message(speed: float) -> bytes:
     writer = CdrWriter()
     writer.pack("d", speed)
     return writer.finish()
-
-
-def guard_message(event: GuardEvent, header: Header) -> bytes:
-    """conveyor_msgs/GuardEvent."""
-    values = {name: getattr(event, name) for name in ("kind", "bottle", "x", "y", "text")}
-    return _serialize(GUARD_EVENT, header, values)
 
 
 def poses_message(columns: BottleColumns, header: Header) -> bytes:

@@ -1,68 +1,17 @@
-"""What a simulation tells: which topic at which tick, serialized once, handed to every sink that wants it."""
+"""Which topic is written at which tick: serialized once, handed to every sink that wants it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
-from conveyor_sim.bag import messages
-from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.qos import QOS, Qos
-from conveyor_sim.scene.marks import marks_of
+from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
 
 if TYPE_CHECKING:
     from conveyor_sim.line.commands import CommandOutcome
-    from conveyor_sim.observe.columns import BottleColumns
-    from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
-    from conveyor_sim.observe.ledger import Ledger
     from conveyor_sim.simulation import Simulation
     from conveyor_sim.stepping.guard import GuardEvent
-
-
-@dataclass(frozen=True)
-class Output:
-    """One topic: its relative name, message type, and the scene output whose rate it follows."""
-
-    name: str
-    type: str
-    rate: str | None
-    """Key of Scene.outputs; None: latched at the start, or sent when it happens (outcomes, events, photo-eyes)."""
-
-    @property
-    def qos(self) -> Qos:
-        """The quality of service offered for it."""
-        return QOS[self.name.partition("/")[0]]
-
-
-OUTPUTS: dict[str, Output] = {
-    output.name: output
-    for output in (
-        Output("line", messages.LINE, None),
-        Output("plant", messages.MARKERS, None),
-        Output("outcomes", messages.OUTCOME, None),
-        Output("guard", messages.GUARD_EVENT, None),
-        Output("damage_events", messages.DAMAGE_EVENT, None),
-        Output("bottles", messages.BOTTLES, "bottles"),
-        Output("poses", messages.POSES, "poses"),
-        Output("markers", messages.MARKERS, "poses"),
-        Output("contacts", messages.CONTACTS, "contacts"),
-        Output("belts", messages.BELTS, "belts"),
-        Output("signals", messages.SIGNALS, "signals"),
-        Output("ledger", messages.LEDGER, "ledger"),
-        Output("damage", messages.DAMAGE, "damage"),
-        Output("rail_wear", messages.RAIL_WEAR, "damage"),
-    )
-}
-"""By name; within a tick, messages are written in this order. These are recorded."""
-
-
-def photo_eye_outputs(names: Iterable[str]) -> dict[str, Output]:
-    """A topic for each photo-eye, by name: latched, sent when it changes. Not recorded, for `signals` has them."""
-    outputs = (Output(f"photo_eyes/{name}", messages.BOOL, None) for name in names)
-    return {output.name: output for output in outputs}
 
 
 class Sink(Protocol):
@@ -73,55 +22,6 @@ class Sink(Protocol):
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Takes one message, with its simulated time in ns."""
-
-
-class Snapshot:
-    """A simulation at one tick: its bottles are observed at most once, however many topics show them."""
-
-    def __init__(self, sim: Simulation) -> None:
-        self.sim = sim
-
-    @cached_property
-    def bottles(self) -> BottleColumns:
-        """The bottles present."""
-        return self.sim.bottles()
-
-    @property
-    def ledger(self) -> Ledger:
-        """The energy ledger, which a scene with that output has."""
-        ledger = self.sim.ledger()
-        assert ledger is not None
-        return ledger
-
-    @property
-    def damage(self) -> DamageColumns:
-        """What bottles have borne, which a scene with that output has."""
-        damage = self.sim.damage()
-        assert damage is not None
-        return damage
-
-    @property
-    def rail_wear(self) -> RailWearColumns:
-        """What rails have borne, likewise."""
-        wear = self.sim.rail_wear()
-        assert wear is not None
-        return wear
-
-
-SERIALIZERS: dict[str, Callable[[Snapshot, Header], bytes]] = {
-    "bottles": lambda now, header: messages.bottles_message(now.bottles, header),
-    "poses": lambda now, header: messages.poses_message(now.bottles, header),
-    "markers": lambda now, header: bottles_markers(
-        now.bottles, now.sim.model.type_radius, now.sim.moving_rails(), header
-    ),
-    "contacts": lambda now, header: messages.contacts_message(now.sim.contacts(), header),
-    "belts": lambda now, header: messages.belts_message(now.sim.belts(), header),
-    "signals": lambda now, header: messages.signals_message(now.sim.signals(), header),
-    "ledger": lambda now, header: messages.ledger_message(now.ledger, header),
-    "damage": lambda now, header: messages.damage_message(now.damage, header),
-    "rail_wear": lambda now, header: messages.rail_wear_message(now.rail_wear, header),
-}
-"""The topics that have a rate."""
 
 
 class Outputs:
@@ -137,10 +37,10 @@ class Outputs:
 
     def start(self) -> None:
         """Writes what is latched (line, plant) and the state at the present tick."""
-        model, header = self._sim.model, self._header(self._sim.tick)
-        marks = marks_of(self._sim.scene)
-        self._hand_out("line", header, messages.line_message, self._sim, self._run_id)
-        self._hand_out("plant", header, plant_markers, model.belt_shapes, model.rails_at_rest, marks)
+        header, now = self._header(self._sim.tick), Snapshot(self._sim, self._run_id)
+        for topic in OUTPUTS.values():
+            if topic.state is not None and topic.qos.latched:
+                self._hand_out(topic.name, topic, header, topic.state, now)
         self._write_state()
 
     def after_tick(self) -> list[CommandOutcome]:
@@ -153,15 +53,14 @@ class Outputs:
         """Writes what is known of a tick that failed: what became of its commands, what the guard says, and what went
         beyond limits.
         """
-        outcomes = self._sim.take_outcomes()
-        for outcome in outcomes:
-            self.tell(outcome)
-        for event in self._sim.take_guard_events():
-            self._noticed.append(event)
-            self._hand_out("guard", self._header(event.tick), messages.guard_message, event)
-        for passed in self._sim.take_damage_events():
-            self._hand_out("damage_events", self._header(passed.tick), messages.damage_event_message, passed)
-        return outcomes
+        happened: dict[str, Sequence[Any]] = {}
+        for topic in OUTPUTS.values():
+            if topic.events is not None:
+                happened[topic.name] = topic.events(self._sim)
+                for event in happened[topic.name]:
+                    self._hand_out(topic.name, topic, self._header(event.tick), _itself, event)
+        self._noticed += happened["guard"]
+        return list(happened["outcomes"])
 
     def take_noticed(self) -> list[GuardEvent]:
         """What the guard said since the last call; it has been written."""
@@ -170,32 +69,38 @@ class Outputs:
 
     def tell(self, outcome: CommandOutcome) -> None:
         """Writes one outcome that belongs to no tick to come."""
-        self._hand_out("outcomes", self._header(outcome.tick), messages.outcome_message, outcome)
+        self._hand_out("outcomes", OUTPUTS["outcomes"], self._header(outcome.tick), _itself, outcome)
 
     def _write_eyes(self) -> None:
-        eyes = self._sim.photo_eyes()
-        for topic, blocked in eyes.items():
-            if self._eyes.get(topic) is not blocked:
-                self._hand_out(topic, self._header(self._sim.tick), messages.bool_message, blocked)
+        eyes, row = self._sim.photo_eyes(), TOPICS["photo_eyes/<eye>"]
+        for name, blocked in eyes.items():
+            if self._eyes.get(name) is not blocked:
+                self._hand_out(name, row, self._header(self._sim.tick), _itself, blocked)
         self._eyes = eyes
 
     def _write_state(self) -> None:
         if not self._sinks:
             return
         self._write_eyes()
-        header, now = self._header(self._sim.tick), Snapshot(self._sim)
-        for topic, serialize in SERIALIZERS.items():
-            rate = OUTPUTS[topic].rate
-            if rate is not None and self._sim.due(rate):
-                self._hand_out(topic, header, serialize, now)
+        header, now = self._header(self._sim.tick), Snapshot(self._sim, self._run_id)
+        for topic in OUTPUTS.values():
+            if topic.state is None or topic.qos.latched:
+                continue
+            if topic.rate is None or self._sim.due(topic.rate):
+                self._hand_out(topic.name, topic, header, topic.state, now)
 
-    def _hand_out(self, topic: str, header: Header, serialize: Callable[..., bytes], *what: object) -> None:
-        takers = [sink for sink in self._sinks if sink.wants(topic)]
-        if takers:
-            data = serialize(*what, header)
+    def _hand_out(self, name: str, topic: Topic, header: Header, observe: Callable[[Any], Any], what: Any) -> None:
+        """Write what is observed, if any sink wants the topic and there is something."""
+        takers = [sink for sink in self._sinks if sink.wants(name)]
+        if takers and (found := observe(what)) is not None:
+            data = topic.pack(found, header)
             for sink in takers:
-                sink.write(topic, data, header.stamp_ns)
+                sink.write(name, data, header.stamp_ns)
 
     def _header(self, tick: int) -> Header:
         # ROS reads a stamp of 0 as "not set", so tick 0 is stamped 1 ns, as Simulation.stamp_ns does.
         return Header(tick, max(1, tick * self._sim.model.tick_ns), self._frame_id)
+
+
+def _itself(what: Any) -> Any:
+    return what

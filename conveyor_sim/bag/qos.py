@@ -1,4 +1,4 @@
-"""Quality of service of every topic, as data: the node offers it, and the bag's metadata states it."""
+"""Qualities of service as data: the node offers them, and the bag's metadata states them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,11 @@ class Qos:
     depth: int
     reliability: Literal["reliable", "best_effort"] = "reliable"
     durability: Literal["volatile", "transient_local"] = "volatile"
+
+    @property
+    def latched(self) -> bool:
+        """Whether the last messages hold for whoever joins late."""
+        return self.durability == "transient_local"
 
     def as_rosbag2(self) -> dict[str, object]:
         """The mapping that rosbag2 writes for one offered profile (metadata version 9)."""
@@ -36,8 +41,8 @@ DATA = Qos(depth=5)
 """What is published at a rate."""
 LATCHED = Qos(depth=1, durability="transient_local")
 """What is published once: a subscriber that joins late still gets it."""
-COMMANDS = Qos(depth=100)
-"""Commands, what the guard tells, limits that are passed: each one counts."""
+EVENTS = Qos(depth=100)
+"""Commands, what the guard reports, limits that are passed: each one counts."""
 OUTCOMES = Qos(depth=1000)
 """As many as one tick may bring (ros/inbox.py)."""
 ALARMS = Qos(depth=100, durability="transient_local")
@@ -46,27 +51,3 @@ ANSWERS = Qos(depth=1000)
 """Of the service `lockstep`: each client is sent the answers to all, and a short history could lose it its own."""
 CLOCK = Qos(depth=1)
 """Reliable, because that also matches subscribers that ask for best effort."""
-
-QOS = {
-    "bottles": DATA,
-    "poses": DATA,
-    "contacts": DATA,
-    "belts": DATA,
-    "signals": DATA,
-    "ledger": DATA,
-    "damage": DATA,
-    "rail_wear": DATA,
-    "markers": DATA,
-    "line": LATCHED,
-    "plant": LATCHED,
-    "outcomes": OUTCOMES,
-    "guard": COMMANDS,
-    "alarms": ALARMS,
-    "damage_events": COMMANDS,
-    "commands": COMMANDS,
-    "cmd_speed": COMMANDS,
-    "photo_eyes": LATCHED,
-    "clock": CLOCK,
-    "diagnostics": DATA,
-}
-"""By topic; `cmd_speed` stands for every `belts/<belt>/cmd_speed`, `photo_eyes` for every `photo_eyes/<eye>`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import stat
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path, PurePath
@@ -16,17 +16,16 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
-from conveyor_sim.bag import messages
 from conveyor_sim.bag.index import sealed
+from conveyor_sim.bag.messages import LINE, Outcome
 from conveyor_sim.bag.metadata import FILE_NAME, file_names, read_metadata
 from conveyor_sim.bag.qos import DATA, Qos
 from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.salvage import Salvage
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")
@@ -43,17 +42,6 @@ class Frame(Generic[T]):
     time: float
     """s, simulated."""
     data: T
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One recorded CommandOutcome."""
-
-    source: str
-    names: tuple[str, ...]
-    values: tuple[float, ...]
-    accepted: bool
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -93,9 +81,9 @@ class Bag(AbstractContextManager["Bag"]):
         """Every byte is as it was written; False: some carry no checksum."""
         self._reader = reader
         self._shares_position = _is_scanned(reader)
-        line_topics = [c.topic for c in reader.connections if c.msgtype == messages.LINE and c.msgcount]
+        line_topics = [c.topic for c in reader.connections if c.msgtype == LINE and c.msgcount]
         if not line_topics:
-            raise BagError(f"{path}: no message of type {messages.LINE}, expected the latched topic line")
+            raise BagError(f"{path}: no message of type {LINE}, expected the latched topic line")
         self.namespace = line_topics[0].rpartition("/")[0]
         self.line: Any = next(iter(self.messages("line"))).data
 
@@ -177,41 +165,31 @@ class Bag(AbstractContextManager["Bag"]):
             message = self.decode(topic, data)
             yield Frame(message.tick, message.tick * self._tick_ns(message) * 1e-9, message)
 
+    def read(self, topic: str) -> Iterator[Frame[Any]]:
+        """Every message of one topic as its row of topics.TOPICS reads it: columns, or whatever it says there."""
+        row = TOPICS[topic]
+        for frame in self.messages(topic):
+            yield Frame(frame.tick, frame.time, row.unpack(frame.data))
+
     def bottles(self) -> Iterator[Frame[BottleColumns]]:
         """Every recorded Bottles."""
-        return self._columns("bottles", lambda message: to_columns(BottleColumns, message))
+        return self.read("bottles")
 
     def contacts(self) -> Iterator[Frame[ContactColumns]]:
         """Every recorded Contacts."""
-        return self._columns("contacts", lambda message: to_columns(ContactColumns, message))
+        return self.read("contacts")
 
     def belts(self) -> Iterator[Frame[BeltColumns]]:
         """Every recorded Belts."""
-        return self._columns("belts", lambda message: to_columns(BeltColumns, message))
+        return self.read("belts")
 
     def signals(self) -> Iterator[Frame[NDArray[np.float64]]]:
         """Every recorded process image, in the order of line.signal_names."""
-        return self._columns("signals", lambda message: message.values)
-
-    def ledger(self) -> Iterator[Frame[Ledger]]:
-        """Every recorded energy ledger."""
-        return self._columns("ledger", lambda message: to_columns(Ledger, message))
-
-    def damage(self) -> Iterator[Frame[DamageColumns]]:
-        """Every recorded Damage."""
-        return self._columns("damage", lambda message: to_columns(DamageColumns, message))
-
-    def rail_wear(self) -> Iterator[Frame[RailWearColumns]]:
-        """Every recorded wear of the rails."""
-        return self._columns("rail_wear", lambda message: to_columns(RailWearColumns, message))
-
-    def damage_events(self) -> Iterator[Frame[DamageEvent]]:
-        """Every limit that was passed."""
-        return self._columns("damage_events", lambda message: to_columns(DamageEvent, message))
+        return self.read("signals")
 
     def outcomes(self) -> Iterator[Frame[Outcome]]:
         """What became of every command, in order; the tick is the one at which it was applied or refused."""
-        return self._columns("outcomes", to_outcome)
+        return self.read("outcomes")
 
     def bottle_series(self, ids: Collection[int]) -> dict[int, BottleSeries]:
         """The histories of some bottles, from one pass over the bag; ids that never occur are left out."""
@@ -226,15 +204,11 @@ class Bag(AbstractContextManager["Bag"]):
                     row[name].append(getattr(frame.data, name)[index])
         return {bottle: BottleSeries(**{n: np.array(v) for n, v in row.items()}) for bottle, row in rows.items()}
 
-    def _columns(self, topic: str, convert: Callable[[Any], T]) -> Iterator[Frame[T]]:
-        for frame in self.messages(topic):
-            yield Frame(frame.tick, frame.time, convert(frame.data))
-
     def _relative(self, topic: str) -> str:
         return topic.removeprefix(f"{self.namespace}/")
 
     def _tick_ns(self, message: Any) -> int:
-        return int(message.tick_ns if message.__msgtype__ == messages.LINE else self.line.tick_ns)
+        return int(message.tick_ns if message.__msgtype__ == LINE else self.line.tick_ns)
 
 
 def _is_scanned(reader: AnyReader) -> bool:
@@ -254,17 +228,6 @@ def _offered(connection: Connection) -> Qos:
         reliability="best_effort" if first.reliability is QosReliability.BEST_EFFORT else "reliable",
         durability="transient_local" if first.durability is QosDurability.TRANSIENT_LOCAL else "volatile",
     )
-
-
-def to_columns(kind: type[T], message: Any) -> T:
-    """The columns dataclass that a message holds field by field."""
-    return kind(**{field.name: getattr(message, field.name) for field in fields(kind)})  # type: ignore[arg-type]
-
-
-def to_outcome(message: Any) -> Outcome:
-    """The outcome that a CommandOutcome message holds."""
-    values = tuple(float(value) for value in message.values)
-    return Outcome(message.source, tuple(message.names), values, bool(message.accepted), message.reason)
 
 
 @contextmanager

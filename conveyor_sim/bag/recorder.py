@@ -14,7 +14,7 @@ from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.lock import claim
 from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, McapFile, Schema
 from conveyor_sim.bag.metadata import to_yaml, write_metadata
-from conveyor_sim.bag.outputs import OUTPUTS
+from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.bag.typestore import default_distro, definition, type_hash
 from conveyor_sim.errors import BagError
 
@@ -26,7 +26,7 @@ what a loaded machine adds: less than a second."""
 class Recorder(contextlib.AbstractContextManager["Recorder"]):
     """A sink that records every message it is given; use it as a context manager.
 
-    path: the folder to create, which must not exist or be empty. topics: those of OUTPUTS to record (default: all).
+    path: the folder to create, which must not exist or be empty. topics: names of OUTPUTS to record (default: all).
     A thread of its own flushes, whether more messages come or not; any thread may call the methods.
     Raises BagError, before anything is simulated, if the folder can't be written; then nothing is left of it.
     """

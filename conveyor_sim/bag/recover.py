@@ -12,7 +12,6 @@ from pathlib import Path, PurePath
 from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
-from conveyor_sim.bag.compare import COMPARERS
 from conveyor_sim.bag.index import read_index, sealed
 from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.mcap_file import McapFile, Schema, topic_info
@@ -27,14 +26,14 @@ from conveyor_sim.bag.metadata import (
     read_metadata,
     write_metadata,
 )
-from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.salvage import NothingLeft, Salvage
+from conveyor_sim.bag.topics import STATES
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import BagError
 
-STATE_TYPES = {OUTPUTS[topic].type for topic in COMPARERS}
+STATE_TYPES = {topic.type for topic in STATES.values()}
 
 
 @dataclass(frozen=True)
@@ -285,7 +284,7 @@ def _unusable(path: Path) -> str:
     """Why a bag can't be replayed or drawn, in words; empty if it can."""
     try:
         with open_bag(path) as bag:
-            known = any(bag.counts.get(topic) for topic in COMPARERS)
+            known = any(bag.counts.get(topic) for topic in STATES)
     except BagError as error:
         return str(error)
-    return "" if known else f"{path}: holds no message of topics {', '.join(COMPARERS)}"
+    return "" if known else f"{path}: holds no message of topics {', '.join(STATES)}"

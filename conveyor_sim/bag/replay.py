@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.bag.compare import COMPARERS, Difference, first_difference, outcome_difference
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.outputs import SERIALIZERS, Snapshot
-from conveyor_sim.bag.reader import Bag, Outcome, open_bag, to_outcome
+from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
+from conveyor_sim.bag.messages import Header, Outcome, to_outcome
+from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
+from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
+from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG
 from conveyor_sim.simulation import Simulation
-
-SENSITIVE = frozenset({"contacts", "ledger", "damage", "rail_wear"})
-"""Topics that are compared bit for bit or not at all."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +80,9 @@ class _Messages:
 def replay(path: str | Path, progress: Callable[[float, float], None] | None = None) -> ReplayReport:
     """Replays a bag (recorded by this package or, the same topics, by stock rosbag2) and compares.
 
-    Bottles, Contacts, Belts, Signals, Ledgers, Damage, RailWear and CommandOutcomes are compared bit for bit where the
-    engine, versions and machine are those of the recording; elsewhere within compare.TOLERANCE, those in SENSITIVE left
-    out. Stops at the first difference. progress(done, total) is told simulated times, s.
+    What is in topics.COMPARED, and the outcomes of commands, is compared bit for bit where the engine, versions and
+    machine are those of the recording; elsewhere within the tolerances of the topics, those without any left out.
+    Stops at the first difference. progress(done, total) is called with simulated times, s.
     Raises BagError, also for a recording from before rails that move had limits; SceneError if the recorded scene is
     refused.
     """
@@ -112,15 +110,16 @@ class _Replay:
         self._environment = environment
         self._exact = not environment
         self._progress = progress
-        recorded = bag.counts
-        topics = [topic for topic in COMPARERS if recorded.get(topic) and (self._exact or topic not in SENSITIVE)]
+        recorded, types = bag.counts, bag.types
+        here = [row for row in COMPARED.values() if self._exact or row.compare.within]
+        topics = [row.name for row in here if recorded.get(row.name) and types[row.name] == row.type]
         end_ns = simulation.scene.duration_ticks * simulation.model.tick_ns
         self._states = [_Messages(bag, topic, end_ns) for topic in topics]
         self._outcomes = _Messages(bag, "outcomes", end_ns) if recorded.get("outcomes") else None
         self._compared = dict.fromkeys(topics, 0)
         self._last_tick = -1
         if not self._states:
-            raise BagError(f"{bag.path}: holds no message of topics {', '.join(COMPARERS)}; nothing can be compared")
+            raise BagError(f"{bag.path}: holds no message of topics {', '.join(STATES)}; nothing can be compared")
 
     def run(self) -> ReplayReport:
         first_tick = min(tick for state in self._states if (tick := state.next_tick) is not None)
@@ -175,8 +174,9 @@ class _Replay:
         return None
 
     def _compare(self, topic: str, recorded: Any, now: Snapshot) -> Difference | None:
-        header = Header(self._sim.tick, self._sim.stamp_ns, recorded.header.frame_id)
-        replayed = self._bag.decode(topic, SERIALIZERS[topic](now, header))
+        header, row = Header(self._sim.tick, self._sim.stamp_ns, recorded.header.frame_id), COMPARED[topic]
+        assert row.state is not None
+        replayed = self._bag.decode(topic, row.pack(row.state(now), header))
         return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
 
 

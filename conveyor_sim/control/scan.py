@@ -63,6 +63,21 @@ class Controller(Protocol):
         """One scan: commands by name, and alarms (keys that begin with ALARMS)."""
 
 
+class AlarmChanges:
+    """What of a controller's alarms is to be given to the line with its commands: all at first, then what changes."""
+
+    def __init__(self) -> None:
+        self._given: dict[str, float] = {}
+
+    def of(self, answer: Mapping[str, float]) -> dict[str, float]:
+        """The alarms of a scan's answer that come or go, 1 or 0; one that it does not have any more goes."""
+        alarms = {name: float(value >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
+        now = {**dict.fromkeys(self._given, 0.0), **alarms}
+        changes = {name: value for name, value in now.items() if self._given.get(name) != value}
+        self._given = now
+        return changes
+
+
 @dataclass(frozen=True)
 class Constant:
     """Gives the same commands in every scan: `Constant({"belts/feeder/cmd_speed": 0.5})`."""

@@ -7,6 +7,15 @@ from dataclasses import dataclass
 from conveyor_sim.line.process_image import Command
 from conveyor_sim.support.printable import printable
 
+FAULT = "fault"
+"""Source of outcomes of faults."""
+
+ALARMS = "alarms/"
+"""What the name of an input begins with that is an alarm of the controller, 0 or 1: it commands nothing."""
+
+MOST_ALARMS = 1000
+"""That stand at once."""
+
 LISTED = 20
 """Names that a refusal lists, of those there are."""
 
@@ -33,6 +42,10 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
     known = {command.name: command for command in table}
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
+        if name.startswith(ALARMS) and what == "command":
+            if wrong := alarm_problem(name, value):
+                return wrong
+            continue
         if name not in known:
             return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
         if name in seen:
@@ -47,6 +60,13 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
         if not math.isfinite(value) or not command.low <= value <= command.high:
             return f"{name}: {value:g} given, expected {command.low:g} to {command.high:g}{unit}"
     return ""
+
+
+def alarm_problem(name: str, value: float) -> str:
+    """Why an alarm can't be noted, "" if it can."""
+    if name == ALARMS:
+        return f"{name}: given, expected the name of an alarm behind it"
+    return "" if value in (0.0, 1.0) else f"{printable(name)}: {value:g} given, expected 0 or 1"
 
 
 def shown(names: Sequence[str]) -> tuple[str, ...]:

@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
-from conveyor_sim.line.commands import CommandOutcome, refusal, shown
+from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
+from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.process_image import ProcessImage, Role
+from conveyor_sim.observe.damage import DamageEvent
+from conveyor_sim.observe.events import Event
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 from conveyor_sim.state.snapshot import Unchecked, entries, restore, snapshot, typed
 from conveyor_sim.support.printable import printable
-
-FAULT = "fault"
-"""Source of outcomes of faults."""
 
 WATCHDOG = "watchdog"
 """Source of outcomes that the line itself brings about."""
@@ -49,7 +49,9 @@ class Line:
         self._ending = [device for device in devices if type(device).end is not Device.end]
         self._taking = [device for device in devices if type(device).take is not Device.take]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
-        self._counting = [device for device in devices if any(signal.role for signal in device.signals)]
+        self._counting = [
+            device for device in devices if any(signal.role not in ("", "state") for signal in device.signals)
+        ]
         self.takes = bool(self._taking) and state.model.has("outfeed")
         """Whether any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
@@ -63,6 +65,8 @@ class Line:
         self._surfaces = BeltSurfaces(state)
         self._pending: list[_Pending] = []
         self._outcomes: list[CommandOutcome] = []
+        self._log = EventLog(devices, self.now)
+        self.now.begin_scan()  # which its look at the devices began, before there are bottles
 
     @property
     def fed(self) -> int:
@@ -94,7 +98,9 @@ class Line:
 
     def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
         """Have inputs applied, or refused, together as the next tick begins."""
-        self._pending.append((tuple(names), tuple(float(value) for value in values), printable(source)))
+        # Whoever names an alarm makes it up, so it is kept as it can be shown.
+        kept = tuple(printable(name) if name.startswith(ALARMS) else name for name in names)
+        self._pending.append((kept, tuple(float(value) for value in values), printable(source)))
 
     @property
     def waiting(self) -> Sequence[tuple[tuple[str, ...], tuple[float, ...], str]]:
@@ -109,7 +115,12 @@ class Line:
     def refusal(self, names: Sequence[str], values: Sequence[float], source: str) -> str:
         """Why a set of inputs can't be applied, "" if it can."""
         table = self.image.faults if source == FAULT else self.image.commands
-        return refusal(table, FAULT if source == FAULT else "command", names, values)
+        if reason := refusal(table, FAULT if source == FAULT else "command", names, values):
+            return reason
+        raised = {name for name, value in zip(names, values, strict=True) if name.startswith(ALARMS) and value}
+        if raised and len(raised.union(self._log.alarms)) > MOST_ALARMS:
+            return f"{len(raised)} alarms given while {len(self._log.alarms)} stand, expected {MOST_ALARMS} at most"
+        return ""
 
     def take_outcomes(self) -> list[CommandOutcome]:
         """What became of inputs since the last call, in order."""
@@ -119,17 +130,21 @@ class Line:
     def begin(self, tick: int) -> None:
         """Apply what was queued and let the devices act before the steps from a tick."""
         self._at(tick)
+        self._log.begin()
         pending, self._pending = self._pending, []
         for names, values, source in pending:
             reason = self.refusal(names, values, source)
             if not reason:
                 for name, value in zip(names, values, strict=True):
-                    self._owner[name].command(name, value, self.now)
+                    if name in self._owner:  # not an alarm
+                        self._owner[name].command(name, value, self.now)
             told = shown(names) if reason else names
             self._outcomes.append(CommandOutcome(tick, source, told, values, not reason, reason))
+            self._log.note_outcome(self._outcomes[-1])
         for belt in self._belts:
             if name := belt.watch(self.now):
                 self._outcomes.append(CommandOutcome(tick, WATCHDOG, (name,), (0.0,), True, ""))
+                self._log.note(tick, "machine_state", name, 0.0, text="stopped: no command came for its watchdog")
         before = self.now.speeds.tolist()
         for device in self._beginning:
             device.begin(self.now)
@@ -145,14 +160,39 @@ class Line:
     def take(self) -> None:
         """Let the devices take bottles off the line."""
         for device in self._taking:
+            before = self.now.state.world.bottles.id.copy()
             device.take(self.now)
+            self._log.note_removed(device, before, self.now)
         self.now.begin_scan()
 
     def feed(self) -> None:
         """Let the devices put bottles onto the line."""
         for device in self._feeding:
+            first = self.now.state.next_id
             device.feed(self.now)
+            self._log.note_fed(device, first, self.now)
         self.now.begin_scan()
+
+    def close(self, passed: Sequence[DamageEvent]) -> None:
+        """A tick has ended, in which these limits were passed: what happened in it is complete."""
+        for limit in passed:
+            self._log.note(limit.tick, "limit_passed", limit.kind, limit.value, limit.bottle, limit.text)
+        self._log.note_states(self.now)
+
+    @property
+    def happened(self) -> Sequence[Event]:
+        """What has happened since the tick before, in order."""
+        return tuple(Event(*event) for event in self._log.events)
+
+    @property
+    def happened_so_far(self) -> int:
+        """How many events there were since the start."""
+        return self._log.total
+
+    @property
+    def alarms(self) -> frozenset[str]:
+        """Names of the alarms that stand, without what they begin with."""
+        return frozenset(name.removeprefix(ALARMS) for name in self._log.alarms)
 
     def signals(self) -> F8:
         """Values of all signals, in the order of the process image."""
@@ -174,6 +214,7 @@ class Line:
         self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
         self.now.bad = set(other.now.bad)
         self._restore_devices(snapshot(other._by_name()))
+        restore(self._log, snapshot(other._log))
 
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
@@ -184,6 +225,7 @@ class Line:
             "speeds": self.now.speeds.tolist(),
             "bad": sorted(self.now.bad),
             "devices": snapshot(self._by_name()),
+            "log": snapshot(self._log),
         }
 
     def restore(self, tick: int, memory: dict[str, Any]) -> None:
@@ -197,6 +239,7 @@ class Line:
         self._surfaces.note(self.now.speeds)
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
         self._restore_devices(memory["devices"])
+        restore(self._log, memory["log"], "line.log")
 
     def _restore_devices(self, memory: Any) -> None:
         restore(self._by_name(), memory, "line.devices")

@@ -17,7 +17,7 @@ class MachineDevice(Device):
         most = rate if rate_limit is None else rate_limit
         super().__init__(
             name,
-            [Signal(f"{name}/running", "1", "bool"), *signals],
+            [Signal(f"{name}/running", "1", "bool", "state"), *signals],
             [switch(f"{name}/run"), Command(f"{name}/rate", "1/s", "number", 0.0, most)],
             [switch(f"{name}/stop")],
         )

@@ -7,8 +7,9 @@ from typing import Literal
 Kind = Literal["bool", "count", "number"]
 """bool: 0 or 1; count: a whole number."""
 
-Role = Literal["", "fed", "removed", "rejected"]
-"""What a count adds to: bottles put onto the line, taken off it, thrown out of it; "" to nothing."""
+Role = Literal["", "fed", "removed", "rejected", "state"]
+"""What a signal adds to: bottles put onto the line, taken off it, thrown out of it; or whether it is the state of a
+machine, each change of which is an event; "": neither."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Recording:
     @property
     def energy(self) -> Energy | None:
         """The energy ledger, at every recorded one; None if there is none."""
-        frames = list(self._bag.ledger())
+        frames = list(self._bag.read("ledger"))
         if not frames:
             return None
         values = {
@@ -85,7 +85,7 @@ class Recording:
         worst: dict[str, dict[int, float]] = {name: {} for name in known}
         ids: set[int] = set()
         time = None
-        for frame in self._bag.damage():
+        for frame in self._bag.read("damage"):
             time = frame.time
             ids.update(frame.data.id.tolist())
             for name, by_bottle in worst.items():
@@ -96,7 +96,7 @@ class Recording:
         if time is None:
             return None
         wear: RailWearColumns | None = None
-        for last in self._bag.rail_wear():
+        for last in self._bag.read("rail_wear"):
             wear = last.data
         none = np.zeros(0)
         limits = {name: limit for name in known if (limit := getattr(self.scene.limits, name)) is not None}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import ros_qos
 
@@ -19,7 +19,7 @@ class Alarms:
     """
 
     def __init__(self, node: Node) -> None:
-        self._publisher = node.create_publisher(DiagnosticArray, "alarms", ros_qos(QOS["alarms"]))
+        self._publisher = node.create_publisher(DiagnosticArray, "alarms", ros_qos(TOPICS["alarms"].qos))
         self._source = node.get_name()
         self._told: dict[str, bool] = {}
 

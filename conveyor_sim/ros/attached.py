@@ -25,7 +25,7 @@ from rclpy.context import Context
 from rclpy.serialization import deserialize_message
 
 from conveyor_sim.bag.messages import LINE, Header, line_message
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
@@ -124,7 +124,7 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         stack.callback(rclpy.shutdown, context=context)
         node = new_node("conveyor_sim", context=context, namespace=namespace)
         stack.callback(node.destroy_node)
-        lines = node.create_publisher(Line, "line", ros_qos(QOS["line"]))
+        lines = node.create_publisher(Line, "line", ros_qos(TOPICS["line"].qos))
         check_type(node, lines.topic_name, LINE, default_distro())
         lines.publish(_line(self._turns.simulation, self._turns.run_id))
         spinner = Spinner(context, died=self._died)

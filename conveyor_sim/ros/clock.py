@@ -5,7 +5,7 @@ from __future__ import annotations
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import ros_qos
 
@@ -16,7 +16,7 @@ class ClockPublisher:
     """Publishes simulated time, at most `rate` times a wall second; it is asked after each tick, and while paused."""
 
     def __init__(self, node: Node, rate: float) -> None:
-        self._publisher = node.create_publisher(Clock, "/clock", ros_qos(QOS["clock"]))
+        self._publisher = node.create_publisher(Clock, "/clock", ros_qos(TOPICS["/clock"].qos))
         self.topic: str = self._publisher.topic_name
         """Its whole name, remapped or not."""
         self._cap = RateCap(rate)

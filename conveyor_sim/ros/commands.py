@@ -13,7 +13,8 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from std_msgs.msg import Float64
 
-from conveyor_sim.bag.qos import QOS, Qos
+from conveyor_sim.bag.qos import Qos
+from conveyor_sim.bag.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.ros.gaps import Gaps
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE
@@ -25,10 +26,11 @@ UNREADABLE = "not readable as {type}, expected its serialized form"
 
 def subscribe_commands(node: Node, stepper: Stepper) -> None:
     """Pass every command on to the simulation, which judges it at the start of the next tick."""
-    _Topic(node, stepper, "commands", Commands, QOS["commands"], lambda message: (tuple(message.names), message.values))
+    qos = TOPICS["commands"].qos
+    _Topic(node, stepper, "commands", Commands, qos, lambda message: (tuple(message.names), message.values))
     for belt in stepper.session.simulation.model.belts:
         name = speed_command(belt)
-        _Topic(node, stepper, name, Float64, QOS["cmd_speed"], partial(_speed, name))
+        _Topic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
 
 
 def _speed(name: str, message: Any) -> tuple[tuple[str, ...], tuple[float, ...]]:

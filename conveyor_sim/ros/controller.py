@@ -16,8 +16,9 @@ from conveyor_msgs.msg import Commands, Line, Signals
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import ANSWERS, QOS
-from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
+from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.publishers import ros_qos
@@ -38,7 +39,9 @@ class Stopped(Exception):
 
 
 class Scanner:
-    """A controller on the line of one run: values in the line's order in, commands out; alarms are published."""
+    """A controller on the line of one run: values in the line's order in, commands out, and alarms, which are published
+    too.
+    """
 
     def __init__(self, controller: Controller, line: Any, alarms: Alarms) -> None:
         """line: conveyor_msgs/Line."""
@@ -46,9 +49,13 @@ class Scanner:
         self._names: Sequence[str] = line.signal_names
         self._tick_ns: int = line.tick_ns
         self._alarms = alarms
+        self._changes = AlarmChanges()
 
     def scan(self, values: Sequence[float], tick: int, ticks: int) -> dict[str, float]:
-        """Commands by name, for the scan at a tick that is so many ticks long. Raises ConveyorError."""
+        """Commands by name, and alarms that come or go, for the scan at a tick that is so many ticks long.
+
+        Raises ConveyorError.
+        """
         signals = dict(zip(self._names, values, strict=True))
         try:
             answer = self._controller.scan(
@@ -57,7 +64,8 @@ class Scanner:
         except ControlError as error:
             raise ConveyorError(f"scan at tick {tick}: {error}") from error
         self._alarms.tell(_alarms(answer), max(1, tick * self._tick_ns))
-        return {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+        commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+        return {**commands, **self._changes.of(answer)}
 
 
 class ControllerRun:
@@ -77,7 +85,7 @@ class ControllerRun:
         self._line: Any = None
         self._has_line = threading.Event()
         self._alarms = Alarms(node)
-        node.create_subscription(Line, "line", self._on_line, ros_qos(QOS["line"]))
+        node.create_subscription(Line, "line", self._on_line, ros_qos(TOPICS["line"].qos))
         self._lockstep = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS))
         self._spinner = Spinner(died=self._died)
         self._spinner.start(node)
@@ -122,7 +130,7 @@ class ControllerRun:
         """Scan what arrives, until asked to stop. Raises ConveyorError if a scan fails."""
         self._find(lambda: True)
         free = _FreeScans(self._node, self._scan_ticks, self._scanner, lambda: self._line)
-        self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(QOS["signals"]))
+        self._node.create_subscription(Signals, "signals", free.on_signals, ros_qos(TOPICS["signals"].qos))
         self._node.get_logger().info(f"controls {printable(self._line.scene_name)} as its signals arrive")
         self._stop.wait()
         if self._error is not None:
@@ -187,7 +195,7 @@ class _FreeScans:
     """Scans signals as they arrive, every `scan_ticks` ticks or as seldom as they come."""
 
     def __init__(self, node: Node, scan_ticks: int, scanner: Callable[[Any], Scanner], line: Callable[[], Any]) -> None:
-        self._commands = node.create_publisher(Commands, "commands", ros_qos(QOS["commands"]))
+        self._commands = node.create_publisher(Commands, "commands", ros_qos(TOPICS["commands"].qos))
         self._scan_ticks = scan_ticks
         self._make = scanner
         self._present = line

@@ -9,7 +9,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import RosSink, ros_qos
@@ -32,7 +32,7 @@ class Diagnostics:
         self._sink = sink
         self._graph = graph
         self._name = f"{node.get_name()}: simulation"
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", ros_qos(QOS["diagnostics"]))
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", ros_qos(TOPICS["/diagnostics"].qos))
         self._last_wall = time.monotonic()
         self._last_tick = 0
         self._last_run = ""

@@ -9,7 +9,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from conveyor_sim.line.line import FAULT
+from conveyor_sim.line.commands import FAULT
 from conveyor_sim.ros.inbox import size_of
 from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.services import settled

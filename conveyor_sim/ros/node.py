@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from conveyor_sim.bag.folder import require_recordable
-from conveyor_sim.bag.outputs import OUTPUTS, photo_eye_outputs
+from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.explain.choices import setting_line
 from conveyor_sim.ros import parameters
@@ -85,7 +85,7 @@ class SimNode:
         self._scene = load_scene(scene_path(self._given.scene), self._given.overrides(), self._given.outside_tables)
         if self._given.record is not None:
             require_recordable(self._given.record)
-        topics = {**OUTPUTS, **photo_eye_outputs(self._scene.photo_eyes)}
+        topics = {**OUTPUTS, **photo_eye_topics(self._scene.photo_eyes)}
         with one_sentence():  # names may have been remapped to one that is taken
             self._sink = RosSink(node, self._distro, {"markers": RateCap(self._given.marker_rate)}, topics)
         self._compilation = Compilation(self._scene, node.get_logger().info)

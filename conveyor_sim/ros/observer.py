@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rosgraph_msgs.msg import Clock
 
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.diagnostics import TICK, WALL
 from conveyor_sim.ros.publishers import ros_qos
@@ -28,9 +28,9 @@ class Observer(AbstractContextManager["Observer"]):
         self._last_tick = last_tick
         start_ros()
         self._node = new_node("observer")
-        self._node.create_subscription(Clock, "/clock", self._on_clock, ros_qos(QOS["clock"]))
+        self._node.create_subscription(Clock, "/clock", self._on_clock, ros_qos(TOPICS["/clock"].qos))
         self._node.create_subscription(
-            DiagnosticArray, "/diagnostics", self._on_diagnostics, ros_qos(QOS["diagnostics"])
+            DiagnosticArray, "/diagnostics", self._on_diagnostics, ros_qos(TOPICS["/diagnostics"].qos)
         )
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)

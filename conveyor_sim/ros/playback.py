@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from conveyor_sim.bag import messages
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.qos import COMMANDS, LATCHED, QOS, Qos
-from conveyor_sim.bag.reader import Bag, Outcome, to_outcome
+from conveyor_sim.bag import messages, topics
+from conveyor_sim.bag.messages import Header, Outcome, to_outcome
+from conveyor_sim.bag.qos import EVENTS, LATCHED, Qos
+from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
+from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG
 from conveyor_sim.line.process_image import speed_command
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
@@ -47,12 +48,13 @@ class Topic:
     @property
     def latched(self) -> bool:
         """Whether its last message holds until the next one, for whoever joins late."""
-        return self.qos.durability == "transient_local"
+        return self.qos.latched
 
     @property
     def event(self) -> bool:
         """Whether each message counts for its own moment only, and none tells a state."""
-        return QOS.get(self.name) is COMMANDS
+        row = topics.TOPICS.get(self.name)
+        return row is not None and row.each_counts
 
 
 class Playback:
@@ -85,8 +87,8 @@ class Playback:
         known = {topic.name for topic in recorded}
         made: list[Topic] = []
         if "outcomes" in known:
-            made.append(Topic("commands", messages.COMMANDS, COMMANDS, None))
-            made += [Topic(speed_command(belt), messages.SPEED, COMMANDS, None) for belt in bag.line.belts]
+            made.append(Topic("commands", messages.COMMANDS, EVENTS, None))
+            made += [Topic(speed_command(belt), messages.SPEED, EVENTS, None) for belt in bag.line.belts]
         eyes = _photo_eyes(bag.line.signal_names) if "signals" in known else {}
         made += [Topic(eye, messages.BOOL, LATCHED, None) for eye in eyes]
         self.topics = (*recorded, *(topic for topic in made if topic.name not in known))

@@ -12,8 +12,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from conveyor_sim.bag.outputs import Output
 from conveyor_sim.bag.qos import Qos
+from conveyor_sim.bag.topics import Topic
 from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.pacing import RateCap
@@ -40,18 +40,18 @@ class RosSink:
     Written to by the stepping thread; `published` may be read by any.
     """
 
-    def __init__(self, node: Node, distro: str, caps: Mapping[str, RateCap], outputs: Mapping[str, Output]) -> None:
-        """Creates a publisher for each output, by name.
+    def __init__(self, node: Node, distro: str, caps: Mapping[str, RateCap], topics: Mapping[str, Topic]) -> None:
+        """Creates a publisher for each topic, by name.
 
         Raises ConveyorError if ROS knows a message type by another definition than the one serialized here.
         """
         self.published: Counter[str] = Counter()
         self._caps = caps
         self._publishers: dict[str, Publisher] = {}
-        self._latched = {name for name, output in outputs.items() if output.qos.durability == "transient_local"}
-        for name, output in outputs.items():
-            publisher = node.create_publisher(message_class(output.type), name, ros_qos(output.qos))
-            check_type(node, publisher.topic_name, output.type, distro)
+        self._latched = {name for name, topic in topics.items() if topic.qos.latched}
+        for name, topic in topics.items():
+            publisher = node.create_publisher(message_class(topic.type), name, ros_qos(topic.qos))
+            check_type(node, publisher.topic_name, topic.type, distro)
             self._publishers[name] = publisher
 
     def wants(self, topic: str) -> bool:

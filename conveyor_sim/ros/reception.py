@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.line.line import ARRIVAL, FAULT, WATCHDOG
+from conveyor_sim.line.commands import FAULT, CommandOutcome
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG
 from conveyor_sim.ros.inbox import Inbox, size_of
 from conveyor_sim.ros.session import Session
 

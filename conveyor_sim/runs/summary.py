@@ -14,9 +14,9 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from conveyor_sim.bag.messages import BOTTLES, DAMAGE, DAMAGE_EVENT, GUARD_EVENT, LEDGER, OUTCOME, SIGNALS
-from conveyor_sim.bag.reader import Bag, open_bag, to_columns
+from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import ConveyorError, SceneError
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.process_image import Role
@@ -24,7 +24,6 @@ from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.model.step_choice import choose_steps
 from conveyor_sim.observe.columns import BottleColumns
-from conveyor_sim.observe.damage import DamageColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.observe.load_history import LoadHistory
@@ -34,7 +33,11 @@ from conveyor_sim.support.printable import SENTENCE, printable
 
 FILE_NAME = "summary.json"
 GUARD_TEXTS = 3
-TAKEN = (BOTTLES, SIGNALS, LEDGER, DAMAGE, DAMAGE_EVENT, OUTCOME, GUARD_EVENT)
+TAKEN = {
+    TOPICS[name].type: TOPICS[name]
+    for name in ("bottles", "signals", "ledger", "damage", "damage_events", "outcomes", "guard")
+}
+"""What is summed up, by message type: the topics may have been renamed."""
 
 
 @dataclass(frozen=True)
@@ -199,28 +202,28 @@ class _Tally:
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
-            if bag.types[topic] in TAKEN:
-                self._take(bag.types[topic], bag.decode(topic, data))
+            if (row := TAKEN.get(bag.types[topic])) is not None:
+                self._take(row.name, bag.decode(topic, data))
 
-    def _take(self, kind: str, message: Any) -> None:
-        self._last_tick = max(self._last_tick, int(message.tick))
-        if kind == BOTTLES:
-            self._bottles = to_columns(BottleColumns, message)
+    def _take(self, topic: str, message: Any) -> None:
+        self._last_tick, read = max(self._last_tick, int(message.tick)), TOPICS[topic].unpack(message)
+        if topic == "bottles":
+            self._bottles = read
             time = self._bag.time(message.tick)
-            self._itinerary.take(time, self._bottles)
-            self._pressing.take(time, self._bottles.id, self._bottles.impulse)
-            self._forces.append(self._bottles.peak_force[self._bottles.peak_force > 0.0])
-            self._unknown = self._unknown or bool(np.isnan(self._bottles.peak_force).any())
-        elif kind == SIGNALS:
-            self._signals = message.values
-        elif kind == GUARD_EVENT:
+            self._itinerary.take(time, read)
+            self._pressing.take(time, read.id, read.impulse)
+            self._forces.append(read.peak_force[read.peak_force > 0.0])
+            self._unknown = self._unknown or bool(np.isnan(read.peak_force).any())
+        elif topic == "signals":
+            self._signals = read
+        elif topic == "guard":
             self._guard.append((printable(message.kind), printable(message.text, SENTENCE)))
-        elif kind == DAMAGE:
-            self._borne = (self._borne or LoadHistory()).with_more(to_columns(DamageColumns, message))
-        elif kind == DAMAGE_EVENT:
+        elif topic == "damage":
+            self._borne = (self._borne or LoadHistory()).with_more(read)
+        elif topic == "damage_events":
             self._passed.append((printable(message.kind), printable(message.text, SENTENCE)))
-        elif kind == LEDGER:
-            self._ledger = to_columns(Ledger, message)
+        elif topic == "ledger":
+            self._ledger = read
         else:
             self._outcomes[bool(message.accepted)] += 1
 

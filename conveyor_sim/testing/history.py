@@ -12,8 +12,7 @@ import numpy as np
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import CommandOutcome
-from conveyor_sim.line.line import FAULT
+from conveyor_sim.line.commands import FAULT, CommandOutcome
 from conveyor_sim.line.process_image import Command, Kind, ProcessImage, Signal
 
 _FIRST_ROWS = 1024
@@ -94,6 +93,8 @@ class History:
     def take(self, outcome: CommandOutcome, from_test: bool) -> None:
         """What was applied at the last tick. from_test: by the test itself, not by the controller."""
         for name, value in zip(outcome.names, outcome.values, strict=True):
+            if name.startswith(ALARMS):  # noted as the controller gave it
+                continue
             self._set(name, value)
             if from_test or outcome.source == FAULT:
                 self.marks.append(Mark(self._times[-1], name, value))

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import ALARMS, ON, ControlError, Controller
+from conveyor_sim.control.scan import ALARMS, ON, AlarmChanges, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.line import FAULT
+from conveyor_sim.line.commands import FAULT
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
@@ -97,6 +97,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._node: AttachedNode | None = None
         self._answer: dict[str, float] = {}
         self._alarms: dict[str, float] = {}
+        self._changes = AlarmChanges()
         self._standing: list[GuardProbe] = []
         self._signals: dict[str, float] = {}
         self._look()
@@ -298,9 +299,12 @@ class Scenario(AbstractContextManager["Scenario"]):
         if not isinstance(answer, Mapping):
             raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
         self._scan_read |= inputs.read
-        self._answer = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
-        told = {name: float(value) for name, value in answer.items() if name.startswith(ALARMS)}
-        self._alarms = {**dict.fromkeys(self._alarms, 0.0), **told}
+        commands = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
+        # A node answers what changes only, and nothing between its scans; alarms of a controller before it go.
+        alone = self._node is None
+        changes = self._changes.of(answer if alone else {})
+        self._answer = {**commands, **changes} if alone else {**changes, **answer}
+        self._alarms |= {name: value for name, value in self._answer.items() if name.startswith(ALARMS)}
         self.history.alarms(self._alarms)
 
     def _present(self, values: Mapping[str, float]) -> Present:

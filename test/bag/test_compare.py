@@ -10,7 +10,8 @@ from bag.hand_made import HEADER, bottles, contacts
 
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
-from conveyor_sim.bag.reader import Outcome
+from conveyor_sim.bag.messages import Outcome
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 
@@ -26,12 +27,12 @@ class Line:
 
 def of_bottles(columns: BottleColumns, header: messages.Header = HEADER) -> Any:
     """A decoded Bottles."""
-    return typestore().deserialize_cdr(messages.bottles_message(columns, header), messages.BOTTLES)
+    return typestore().deserialize_cdr(TOPICS["bottles"].pack(columns, header), TOPICS["bottles"].type)
 
 
 def of_contacts(columns: ContactColumns) -> Any:
     """A decoded Contacts."""
-    return typestore().deserialize_cdr(messages.contacts_message(columns, HEADER), messages.CONTACTS)
+    return typestore().deserialize_cdr(TOPICS["contacts"].pack(columns, HEADER), TOPICS["contacts"].type)
 
 
 def compare_x(then: float, now: float, *, exact: bool) -> Difference | None:

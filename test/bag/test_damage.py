@@ -43,7 +43,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Simulation
 def test_a_bag_holds_what_the_simulation_tells(recorded: tuple[Path, Simulation]) -> None:
     path, sim = recorded
     with open_bag(path) as bag:
-        damage, wear, events = list(bag.damage()), list(bag.rail_wear()), list(bag.damage_events())
+        damage, wear, events = (list(bag.read(topic)) for topic in ("damage", "rail_wear", "damage_events"))
     assert [frame.tick for frame in damage] == [frame.tick for frame in wear] == list(range(0, 51, 5))
     for then, now in ((damage[-1].data, damage_of(sim)), (wear[-1].data, wear_of(sim))):
         for field in fields(now):

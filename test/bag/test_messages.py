@@ -10,10 +10,12 @@ from bag.hand_made import HEADER, bottles, contacts
 from bag.ros_decode import assert_same, deserialize
 
 from conveyor_sim.bag import messages
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.observe.events import Event, event_columns
 from conveyor_sim.observe.ledger import balance
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -33,25 +35,34 @@ BORNE = DamageColumns(
 )
 WEAR = RailWearColumns(np.arange(3, dtype=np.uint32), *np.arange(15.0).reshape(5, 3))
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
-    "bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(5), HEADER)),
-    "no bottles": (messages.BOTTLES, lambda: messages.bottles_message(bottles(0), HEADER)),
-    "contacts": (messages.CONTACTS, lambda: messages.contacts_message(contacts(3), HEADER)),
-    "no contacts": (messages.CONTACTS, lambda: messages.contacts_message(contacts(0), HEADER)),
-    "belts": (messages.BELTS, lambda: messages.belts_message(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
-    "signals": (messages.SIGNALS, lambda: messages.signals_message(np.array([1.0, math.nan]), HEADER)),
-    "ledger": (messages.LEDGER, lambda: messages.ledger_message(LEDGER, HEADER)),
+    "bottles": (TOPICS["bottles"].type, lambda: TOPICS["bottles"].pack(bottles(5), HEADER)),
+    "no bottles": (TOPICS["bottles"].type, lambda: TOPICS["bottles"].pack(bottles(0), HEADER)),
+    "contacts": (TOPICS["contacts"].type, lambda: TOPICS["contacts"].pack(contacts(3), HEADER)),
+    "no contacts": (TOPICS["contacts"].type, lambda: TOPICS["contacts"].pack(contacts(0), HEADER)),
+    "belts": (TOPICS["belts"].type, lambda: TOPICS["belts"].pack(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
+    "signals": (TOPICS["signals"].type, lambda: TOPICS["signals"].pack(np.array([1.0, math.nan]), HEADER)),
+    "ledger": (TOPICS["ledger"].type, lambda: TOPICS["ledger"].pack(LEDGER, HEADER)),
     "bool": (messages.BOOL, lambda: messages.bool_message(True, HEADER)),
-    "damage": (messages.DAMAGE, lambda: messages.damage_message(BORNE, HEADER)),
-    "rail wear": (messages.RAIL_WEAR, lambda: messages.rail_wear_message(WEAR, HEADER)),
+    "damage": (TOPICS["damage"].type, lambda: TOPICS["damage"].pack(BORNE, HEADER)),
+    "rail wear": (TOPICS["rail_wear"].type, lambda: TOPICS["rail_wear"].pack(WEAR, HEADER)),
     "damage event": (
-        messages.DAMAGE_EVENT,
-        lambda: messages.damage_event_message(DamageEvent(9, "tipping", 3, 0.5, -0.25, 1.5, 1.0, "it tips"), HEADER),
+        TOPICS["damage_events"].type,
+        lambda: TOPICS["damage_events"].pack(DamageEvent(9, "tipping", 3, 0.5, -0.25, 1.5, 1.0, "it tips"), HEADER),
     ),
-    "poses": (messages.POSES, lambda: messages.poses_message(bottles(7), HEADER)),
-    "no poses": (messages.POSES, lambda: messages.poses_message(bottles(0), HEADER)),
+    "events": (
+        TOPICS["events"].type,
+        lambda: TOPICS["events"].pack(
+            event_columns(
+                [Event(9, "bottle_fed", "infeeds/a", 3, 4.0, ""), Event(8, "alarm_raised", "alarms/ü", -1, 1.0, "é")], 7
+            ),
+            HEADER,
+        ),
+    ),
+    "poses": (TOPICS["poses"].type, lambda: TOPICS["poses"].pack(bottles(7), HEADER)),
+    "no poses": (TOPICS["poses"].type, lambda: TOPICS["poses"].pack(bottles(0), HEADER)),
     "outcome": (
-        messages.OUTCOME,
-        lambda: messages.outcome_message(
+        TOPICS["outcomes"].type,
+        lambda: TOPICS["outcomes"].pack(
             CommandOutcome(9, "commands", ("belts/a/cmd_speed",), (math.inf,), False, "not a number — really"), HEADER
         ),
     ),
@@ -105,15 +116,15 @@ def test_pose_is_position_and_turn_about_the_vertical() -> None:
 
 def test_columns_of_another_type_or_layout_are_converted() -> None:
     """rosbags alone would copy an int64 array's bytes as if they were doubles, and refuse a strided one."""
-    data = messages.signals_message(np.arange(6)[::2], HEADER)  # type: ignore[arg-type]
-    assert typestore().deserialize_cdr(data, messages.SIGNALS).values.tolist() == [0.0, 2.0, 4.0]  # type: ignore[attr-defined]
+    data = TOPICS["signals"].pack(np.arange(6)[::2], HEADER)  # type: ignore[arg-type]
+    assert typestore().deserialize_cdr(data, TOPICS["signals"].type).values.tolist() == [0.0, 2.0, 4.0]  # type: ignore[attr-defined]
 
 
 def test_line_holds_all_that_a_replay_needs(scene: Scene) -> None:
     simulation = Simulation(scene)
     data = messages.line_message(simulation, "run-1", HEADER)
-    line: Any = typestore().deserialize_cdr(data, messages.LINE)
-    assert_same(deserialize(messages.LINE, data), line)
+    line: Any = typestore().deserialize_cdr(data, TOPICS["line"].type)
+    assert_same(deserialize(TOPICS["line"].type, data), line)
     assert (line.run_id, line.scene_name, line.seed) == ("run-1", "small_line", 7)
     assert line.scene_text == scene.source_text
     assert line.belts == ["straight", "turn"]

@@ -6,8 +6,9 @@ from pathlib import Path
 from bag.small_line import COMMANDS, SMALL_LINE, record
 
 from conveyor_sim.bag.messages import BOOL
-from conveyor_sim.bag.outputs import OUTPUTS, Outputs, photo_eye_outputs
+from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
@@ -65,6 +66,7 @@ def test_rates_are_those_of_the_scene(scene: Scene) -> None:
         "contacts": every_other_tick,
         "belts": every_other_tick,
         "signals": 41,
+        "events": 5,
         **dict.fromkeys(SILENT, 0),
     }
 
@@ -121,7 +123,7 @@ def test_a_photo_eye_is_told_at_the_start_and_when_it_changes_and_is_not_recorde
     """One that the bottles there block and leave, one that stays free; `signals` tell the same."""
     eyes = {"busy": {"from": [0.75, 0.1], "to": [0.75, 0.3]}, "free": {"from": [0.0, 0.9], "to": [0.1, 0.9]}}
     scene = load_scene(SMALL_LINE, {"photo_eyes": eyes})
-    topics = photo_eye_outputs(eyes)
+    topics = photo_eye_topics(eyes)
     assert [output.type for output in topics.values()] == [BOOL] * 2
     assert {output.qos.durability for output in topics.values()} == {"transient_local"}
     sink = Collector({*topics, "signals"})

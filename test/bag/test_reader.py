@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from bag.small_line import COMMANDS
 
-from conveyor_sim.bag.outputs import SERIALIZERS
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.errors import BagError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -62,7 +62,7 @@ def test_counts_and_types_are_by_relative_name(bag: Path) -> None:
     with open_bag(bag) as opened:
         assert opened.counts["bottles"] == 51
         assert opened.types["poses"] == "geometry_msgs/msg/PoseArray"
-        assert set(SERIALIZERS) <= set(opened.counts)
+        assert set(OUTPUTS) <= set(opened.counts)
 
 
 def test_missing_bag_is_named(tmp_path: Path) -> None:

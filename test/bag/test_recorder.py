@@ -18,10 +18,10 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from ruamel.yaml import YAML
 
 from conveyor_sim.bag.folder import make_folder
-from conveyor_sim.bag.outputs import OUTPUTS
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder, new_run_folder, run_folder
 from conveyor_sim.bag.recover import recover
+from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import BagError
 from conveyor_sim.scene import Scene
@@ -36,6 +36,7 @@ COUNTS = {
     "/contacts": 51,
     "/belts": 51,
     "/signals": 101,
+    "/events": 8,
 }
 SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events"), 0)
 """Nothing was to be told, nothing asked for."""

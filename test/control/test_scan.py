@@ -6,6 +6,7 @@ import pytest
 from control.scans import Scans
 
 from conveyor_sim.control import Constant, ControlError, Inputs, priority, together
+from conveyor_sim.control.scan import AlarmChanges
 
 
 def test_together_merges_what_all_answer() -> None:
@@ -40,3 +41,22 @@ def test_inputs_tell_bools_and_what_is_missing() -> None:
         inputs["photo_eyes/c/blocked"]
     with pytest.raises(KeyError, match="which has no zones/"):
         inputs["zones/z/bottles"]
+
+
+def test_of_its_alarms_the_line_is_given_what_changes() -> None:
+    changes = AlarmChanges()
+    given = [
+        changes.of(answer)
+        for answer in (
+            {"alarms/a": 0.0, "alarms/b": True, "belts/x/cmd_speed": 1.0},
+            {"alarms/a": 0.0, "alarms/b": 1.0},
+            {"alarms/a": 1.0},
+            {},
+        )
+    ]
+    assert given == [
+        {"alarms/a": 0.0, "alarms/b": 1.0},
+        {},
+        {"alarms/a": 1.0, "alarms/b": 0.0},
+        {"alarms/a": 0.0},
+    ]

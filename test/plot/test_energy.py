@@ -33,7 +33,7 @@ def line(figure: Figure, gid: str) -> Line2D:
 def test_every_account_is_drawn_as_recorded(tmp_path: Path) -> None:
     simulation = record(load_scene(SMALL_LINE, {"outputs": {"ledger": 20}}), tmp_path / "bag", 100)
     with open_bag(tmp_path / "bag") as opened:
-        frames = list(opened.ledger())
+        frames = list(opened.read("ledger"))
         recording = Recording(opened)
         energy = recording.energy
     assert energy is not None

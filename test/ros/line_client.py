@@ -13,7 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from conveyor_sim.bag.qos import ANSWERS, QOS
+from conveyor_sim.bag.qos import ANSWERS
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 
@@ -27,6 +28,15 @@ def until(condition: Callable[[], Any], what: str) -> Any:
         assert time.monotonic() < end, f"in vain: {what}"
         time.sleep(0.002)
     return value
+
+
+ROWS = {
+    "clock": "/clock",
+    "diagnostics": "/diagnostics",
+    "photo_eyes": "photo_eyes/<eye>",
+    "cmd_speed": "belts/<belt>/cmd_speed",
+}
+"""Rows of topics whose quality of service is asked for by another name."""
 
 
 class LineClient:
@@ -110,7 +120,7 @@ class LineClient:
 
     def publisher(self, kind: Any, topic: str, qos: str) -> Any:
         """A publisher to which the node under test has subscribed."""
-        publisher = self.node.create_publisher(kind, topic, ros_qos(QOS[qos]))
+        publisher = self.node.create_publisher(kind, topic, ros_qos(TOPICS[ROWS.get(qos, qos)].qos))
         until(publisher.get_subscription_count, f"a subscription to {topic}")
         return publisher
 
@@ -131,7 +141,8 @@ class Listener:
         self.messages: list[Any] = []
         self._node = node
         self._topic = topic
-        self._subscription = node.create_subscription(kind, topic, self.messages.append, ros_qos(QOS[qos]))
+        profile = ros_qos(TOPICS[ROWS.get(qos, qos)].qos)
+        self._subscription = node.create_subscription(kind, topic, self.messages.append, profile)
         until(self._subscription.get_publisher_count, f"a publisher of {topic}")
 
     def first(self) -> Any:

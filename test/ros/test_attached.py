@@ -26,6 +26,7 @@ from conveyor_sim.testing import Scenario
 
 HIGH = 13  # bottles on the table at which the feeder is held
 FEEDER = "belts/feeder/cmd_speed"
+FULL = "alarms/table full"
 STUCK = "photo_eyes/entry/stuck_on"
 NODE = [sys.executable, "-m", "conveyor_sim.ros.controller_node", "--ros-args", "-r", "__ns:=/cell"]
 NODE += ["-p", f"controller:={Path(__file__).with_name('small_line_controller.py')}:make"]
@@ -51,6 +52,9 @@ def test_a_node_gives_the_bits_of_its_scan_function(scenario: Scenario) -> None:
             assert np.array_equal(other.history[name], scenario.history[name])
         assert other.simulation.state_hash() == scenario.simulation.state_hash()
         assert np.ptp(other.history[FEEDER]) > 0.0  # it did act
+        assert np.array_equal(other.history[FULL], scenario.history[FULL])
+        assert np.ptp(other.history[FULL]) > 0.0  # it did come
+        assert other.simulation.alarms == other.alarms == scenario.alarms
 
 
 def test_it_is_served_as_by_the_simulation_s_own_node(scenario: Scenario, domain: int, client: LineClient) -> None:

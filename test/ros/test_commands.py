@@ -7,11 +7,18 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from conveyor_msgs.msg import Belts, CommandOutcome, Commands
+from conveyor_msgs.msg import Belts, CommandOutcome, Commands, Events
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 
 FEEDER, TABLE = "belts/feeder/cmd_speed", "belts/table/cmd_speed"
+
+ALARM = "alarms/table full"
+
+
+def rows(message: Any) -> list[tuple[int, str, str, int, float]]:
+    """The events of a message: at, kind, name, bottle, value."""
+    return list(zip(message.at, message.kind, message.name, message.bottle, message.value, strict=True))
 
 
 class Sender:
@@ -64,6 +71,20 @@ def test_a_command_changes_the_belts(sender: Sender) -> None:
     assert outcome.source == "commands"
     assert list(outcome.names) == [FEEDER, TABLE]
     assert sender.speeds() == ([0.25, -0.125], [0.25, -0.125])
+
+
+def test_an_alarm_is_in_the_events_at_its_tick_even_beside_a_refused_command(sender: Sender) -> None:
+    with sender.line.listen(Events, "events") as events:
+        sent = [Commands(names=[ALARM, FEEDER], values=[1.0, 0.25]), Commands(names=[FEEDER, ALARM], values=[1e9, 0.0])]
+        outcomes = [sender.outcome_of(sender.commands, message) for message in sent]
+        assert [outcome.accepted for outcome in outcomes] == [True, False]
+        found = until(
+            lambda: [row for message in events.messages for row in rows(message) if row[2] == ALARM][1:],
+            "the alarm's end",
+        )
+        (raised,) = [row for message in events.messages for row in rows(message) if row[1] == "alarm_raised"]
+    assert raised == (outcomes[0].tick, "alarm_raised", ALARM, -1, 1.0)
+    assert found == [(outcomes[1].tick, "alarm_cleared", ALARM, -1, 0.0)]
 
 
 def test_a_speed_sent_to_a_belt_changes_that_belt(sender: Sender) -> None:

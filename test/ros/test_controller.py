@@ -5,14 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conveyor_msgs.msg import CommandOutcome, Signals
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
+from rosbags.highlevel import AnyReader
 from std_srvs.srv import Trigger
 
+from conveyor_sim.bag.replay import replay
 from conveyor_sim.control import Inputs
 from conveyor_sim.ros.child import Child
 from conveyor_sim.scene import load_scene
@@ -64,14 +67,27 @@ def heard_of(message: DiagnosticArray) -> tuple[int, bool]:
     return tick, status.level == DiagnosticStatus.ERROR
 
 
+def recorded_alarms(bag: Path) -> list[tuple[int, bool]]:
+    """At which ticks the alarm was raised or cleared, by another library."""
+    found = []
+    with AnyReader([bag]) as reader:
+        for connection, _, data in reader.messages([each for each in reader.connections if each.topic == "/events"]):
+            message: Any = reader.deserialize(data, connection.msgtype)
+            for at, kind, name in zip(message.at.tolist(), message.kind, message.name, strict=True):
+                if name == "alarms/table full":
+                    found.append((at, kind == "alarm_raised"))
+    return found
+
+
 def test_in_lockstep_it_gives_the_same_bits_as_in_one_process(
-    start_controller: StartController, start_node: Callable[..., Child], client: LineClient
+    start_controller: StartController, start_node: Callable[..., Child], client: LineClient, tmp_path: Path
 ) -> None:
     state_hash, alarms = in_process()
     assert len(alarms) >= 2  # it comes, at least
+    bag = tmp_path / "bag"
     controller = start_controller()  # waits for the simulation
     with client.listen(DiagnosticArray, "alarms") as heard:
-        node = start_node()
+        node = start_node(record=bag)
         until(lambda: controller.exit_code is not None, "the end of the controller")
         assert controller.exit_code == 0, controller.obituary()
         end = client.lockstep(LAST + 1)
@@ -80,6 +96,11 @@ def test_in_lockstep_it_gives_the_same_bits_as_in_one_process(
         until(lambda: len(heard.messages) == len(alarms), "all alarms")
         assert [heard_of(message) for message in heard.messages] == alarms
     node.stop()
+    first, *changes = alarms  # the line notes what changes: at first none stands
+    assert not first[1]
+    assert recorded_alarms(bag) == changes
+    report = replay(bag)
+    assert report.difference is None and report.compared["events"] > len(changes)
 
 
 def test_running_free_it_commands_as_signals_arrive(

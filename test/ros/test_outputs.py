@@ -15,8 +15,7 @@ from ros.line_client import LineClient, until
 from std_msgs.msg import Bool, Float64
 from visualization_msgs.msg import Marker, MarkerArray
 
-from conveyor_sim.bag.outputs import OUTPUTS
-from conveyor_sim.bag.qos import QOS
+from conveyor_sim.bag.topics import OUTPUTS, TOPICS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.child import Child
@@ -125,9 +124,9 @@ def test_markers_show_every_bottle(line: LineClient) -> None:
 
 
 def test_topics_offer_the_stated_quality_of_service(line: LineClient) -> None:
-    for name in [*OUTPUTS, "clock", "diagnostics"]:
-        (info,) = line.node.get_publishers_info_by_topic(f"/{name}")
-        qos = QOS[name]
+    for name in [*OUTPUTS, "/clock", "/diagnostics"]:
+        (info,) = line.node.get_publishers_info_by_topic(f"/{name.removeprefix('/')}")
+        qos = TOPICS[name].qos
         assert info.qos_profile.reliability == ReliabilityPolicy[qos.reliability.upper()], name
         assert info.qos_profile.durability == DurabilityPolicy[qos.durability.upper()], name
     for name in ("commands", FEEDER):

@@ -215,7 +215,7 @@ def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_ow
         file = McapFile(stream, "bag.mcap", "jazzy")
         for name, kind in {
             "/hall/line": types.LINE,
-            "/hall/belts": types.BELTS,
+            "/hall/belts": "conveyor_msgs/msg/Belts",
             "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
             "/clock": "rosgraph_msgs/msg/Clock",
         }.items():

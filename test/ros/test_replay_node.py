@@ -22,8 +22,9 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim.bag import messages as types
 from conveyor_sim.bag.mcap_file import McapFile, Schema
-from conveyor_sim.bag.qos import COMMANDS, QOS
+from conveyor_sim.bag.qos import EVENTS
 from conveyor_sim.bag.reader import Bag, open_bag
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import definition
 from conveyor_sim.ros.playback import Message, Playback
 from conveyor_sim.ros.publishers import message_class, ros_qos
@@ -83,7 +84,7 @@ def test_the_command_publishes_every_message_with_the_bytes_of_the_recording(
         # The line last: when it arrives, the other subscriptions are known too.
         for topic, kind in sorted({**bag.types, **MADE}.items(), key=lambda item: item[0] == "line"):
             heard[topic] = []
-            qos = ros_qos(QOS.get(topic, COMMANDS))
+            qos = ros_qos(TOPICS[topic].qos if topic in TOPICS else EVENTS)
             qos.depth = 1000
             subscription = client.node.create_subscription(
                 message_class(kind), f"a/{topic}", heard[topic].append, qos, raw=True

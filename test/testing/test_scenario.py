@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 from testing.conftest import FEEDER, ON_TABLE, STOP, TABLE, TAKEN
 
-from conveyor_sim.control import Inputs
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.control import Constant, Inputs
 from conveyor_sim.errors import CommandError
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -123,6 +126,28 @@ def test_alarms(table: Scenario) -> None:
     assert table.signals[ON_TABLE] == 2
     with pytest.raises(KeyError, match="alarms/ful: no such signal on this line, expected one of alarms/full"):
         table.never(lambda s: s["alarms/ful"], for_=0.5)
+
+
+def test_alarms_reach_the_line_with_the_commands_and_are_recorded_and_replayed(tmp_path: Path) -> None:
+    with Scenario(TABLE, bag=tmp_path / "bag") as table:
+        table.attach(Hold(2))
+        came = table.run_until(lambda s: s["alarms/full"], within=20)
+        assert not table.simulation.alarms  # the line is given it as the next tick begins
+        table.run_for(0.01)
+        assert table.simulation.alarms == {"full"}
+        table.attach(Constant({}))  # which has no such alarm: it goes
+        table.run_for(0.05)
+        assert not table.simulation.alarms and not table.alarms
+    tick = round(came / 0.01)
+    with open_bag(tmp_path / "bag") as bag:
+        rows = [
+            row
+            for frame in bag.read("events")
+            for row in zip(frame.data.at, frame.data.kind, frame.data.name, strict=True)
+            if row[1].startswith("alarm")
+        ]
+    assert rows == [(tick, "alarm_raised", "alarms/full"), (tick + 1, "alarm_cleared", "alarms/full")]
+    assert replay(tmp_path / "bag").difference is None
 
 
 def test_an_unknown_signal_is_an_error_not_a_condition_that_holds(table: Scenario) -> None:

@@ -23,7 +23,11 @@ class DriveDevice(BeltDevice):
     """
 
     def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
-        signals = [Signal(f"{name}/{what}", "1", "bool") for what in ("running", "at_speed", "fault")]
+        signals = [
+            Signal(f"{name}/running", "1", "bool", "state"),
+            Signal(f"{name}/at_speed", "1", "bool"),
+            Signal(f"{name}/fault", "1", "bool", "state"),
+        ]
         if drive.pulses_per_metre is not None:
             signals.append(Signal(f"{name}/pulses", "1", "count"))
         commands = [switch(f"{name}/{what}") for what in ("run", "reverse", "reset")]

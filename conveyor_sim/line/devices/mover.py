@@ -38,7 +38,7 @@ class Mover(Device):
                 Signal(f"{name}/position", "1", "number"),
                 Signal(f"{name}/{home}", "1", "bool"),
                 Signal(f"{name}/{away}", "1", "bool"),
-                Signal(f"{name}/blocked", "1", "bool"),
+                Signal(f"{name}/blocked", "1", "bool", "state"),
             ),
             (switch(f"{name}/{order}"),),
             (switch(f"{name}/jammed"),),

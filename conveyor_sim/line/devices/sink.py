@@ -20,7 +20,7 @@ class SinkDevice(MachineDevice):
         signals = [
             Signal(f"{name}/taken", "1", "count", "removed"),
             Signal(f"{name}/taken_bad", "1", "count"),
-            Signal(f"{name}/starved", "1", "bool"),
+            Signal(f"{name}/starved", "1", "bool", "state"),
             Signal(f"{name}/starved_time", "s", "number"),
         ]
         super().__init__(name, sink.rate, sink.rate_limit, signals)

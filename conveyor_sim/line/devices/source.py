@@ -16,7 +16,7 @@ class SourceDevice(MachineDevice):
     def __init__(self, name: str, source: Source, setup: Setup) -> None:
         signals = [
             Signal(f"{name}/produced", "1", "count", "fed"),
-            Signal(f"{name}/blocked", "1", "bool"),
+            Signal(f"{name}/blocked", "1", "bool", "state"),
             Signal(f"{name}/blocked_time", "s", "number"),
         ]
         super().__init__(name, source.rate, source.rate_limit, signals)

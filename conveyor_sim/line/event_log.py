@@ -1,0 +1,100 @@
+"""`EventLog`: what happens on a line, from one tick to the next."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome, alarm_problem
+from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.observe.events import Event, Kind
+from conveyor_sim.state.snapshot import Unchecked
+from conveyor_sim.support.printable import printable
+
+
+class EventLog:
+    """Keeps what happened since the last tick, in order. Public attributes are remembered in checkpoints."""
+
+    events: list[tuple[int, str, str, int, Unchecked, str]]
+    """Since the tick before, as Event has them."""
+    alarms: list[str]
+    """Those that stand, by their whole names, in the order in which they were raised."""
+    bottles: dict[str, int]
+    """By device, how many it has put onto the line or taken off it so far."""
+    states: dict[str, Unchecked]
+    """Of machines, by signal, at the end of the last tick."""
+
+    def __init__(self, devices: Sequence[Device], now: ScanContext) -> None:
+        """now: at the start, with the states that machines have at first."""
+        self._machines = [device for device in devices if any(signal.role == "state" for signal in device.signals)]
+        self.events = []
+        self.total = 0
+        """Events so far."""
+        self.alarms = []
+        self.bottles = {device.name: 0 for device in devices}
+        self.states = self._present(now)
+
+    def begin(self) -> None:
+        """A tick begins."""
+        self.events = []
+
+    def note(self, at: int, kind: Kind, name: str, value: float, bottle: int = -1, text: str = "") -> None:
+        """Something has happened."""
+        self.events.append(Event(at, kind, name, bottle, value, text))
+        self.total += 1
+
+    def note_outcome(self, outcome: CommandOutcome) -> None:
+        """Inputs were applied or refused as a tick began. Alarms command nothing, so they count either way."""
+        at, names, values = outcome.tick, outcome.names, outcome.values
+        if not outcome.accepted:
+            value = values[0] if len(names) == len(values) == 1 else math.nan
+            self.note(at, "command_refused", printable(", ".join(names)), value, text=outcome.reason)
+        elif outcome.source == FAULT:
+            self.note(at, "fault_injected" if values[0] else "fault_cleared", names[0], values[0])
+        for name, value in zip(names, values, strict=False):
+            if name.startswith(ALARMS):
+                self._note_alarm(at, name, value)
+
+    def note_removed(self, device: Device, before: NDArray[np.int64], now: ScanContext) -> None:
+        """A device may have taken bottles. before: ids by slot."""
+        gone = before[(before >= 0) & (now.state.world.bottles.id != before)]
+        if gone.size:
+            rejects = any(signal.role == "rejected" for signal in device.signals)
+            self._note_bottles("bottle_rejected" if rejects else "bottle_removed", device, sorted(gone.tolist()), now)
+
+    def note_fed(self, device: Device, first: int, now: ScanContext) -> None:
+        """A device may have given bottles. first: id of the next one before."""
+        self._note_bottles("bottle_fed", device, range(first, now.state.next_id), now)
+
+    def note_states(self, now: ScanContext) -> None:
+        """A tick has ended."""
+        states = self._present(now)
+        for name, value in states.items():
+            if value != self.states[name]:
+                self.note(now.tick, "machine_state", name, value)
+        self.states = states
+
+    def _note_bottles(self, kind: Kind, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
+        for bottle in bottles:
+            self.bottles[device.name] += 1
+            self.note(now.tick, kind, device.name, float(self.bottles[device.name]), bottle)
+
+    def _note_alarm(self, at: int, name: str, value: float) -> None:
+        """Only what changes; what is no alarm, or one too many, was refused."""
+        if alarm_problem(name, value):
+            return
+        if value == 1.0 and name not in self.alarms and len(self.alarms) < MOST_ALARMS:
+            self.alarms.append(name)
+            self.note(at, "alarm_raised", name, value)
+        elif value == 0.0 and name in self.alarms:
+            self.alarms.remove(name)
+            self.note(at, "alarm_cleared", name, value)
+
+    def _present(self, now: ScanContext) -> dict[str, float]:
+        return {
+            signal.name: float(value)
+            for device in self._machines
+            for signal, value in zip(device.signals, device.values(now), strict=True)
+            if signal.role == "state"
+        }
