@@ -126,3 +126,8 @@ class Device:
     def values(self, now: ScanContext) -> Sequence[float]:
         """The signals' values, in their order."""
         return ()
+
+    def states(self, now: ScanContext) -> Sequence[float]:
+        """The values of the signals of the role "state", in their order; asked for at every tick."""
+        signals = zip(self._signals, self.values(now), strict=True)
+        return [value for signal, value in signals if signal.role == "state"]

@@ -3,9 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome, alarm_problem
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.observe.events import Event, Kind
@@ -22,18 +19,23 @@ class EventLog:
     """Those that stand, by their whole names, in the order in which they were raised."""
     bottles: dict[str, int]
     """By device, how many it has put onto the line or taken off it so far."""
-    states: dict[str, Unchecked]
-    """Of machines, by signal, at the end of the last tick."""
+    states: dict[str, list[Unchecked]]
+    """Of machines, by device, at the end of the last tick."""
 
     def __init__(self, devices: Sequence[Device], now: ScanContext) -> None:
         """now: at the start, with the states that machines have at first."""
-        self._machines = [device for device in devices if any(signal.role == "state" for signal in device.signals)]
+        # Each machine with the names of its states.
+        self._machines = [
+            (device, names)
+            for device in devices
+            if (names := [signal.name for signal in device.signals if signal.role == "state"])
+        ]
         self.events = []
         self.total = 0
         """Events so far."""
         self.alarms = []
         self.bottles = {device.name: 0 for device in devices}
-        self.states = self._present(now)
+        self.states = {device.name: [float(value) for value in device.states(now)] for device, _ in self._machines}
 
     def begin(self) -> None:
         """A tick begins."""
@@ -56,12 +58,10 @@ class EventLog:
             if name.startswith(ALARMS):
                 self._note_alarm(at, name, value)
 
-    def note_removed(self, device: Device, before: NDArray[np.int64], now: ScanContext) -> None:
-        """A device may have taken bottles. before: ids by slot."""
-        gone = before[(before >= 0) & (now.state.world.bottles.id != before)]
-        if gone.size:
-            rejects = any(signal.role == "rejected" for signal in device.signals)
-            self._note_bottles("bottle_rejected" if rejects else "bottle_removed", device, sorted(gone.tolist()), now)
+    def note_removed(self, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
+        """A device has taken bottles, by their ids."""
+        rejects = any(signal.role == "rejected" for signal in device.signals)
+        self._note_bottles("bottle_rejected" if rejects else "bottle_removed", device, sorted(bottles), now)
 
     def note_fed(self, device: Device, first: int, now: ScanContext) -> None:
         """A device may have given bottles. first: id of the next one before."""
@@ -69,11 +69,13 @@ class EventLog:
 
     def note_states(self, now: ScanContext) -> None:
         """A tick has ended."""
-        states = self._present(now)
-        for name, value in states.items():
-            if value != self.states[name]:
-                self.note(now.tick, "machine_state", name, value)
-        self.states = states
+        for device, names in self._machines:
+            before, present = self.states[device.name], device.states(now)
+            if before != list(present):
+                self.states[device.name] = [float(value) for value in present]
+                for name, old, value in zip(names, before, present, strict=True):
+                    if old != value:
+                        self.note(now.tick, "machine_state", name, float(value))
 
     def _note_bottles(self, kind: Kind, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
         for bottle in bottles:
@@ -90,11 +92,3 @@ class EventLog:
         elif value == 0.0 and name in self.alarms:
             self.alarms.remove(name)
             self.note(at, "alarm_cleared", name, value)
-
-    def _present(self, now: ScanContext) -> dict[str, float]:
-        return {
-            signal.name: float(value)
-            for device in self._machines
-            for signal, value in zip(device.signals, device.values(now), strict=True)
-            if signal.role == "state"
-        }

@@ -160,9 +160,9 @@ class Line:
     def take(self) -> None:
         """Let the devices take bottles off the line."""
         for device in self._taking:
-            before = self.now.state.world.bottles.id.copy()
             device.take(self.now)
-            self._log.note_removed(device, before, self.now)
+            if removed := self.now.state.take_removed():
+                self._log.note_removed(device, removed, self.now)
         self.now.begin_scan()
 
     def feed(self) -> None:

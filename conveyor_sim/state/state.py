@@ -33,6 +33,7 @@ class State:
         self.next_id = 0
         self.world = empty_world(self.model, max(1, room))
         self._free = list(range(max(1, room)))
+        self._removed: list[int] = []
 
     def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
         """Put a bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot; return its id."""
@@ -59,6 +60,7 @@ class State:
     def remove(self, slot: int) -> None:
         """Take the bottle in a slot away; the slot is free and at rest."""
         world = self.world
+        self._removed.append(int(world.bottles.id[slot]))
         for group in (world.bottles, world.spin, world.peaks, world.ring, world.implicit):
             for name, column in zip(group._fields, group, strict=True) if group is not None else ():
                 if name != "packed":
@@ -77,6 +79,11 @@ class State:
         if world.moving is not None and world.moving.springs is not None:
             world.moving.springs.elongation[slot] = 0.0
         world.neighbourhood.stale[0] = 1
+
+    def take_removed(self) -> list[int]:
+        """Ids of the bottles that were taken away since the last call, in order."""
+        removed, self._removed = self._removed, []
+        return removed
 
     def restore_from(self, other: "State") -> None:
         """Take over the bottles of a State of the same line and bottle types, each in its slot.

@@ -71,10 +71,15 @@ class DriveDevice(BeltDevice):
     def values(self, now: ScanContext) -> Sequence[float]:
         """As a belt, then running, at_speed, fault, and pulses."""
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
-        values = [*super().values(now), self.run and not self.tripped, at_speed, self.tripped]
+        running, fault = self.states(now)
+        values = [*super().values(now), running, at_speed, fault]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
+
+    def states(self, now: ScanContext) -> Sequence[float]:
+        """Running and fault."""
+        return self.run and not self.tripped, self.tripped
 
     def wanted(self, now: ScanContext) -> float:
         """The speed that it is told to run at, m/s: none while it is stopped or tripped."""

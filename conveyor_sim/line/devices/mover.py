@@ -99,6 +99,10 @@ class Mover(Device):
         share = min(1.0, max(0.0, self.position / self._shape.stroke))
         return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED), float(self.blocked)
 
+    def states(self, now: ScanContext) -> Sequence[float]:
+        """Blocked."""
+        return (self.blocked,)
+
     def _rails(self, now: ScanContext) -> MovingRails:
         moving = now.state.world.moving
         assert moving is not None

@@ -55,3 +55,7 @@ class SinkDevice(MachineDevice):
     def values(self, now: ScanContext) -> Sequence[float]:
         """Running, taken, taken_bad, starved, starved_time (s)."""
         return self.runs, self.removed, self.removed_bad, self.starved, self.starved_ticks * now.length
+
+    def states(self, now: ScanContext) -> Sequence[float]:
+        """Running and starved."""
+        return self.runs, self.starved

@@ -42,4 +42,9 @@ class SourceDevice(MachineDevice):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Running, produced, blocked, blocked_time (s)."""
-        return self.runs and not self.blocked, self.fed, self.blocked, self.blocked_ticks * now.length
+        running, blocked = self.states(now)
+        return running, self.fed, blocked, self.blocked_ticks * now.length
+
+    def states(self, now: ScanContext) -> Sequence[float]:
+        """Running and blocked."""
+        return self.runs and not self.blocked, self.blocked
