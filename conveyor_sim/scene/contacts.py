@@ -1,6 +1,7 @@
 """What a scene says where two materials meet: contacts with their laws, and friction of bottles on belts."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Len
 
@@ -9,6 +10,28 @@ from conveyor_sim.scene.types import Component, NotNegative, Pair, Positive, Res
 
 ELASTIC = ("stiffness", "hertz_stiffness", "table")
 """The fields of a contact that each choose an elastic law."""
+
+
+class DampingChoice(NamedTuple):
+    """What goes with a law of damping."""
+
+    restitution: tuple[str, ...]
+    """The elastic laws beside which it can be given by a restitution."""
+    at_speed: bool = False
+    """Whether that depends on the speed of impact, and so is given at one."""
+    elastic: tuple[str, ...] = ELASTIC
+    """The elastic laws beside which it can be at all."""
+
+
+DAMPING_CHOICES: Mapping[str, DampingChoice] = {
+    "paper": DampingChoice(("stiffness",)),
+    "normal": DampingChoice(("stiffness", "hertz_stiffness")),
+    "onset": DampingChoice(ELASTIC, at_speed=True),
+}
+"""The values of `Damping.law` but none; the laws themselves are in `engine/contact/laws/`."""
+
+DampingEffect = Literal["paper_damping", "normal_damping", "tsuji_damping", "onset_damping"]
+"""The effects that they are."""
 
 TablePoints = Annotated[
     tuple[tuple[Component, Component], ...],

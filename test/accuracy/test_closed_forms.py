@@ -8,13 +8,13 @@ import pytest
 from scenes import base, belt, bottle, kind, scene, segment, stiffness_for
 
 from conveyor_sim.accuracy.closed_forms import cases_of, orders
-from conveyor_sim.accuracy.collision import Collision, collision_of, duration, onset_restitution, terms_of
+from conveyor_sim.accuracy.collision import Collision, collision_of, duration, terms_of
 from conveyor_sim.accuracy.results import Order
 from conveyor_sim.effects.terms import meetings
+from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
+from conveyor_sim.engine.contact.laws.onset import onset_damping, onset_restitution
 from conveyor_sim.engine.integrators import INTEGRATORS
-from conveyor_sim.laws.restitution import onset_damping
 from conveyor_sim.scene import Scene
-from conveyor_sim.timestep.bounds import hertz_contact_time
 
 MASS, SPEED = 0.2, 0.7
 K = stiffness_for(0.002, MASS / 2.0)

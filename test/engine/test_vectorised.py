@@ -123,7 +123,7 @@ def test_tangential_springs() -> None:
         for c in range(uint64(count)):
             spring[c] = spring_after(law, c, spring[c], overlap[c], slip[c], 1e-4, normal[c], 1.0)
 
-    law = ContactLaw(*[None] * 7, column(), column(), column(), None)
+    law = ContactLaw(friction=column(), tangential_stiffness=column(), tangential_mindlin=column())
     loop(COUNT, law, column(), column(), column(), column())
     assert_vectorised(loop)
 
