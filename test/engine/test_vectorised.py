@@ -55,6 +55,7 @@ ALL = [name for name in ContactLaw._fields if name != "curve"]
         ([*LINEAR, "damping_normal"], False, False, False),
         ([*LINEAR, "damping_onset"], False, False, False),
         (["hertz", "damping_tsuji", "friction"], False, False, False),
+        (["hertz", "damping_viscoelastic", "friction"], False, False, False),
         ([*LINEAR, "damping_paper"], True, False, False),
         ([*LINEAR, "damping_paper"], False, False, True),
         ([*LINEAR, "damping_paper"], True, False, True),

@@ -12,8 +12,9 @@ from conveyor_sim.engine.contact.laws.onset import ONSET
 from conveyor_sim.engine.contact.laws.paper import PAPER
 from conveyor_sim.engine.contact.laws.table import TABLE
 from conveyor_sim.engine.contact.laws.tsuji import TSUJI
+from conveyor_sim.engine.contact.laws.viscoelastic import VISCOELASTIC
 
 __all__ = ["DAMPING", "ELASTIC", "DampingLaw", "ElasticLaw"]
 
 ELASTIC: tuple[ElasticLaw, ...] = (LINEAR, HERTZ, TABLE)
-DAMPING: tuple[DampingLaw, ...] = (PAPER, NORMAL, TSUJI, ONSET)
+DAMPING: tuple[DampingLaw, ...] = (PAPER, NORMAL, TSUJI, ONSET, VISCOELASTIC)
