@@ -69,7 +69,7 @@ def every_law(
 ) -> dict[str, Any]:
     """Fields of a scene with contacts of glass, and with every law of a contact of two bottles, and what goes with it.
 
-    Two types that nobody puts in have the laws, of which no other bottle feels a bit (test/effects/test_absent.py).
+    Three types that nobody puts in have the laws, of which no other bottle feels a bit (test/effects/test_absent.py).
     Tests of one law each share their compiled kernels so: it takes 10 s of a core for a set of effects.
     """
     hertz, table = {"hertz_stiffness": 1e5}, {"table": [[1e-3, 1.0], [2e-3, 4.0]]}
@@ -80,12 +80,15 @@ def every_law(
         ("odd", "odd", table),
         ("odd", "rare", {"stiffness": 1e3, "damping": normal}),
         ("rare", "rare", {"stiffness": 1e3, "damping": onset}),
+        ("glass", "scarce", {**hertz, "damping": {"law": "viscoelastic", "restitution": 0.5, "speed": 1.0}}),
+        *((other, "scarce", {"stiffness": 1e3}) for other in ("odd", "rare", "scarce")),
     ]
     return {
         **fields,
         "contacts": [*contacts, *({"between": [a, b], **law} for a, b, law in laws)],
         "bottle_types": {
             **(bottle_types or {"bottle": kind()}), "odd": kind(material="odd"), "rare": kind(material="rare"),
+            "scarce": kind(material="scarce"),
         },
         "effects": {"peaks": "on", "rotation": "on", "unequal_radii": "on"},
     }  # fmt: skip

@@ -7,6 +7,7 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.contact.laws import ELASTIC
 from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, closed_contacts
 from conveyor_sim.model import Model
 
@@ -19,13 +20,12 @@ def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int
     stored = np.zeros(overlap.size)
     if law is None:
         return stored
-    if law.stiffness is not None:
-        stored += 0.5 * law.stiffness[entries] * overlap**2
-    if law.hertz is not None:
-        stored += 0.4 * law.hertz[entries] * overlap**2.5
-    if law.curve is not None:
-        for index in np.flatnonzero(law.curve[entries] >= 0):
-            stored[index] += _area(model, int(law.curve[entries[index]]), float(overlap[index]))
+    for elastic in ELASTIC:
+        column = getattr(law, elastic.column)
+        if column is not None:
+            for index in np.flatnonzero(column[entries] > elastic.none):
+                k = column[entries[index]].item()
+                stored[index] += elastic.energy(k, float(overlap[index]), model.curves)
     return stored
 
 
@@ -43,15 +43,3 @@ def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64
     materials = model.rail_materials
     material_of = np.array([materials.index(rail.material) for rail in model.rail_shapes], dtype=np.int64)
     return types * len(materials) + material_of[rails]
-
-
-def _area(model: Model, curve: int, overlap: float) -> float:
-    """Integral (J) of a table of forces up to an overlap (m); its last slope goes on."""
-    assert model.curves is not None
-    points = slice(int(model.curves.start[curve]), int(model.curves.start[curve + 1]))
-    x, force = model.curves.overlap[points], model.curves.force[points]
-    pieces = 0.5 * (force[1:] + force[:-1]) * np.diff(x)
-    last = int(np.clip(np.searchsorted(x, overlap, side="right") - 1, 0, x.size - 2))
-    slope = (force[last + 1] - force[last]) / (x[last + 1] - x[last])
-    beyond = overlap - x[last]
-    return float(pieces[:last].sum() + (force[last] + 0.5 * slope * beyond) * beyond)

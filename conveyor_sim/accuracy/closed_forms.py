@@ -90,12 +90,12 @@ def _meetings(terms: Terms, sliding: bool) -> list[Meeting]:
 
     The normal of two bottles that slide along each other turns, that of a straight rail does not.
     """
-    found: dict[tuple[str, str], Meeting] = {}
+    found: dict[str, Meeting] = {}
     for meeting in meetings(terms):
         if sliding and (meeting.second is not None or meeting.value(meeting.law.friction) == 0.0):
             continue
         collision = collision_of(meeting, terms)
-        found.setdefault((collision.elastic, collision.damping), meeting)
+        found.setdefault(collision.name, meeting)
     return list(found.values())
 
 

@@ -4,15 +4,15 @@ Along the normal it is one body of the reduced mass m_r that runs onto the conta
 """
 
 import math
+import sys
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from conveyor_sim.accuracy.root import ROUNDING, root
 from conveyor_sim.effects import choose_effects
-from conveyor_sim.effects.terms import Meeting, Terms, deepest, table_of
+from conveyor_sim.effects.terms import Meeting, Terms, deepest
+from conveyor_sim.engine.contact.laws import DampingLaw, ElasticLaw
+from conveyor_sim.engine.contact.laws.linear import LINEAR
 from conveyor_sim.laws.coefficients import build_laws
-from conveyor_sim.laws.restitution import clamped_restitution
 from conveyor_sim.scene import Scene, rail_shapes
 from conveyor_sim.timestep.presets import DEFAULT, PRESETS
 
@@ -27,27 +27,22 @@ LONGEST = 40 * SAMPLES
 class Collision:
     """What two materials do to each other head on."""
 
-    elastic: str
-    """`linear`, `hertz` or `table`."""
-    damping: str
-    """`paper`, `normal`, `tsuji`, `onset`, or empty."""
+    elastic: ElasticLaw
+    stiffness: Any
+    """Its coefficient, or the number of its table."""
+    damping: DampingLaw | None
     meeting: Meeting
     terms: Terms
 
     @property
     def name(self) -> str:
         """In words, such as `linear, clamped dashpot`."""
-        return f"{_ELASTIC[self.elastic]}, {_DAMPING[self.damping]}"
+        return f"{self.elastic.words}, {'undamped' if self.damping is None else self.damping.words}"
 
-
-_ELASTIC = {"linear": "linear spring", "hertz": "Hertz", "table": "table"}
-_DAMPING = {
-    "": "undamped",
-    "paper": "dashpot",
-    "normal": "clamped dashpot",
-    "tsuji": "Tsuji's dashpot",
-    "onset": "damping from zero on",
-}
+    @property
+    def coefficient(self) -> float:
+        """Of its damping, 0 without."""
+        return 0.0 if self.damping is None else self.meeting.coefficient(self.damping)
 
 
 def terms_of(scene: Scene) -> Terms:
@@ -63,52 +58,28 @@ def rail_materials(scene: Scene) -> list[str]:
 
 def collision_of(meeting: Meeting, terms: Terms) -> Collision:
     """Which laws act where two things meet."""
-    law = meeting.law
-    elastic = "linear" if meeting.value(law.stiffness) else "hertz" if meeting.value(law.hertz) else "table"
-    columns = {
-        "paper": law.damping_paper,
-        "normal": law.damping_normal,
-        "tsuji": law.damping_tsuji,
-        "onset": law.damping_onset,
-    }
-    damping = next((name for name, column in columns.items() if meeting.value(column)), "")
-    return Collision(elastic, damping, meeting, terms)
+    elastic, stiffness = meeting.elastic
+    return Collision(elastic, stiffness, meeting.damping, meeting, terms)
 
 
-def damping_ratio(collision: Collision) -> float:
-    """zeta = c / (2 sqrt(k m_r)) of a linear spring, or of the one that Hertz with Tsuji's dashpot is like."""
-    law, value = collision.meeting.law, collision.meeting.value
-    if collision.damping == "tsuji":
-        k, c = 1.25 * value(law.hertz), value(law.damping_tsuji)
-    else:
-        k, c = value(law.stiffness), value(law.damping_paper) + value(law.damping_normal)
-    return c / (2.0 * math.sqrt(k * collision.meeting.reduced_mass))
+def damping_ratio(collision: Collision, speed: float) -> float:
+    """zeta = c / (2 sqrt(k m_r)) of a linear spring, or of the one that is like it at a speed (m/s).
+
+    0 for a law that has none.
+    """
+    damping = collision.damping
+    if damping is None or damping.ratio is None:
+        return 0.0
+    return damping.ratio(collision.stiffness, collision.coefficient, collision.meeting.reduced_mass, speed)
 
 
 def rebound(collision: Collision, speed: float) -> float | str:
     """Speed after over speed before, by closed form; or why there is none."""
-    if not collision.damping:
+    if collision.damping is None:
         return 1.0
-    if collision.damping == "onset":
-        return onset_restitution(collision.meeting.value(collision.meeting.law.damping_onset) * speed)
-    if collision.damping == "tsuji" or (collision.elastic == "linear" and collision.damping == "normal"):
-        return clamped_restitution(damping_ratio(collision))
-    if collision.elastic == "linear":
-        zeta = damping_ratio(collision)
-        if zeta >= 1.0:
-            return "damped beyond critical, the contact never ends"
-        return math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta))
-    return f"{collision.name}: its rebound has no closed form"
-
-
-def onset_restitution(a: float) -> float:
-    """e of N (1 + lambda v) at a = lambda v: the root of a (1 + e) = ln((1 + a) / (1 - e a))."""
-
-    def rising(e: float) -> float:
-        # By log1p, for a e and a are small where hardly anything is lost.
-        return math.log1p(a) - math.log1p(-e * a) - a * (1.0 + e) if e * a < 1.0 else math.inf
-
-    return root(rising, 0.0, min(1.0, (1.0 + ROUNDING) / a))
+    m_r, c = collision.meeting.reduced_mass, collision.coefficient
+    found = collision.damping.rebound(collision.elastic.name, collision.stiffness, c, m_r, speed)
+    return f"{collision.name}: its rebound has no closed form" if found is None else found
 
 
 def peak_force(collision: Collision, speed: float) -> float | None:
@@ -116,13 +87,14 @@ def peak_force(collision: Collision, speed: float) -> float | None:
 
     None where the dashpot's jump at first touch is larger (zeta > 1/2), and for other laws.
     """
-    if collision.elastic != "linear" or collision.damping not in ("", "paper", "normal"):
+    damping = collision.damping
+    if collision.elastic is not LINEAR or (damping is not None and (damping.exponent > 0.0 or damping.ratio is None)):
         return None
-    zeta = damping_ratio(collision)
+    zeta = damping_ratio(collision, speed)
     if zeta > 0.5:
         return None
     meeting = collision.meeting
-    undamped = speed * math.sqrt(meeting.value(meeting.law.stiffness) * meeting.reduced_mass)
+    undamped = speed * math.sqrt(collision.stiffness * meeting.reduced_mass)
     return undamped * math.exp(-zeta * (3.0 * math.acos(zeta) - math.pi) / math.sqrt(1.0 - zeta * zeta))
 
 
@@ -157,22 +129,18 @@ class _Force:
     """N(x, x') of an impact, in N."""
 
     def __init__(self, collision: Collision) -> None:
-        law, value = collision.meeting.law, collision.meeting.value
-        self.linear, self.hertz = value(law.stiffness), value(law.hertz)
-        self.table = table_of(collision.meeting, collision.terms)
-        self.dashpot = value(law.damping_paper) + value(law.damping_normal)
-        self.tsuji, self.onset = value(law.damping_tsuji), value(law.damping_onset)
-        self.clamped = collision.damping in ("normal", "tsuji", "onset")
+        self._collision = collision
+        self._curves = collision.terms.laws.curves
+        self._coefficient = collision.coefficient
+        jumps = collision.damping is not None and collision.damping.exponent == 0.0
+        # Where such a law sets in, its force is there.
+        self._least = sys.float_info.min if jumps else 0.0
+        self.clamped = collision.damping is not None and not collision.damping.isotropic
 
     def __call__(self, x: float, v: float) -> float:
         """As long as the contact lasts: it is the caller who ends it, a clamped one where this is 0."""
-        x = max(x, 0.0)
-        elastic = self.linear * x + self.hertz * math.pow(x, 1.5) + self._tabled(x)
-        return elastic * (1.0 + self.onset * v) + (self.dashpot + self.tsuji * math.pow(x, 0.25)) * v
-
-    def _tabled(self, x: float) -> float:
-        if self.table is None:
-            return 0.0
-        overlap, force = self.table
-        last = (force[-1] - force[-2]) / (overlap[-1] - overlap[-2])
-        return float(np.interp(x, overlap, force)) + max(0.0, x - float(overlap[-1])) * float(last)
+        collision, depth = self._collision, max(x, self._least)
+        elastic = collision.elastic.force(collision.stiffness, depth, self._curves)
+        if collision.damping is None:
+            return elastic
+        return elastic + collision.damping.force(self._coefficient, elastic, depth, v)

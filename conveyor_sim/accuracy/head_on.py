@@ -11,6 +11,8 @@ from conveyor_sim.accuracy.aside import PHASES, RAIL, corner, phases, pitch, rms
 from conveyor_sim.accuracy.collision import Collision, damping_ratio, duration, peak_force, rebound
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.contact.laws.hertz import HERTZ
+from conveyor_sim.engine.contact.laws.table import TABLE
 from conveyor_sim.simulation import Simulation
 
 STRONG = 3.0
@@ -54,13 +56,13 @@ class HeadOn:
     @property
     def _speeds(self) -> F8:
         """m/s, (PHASES,). On a table they differ by a third, that its points are passed at all phases, too."""
-        spread = 0.3 if self.collision.elastic == "table" else 0.0
+        spread = 0.3 if self.collision.elastic is TABLE else 0.0
         return np.asarray(self.speed * (1.0 + spread * (phases(2.0) - 0.5)))
 
     @property
     def strength(self) -> float:
         """zeta of a dashpot whose order differs from the spring's, else 0."""
-        return damping_ratio(self.collision) if self.collision.damping in ("paper", "normal", "tsuji") else 0.0
+        return damping_ratio(self.collision, self.speed)
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -111,18 +113,14 @@ class HeadOn:
 
     def expected(self, smooth_order: int) -> float | None:
         """Order in dt; None where a weak dashpot lets it change with dt."""
-        elastic, damping = self.collision.elastic, self.collision.damping
-        steps = self.steps[-4:]
-        spring = 2.5 if elastic == "hertz" else 2.0
-        if not damping:
+        damping, steps = self.collision.damping, self.steps[-4:]
+        spring = 2.5 if self.collision.elastic is HERTZ else 2.0
+        if damping is None:
             return spring
-        if damping == "onset":
-            # Semi-implicit Euler's first-order error, dt/2 (da/dv) a, is that of another elastic law: e is the same.
-            return min(max(2.0, float(smooth_order)), spring)
-        if self.strength * steps[0] < STRONG:
+        if 0.0 < self.strength * steps[0] < STRONG:
             # A dashpot that hardly matters: not at all, or in short steps only.
             return spring if self.strength * steps[-1] < WEAK else None
-        return min(float(smooth_order), 1.25) if damping == "tsuji" else 1.0
+        return min(damping.order(float(smooth_order)), spring)
 
 
 def sliding_loss(collision: Collision, speed: float, slip: float, restitution: float, turns: bool) -> float:
@@ -133,10 +131,10 @@ def sliding_loss(collision: Collision, speed: float, slip: float, restitution: f
     """
     meeting, law = collision.meeting, collision.meeting.law
     mu, m = meeting.value(law.friction), meeting.first.mass
-    if collision.damping != "paper":
+    if collision.damping is None or not collision.damping.isotropic:
         return mu * (1.0 + restitution) * speed
     share = _share(collision, turns)
-    rate = meeting.value(law.damping_paper) / (share * m)
+    rate = collision.coefficient / (share * m)
     end, pressed = _pressed(collision, speed, rate)
     after = math.exp(-rate * end) * (slip - mu / (share * m) * pressed)
     return (slip - after) * share
@@ -147,9 +145,9 @@ def slip_for_sliding(collision: Collision, speed: float, restitution: float, tur
     meeting, law = collision.meeting, collision.meeting.law
     mu, left = meeting.value(law.friction), 2.0 * collision.terms.scene.slip_limit
     share = _share(collision, turns)
-    if collision.damping != "paper":
+    if collision.damping is None or not collision.damping.isotropic:
         return 1.25 * mu * (1.0 + restitution) * speed / share + left
-    rate = meeting.value(law.damping_paper) / (share * meeting.first.mass)
+    rate = collision.coefficient / (share * meeting.first.mass)
     end, pressed = _pressed(collision, speed, rate)
     return 1.25 * mu / (share * meeting.first.mass) * pressed + left * math.exp(rate * end)
 
@@ -162,8 +160,8 @@ def _share(collision: Collision, turns: bool) -> float:
 
 def _pressed(collision: Collision, speed: float, rate: float) -> tuple[float, float]:
     """End of a contact (s) with the paper's dashpot, and the integral of exp(rate t) max(0, N) over it, N s."""
-    m, zeta = collision.meeting.reduced_mass, damping_ratio(collision)
-    w = math.sqrt(collision.meeting.value(collision.meeting.law.stiffness) / m)
+    m, zeta = collision.meeting.reduced_mass, damping_ratio(collision, speed)
+    w = math.sqrt(collision.stiffness / m)
     wd, angle = w * math.sqrt(1.0 - zeta * zeta), 2.0 * math.acos(zeta)
     power = complex(rate - zeta * w, -wd)
     whole = cmath.exp(1j * angle) * (cmath.exp(power * angle / wd) - 1.0) / power

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from conveyor_sim.laws.damping import damping_law, elastic_law
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.contacts import Contact
 
@@ -13,9 +14,8 @@ def scaled_contacts(scene: Scene, factor: float) -> list[dict[str, Any]]:
     """The scene's contacts, as in a scene file, with every stiffness times `factor`.
 
     A linear contact of stiffness f k rebounds as before with a dashpot of sqrt(f) c, of the same c / (2 sqrt(k m));
-    a Hertz contact, f^(2/5) times as short at any speed, with f^(2/5) c; damping that sets in at zero keeps its lambda,
-    whose effect depends on the speed alone; a restitution that is given stays. The paper's outlook: a lower equivalent
-    stiffness.
+    a Hertz contact, f^(2/5) times as short at any speed, with f^(2/5) c; each law of damping declares its power. A
+    restitution that is given stays. The paper's outlook: a lower equivalent stiffness.
     """
     return [_scaled(contact, factor) for contact in scene.contacts]
 
@@ -32,8 +32,8 @@ def _scaled(contact: Contact, factor: float) -> dict[str, Any]:
     if damping.restitution is not None:
         # A scene gives one of the two.
         del data["damping"]["coefficient"]
-    elif damping.law in ("paper", "normal"):
-        data["damping"]["coefficient"] *= factor ** (0.4 if contact.hertz_stiffness is not None else 0.5)
+    elif (law := damping_law(contact)) is not None:
+        data["damping"]["coefficient"] *= factor ** law.stiffness_power(elastic_law(contact).name)
     if contact.tangential is not None:
         if contact.tangential.stiffness is not None:
             data["tangential"]["stiffness"] *= factor

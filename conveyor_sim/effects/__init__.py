@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from conveyor_sim.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
 from conveyor_sim.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
 from conveyor_sim.effects.damage import CRUSHING, IMPACTS, SCUFFING, TIPPING
-from conveyor_sim.effects.damping import NORMAL_DAMPING, ONSET_DAMPING, PAPER_DAMPING, TSUJI_DAMPING
+from conveyor_sim.effects.damping import DAMPING_EFFECTS
 from conveyor_sim.effects.declaration import Cause, Effect, EffectChoice
 from conveyor_sim.effects.friction import ATAN_FRICTION, CONTACT_FRICTION, IMPLICIT_FRICTION, TANGENTIAL_SPRING
 from conveyor_sim.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS, UNEQUAL_RADII
@@ -49,10 +49,7 @@ EFFECTS: tuple[Effect, ...] = (
     LINEAR,
     HERTZ,
     TABLE,
-    PAPER_DAMPING,
-    NORMAL_DAMPING,
-    TSUJI_DAMPING,
-    ONSET_DAMPING,
+    *DAMPING_EFFECTS,
     CONTACT_FRICTION,
     BASE_FRICTION,
     ATAN_FRICTION,

@@ -14,10 +14,9 @@ from conveyor_sim.effects.terms import (
     meetings,
     most_bottles,
     overlap_at,
-    steepest,
-    table_of,
     tightest,
 )
+from conveyor_sim.engine.contact.laws import hertz, linear, table
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.moving import moving_shapes
@@ -84,25 +83,26 @@ def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]])
 
 
 def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
-    k = meeting.value(meeting.law.stiffness)
-    return k, f"k = {k:g} N/m"
+    law, k = meeting.elastic
+    return (k, f"k = {k:g} N/m") if law is linear.LINEAR else (0.0, "")
 
 
 def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
     """The stiffer the harder it is pressed, by an impact or by a queue."""
-    k = meeting.value(meeting.law.hertz)
-    if k == 0.0:
+    law, k = meeting.elastic
+    if law is not hertz.HERTZ:
         return 0.0, ""
     pressed = overlap_at(meeting, terms, contact_load(terms).force)
-    tangent = 1.5 * k * max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed) ** 0.5
+    tangent = law.stiffest(k, max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed), None)
     return tangent, f"dN/d delta = {tangent:.3g} N/m"
 
 
 def _table(meeting: Meeting, terms: Terms) -> tuple[float, str]:
-    points = table_of(meeting, terms)
-    if points is None:
+    law, c = meeting.elastic
+    if law is not table.TABLE:
         return 0.0, ""
-    return steepest(points), f"the table's steepest, {steepest(points):.3g} N/m"
+    steepest = law.stiffest(c, 0.0, terms.laws.curves)
+    return steepest, f"the table's steepest, {steepest:.3g} N/m"
 
 
 def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Meeting, Terms], list[Share]]:

@@ -17,8 +17,9 @@ from conveyor_sim.effects.terms import (
     overlap_at,
     tightest,
 )
+from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.scene.schema import BottleType, Scene
-from conveyor_sim.timestep.bounds import Bound, contact_friction_bound, contact_time, damping_bound
+from conveyor_sim.timestep.bounds import Bound, contact_friction_bound, damping_bound
 from conveyor_sim.timestep.prediction import Term
 
 

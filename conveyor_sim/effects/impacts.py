@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from conveyor_sim.effects.declaration import Effect
-from conveyor_sim.effects.terms import Meeting, Terms, deepest, duration, impact_speed, meetings, overlap_at, table_of
+from conveyor_sim.effects.terms import Meeting, Terms, deepest, duration, impact_speed, meetings, overlap_at
 from conveyor_sim.timestep.bounds import Bound
 from conveyor_sim.timestep.prediction import Impact
 
@@ -39,9 +39,5 @@ def impact_bounds(found: Sequence[Impact], tolerance: float) -> list[Bound]:
 
 
 def _at(meeting: Meeting, terms: Terms, speed: float) -> str:
-    if (k := meeting.value(meeting.law.stiffness)) > 0.0:
-        return f"at k = {k:g} N/m and {speed:g} m/s"
-    if (k := meeting.value(meeting.law.hertz)) > 0.0:
-        return f"at k = {k:g} N/m^1.5 and {speed:g} m/s"
-    points = table_of(meeting, terms)
-    return f"on the table of {0 if points is None else len(points[0])} points at {speed:g} m/s"
+    law, k = meeting.elastic
+    return f"{law.said(k, terms.laws.curves)} {speed:g} m/s"

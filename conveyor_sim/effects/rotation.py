@@ -3,14 +3,14 @@
 from collections.abc import Collection
 
 from conveyor_sim.effects.base import RING_BASE
-from conveyor_sim.effects.damping import PAPER_DAMPING
+from conveyor_sim.effects.damping import TURNING
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.friction import CONTACT_FRICTION
 from conveyor_sim.scene.schema import Scene, Single
 
 
 def _rotation(scene: Scene, on: Collection[str]) -> Cause | None:
-    for turning in (CONTACT_FRICTION, PAPER_DAMPING, RING_BASE):
+    for turning in (CONTACT_FRICTION, *TURNING, RING_BASE):
         if turning.name in on and (cause := turning.called_for(scene, on)) is not None:
             return cause
     for index, bottle in enumerate(scene.bottles):

@@ -5,9 +5,10 @@ from collections.abc import Collection
 from conveyor_sim.effects.base import MEETING
 from conveyor_sim.effects.declaration import Cause, Effect
 from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
+from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.laws.coefficients import base_springs
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.timestep.bounds import Bound, contact_time, damping_bound
+from conveyor_sim.timestep.bounds import Bound, damping_bound
 from conveyor_sim.timestep.methods import Share
 
 

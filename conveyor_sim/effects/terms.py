@@ -3,16 +3,18 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC, DampingLaw, ElasticLaw
 from conveyor_sim.laws.coefficients import Laws
 from conveyor_sim.scene.geometry import initial_bottles
 from conveyor_sim.scene.moving import moving_shapes
 from conveyor_sim.scene.schema import BottleType, Scene, Single
-from conveyor_sim.timestep.bounds import Bound, contact_time, hertz_contact_time, least_steps
+from conveyor_sim.timestep.bounds import Bound, least_steps
 from conveyor_sim.timestep.methods import METHODS, STEP_ERROR, Method
 
 SPEED_AT_REST = 1.0
@@ -68,6 +70,22 @@ class Meeting:
     def value(self, column: F8 | None) -> float:
         """The coefficient of this meeting, 0 if it has none."""
         return 0.0 if column is None else float(column[self.entry])
+
+    def coefficient(self, law: DampingLaw) -> float:
+        """Its coefficient of a law of damping, 0 if it has another or none."""
+        return self.value(getattr(self.law, law.column))
+
+    @property
+    def elastic(self) -> tuple[ElasticLaw, Any]:
+        """Its elastic law, and its coefficient or the number of its table."""
+        columns = ((law, getattr(self.law, law.column)) for law in ELASTIC)
+        found = ((law, column[self.entry].item()) for law, column in columns if column is not None)
+        return next((law, k) for law, k in found if k > law.none)
+
+    @property
+    def damping(self) -> DampingLaw | None:
+        """Its law of damping."""
+        return next((law for law in DAMPING if self.coefficient(law)), None)
 
     @property
     def has_spring(self) -> bool:
@@ -144,74 +162,24 @@ def impact_speed(scene: Scene) -> float:
 
 def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:
     """Overlap (m) and force (N) at the turning point of an undamped head-on impact at a speed in m/s."""
-    energy = 0.5 * meeting.reduced_mass * speed * speed
-    law = meeting.law
-    if (k := meeting.value(law.stiffness)) > 0.0:
-        overlap = math.sqrt(2.0 * energy / k)
-        return overlap, k * overlap
-    if (k := meeting.value(law.hertz)) > 0.0:
-        overlap = (2.5 * energy / k) ** 0.4
-        return overlap, k * overlap**1.5
-    points = table_of(meeting, terms)
-    return _deepest_in_table(points[0], points[1], energy) if points is not None else (0.0, 0.0)
+    law, k = meeting.elastic
+    return law.deepest(k, 0.5 * meeting.reduced_mass * speed * speed, terms.laws.curves)
 
 
 def overlap_at(meeting: Meeting, terms: Terms, force: float) -> float:
     """Overlap (m) at which the elastic law gives a force (N)."""
-    law = meeting.law
-    if (k := meeting.value(law.stiffness)) > 0.0:
-        return force / k
-    if (k := meeting.value(law.hertz)) > 0.0:
-        return math.pow(force / k, 2.0 / 3.0)
-    points = table_of(meeting, terms)
-    if points is None:
-        return 0.0
-    overlap, known = points
-    if force > known[-1]:
-        slope = float((known[-1] - known[-2]) / (overlap[-1] - overlap[-2]))
-        return float(overlap[-1]) + (force - float(known[-1])) / slope if slope > 0.0 else math.inf
-    return float(np.interp(force, known, overlap))
-
-
-def steepest(points: tuple[F8, F8]) -> float:
-    """The largest slope of a table, N/m."""
-    overlap, force = points
-    return float(((force[1:] - force[:-1]) / (overlap[1:] - overlap[:-1])).max())
+    law, k = meeting.elastic
+    return law.overlap_at(k, force, terms.laws.curves)
 
 
 def duration(meeting: Meeting, terms: Terms, speed: float) -> float:
     """How long an undamped head-on impact at a speed in m/s lasts, s; on a table: at least."""
-    law = meeting.law
-    if (k := meeting.value(law.hertz)) > 0.0:
-        return hertz_contact_time(k, meeting.reduced_mass, speed)
-    points = table_of(meeting, terms)
-    k = meeting.value(law.stiffness) if points is None else steepest(points)
-    return contact_time(k, meeting.reduced_mass)
+    law, k = meeting.elastic
+    return law.duration(k, meeting.reduced_mass, speed, terms.laws.curves)
 
 
 def frequency(meeting: Meeting, terms: Terms, speed: float) -> float:
     """sqrt(-N'' / N) at the peak of the force N of an undamped head-on impact at a speed in m/s, rad/s."""
-    if (k := meeting.value(meeting.law.hertz)) > 0.0:
-        return math.sqrt(1.5 * k * math.sqrt(deepest(meeting, terms, speed)[0]) / meeting.reduced_mass)
-    return math.pi / duration(meeting, terms, speed)
-
-
-def table_of(meeting: Meeting, terms: Terms) -> tuple[F8, F8] | None:
-    """Overlaps (m) and forces (N) of a meeting's table; None if it has none."""
-    curve, curves = meeting.law.curve, terms.laws.curves
-    if curve is None or curves is None or curve[meeting.entry] < 0:
-        return None
-    index = int(curve[meeting.entry])
-    points = slice(int(curves.start[index]), int(curves.start[index + 1]))
-    return curves.overlap[points], curves.force[points]
-
-
-def _deepest_in_table(overlap: F8, force: F8, energy: float) -> tuple[float, float]:
-    steps = np.diff(overlap)
-    stored = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * steps)])
-    piece = min(int(np.searchsorted(stored, energy, side="right")) - 1, len(steps) - 1)
-    slope = float((force[piece + 1] - force[piece]) / steps[piece])
-    left, start = energy - float(stored[piece]), float(force[piece])
-    # start d + slope d^2 / 2 = left, in the form that does not divide by a slope of 0.
-    deeper = 2.0 * left / (start + math.sqrt(start * start + 2.0 * slope * left))
-    return float(overlap[piece]) + deeper, start + slope * deeper
+    law, k = meeting.elastic
+    depth, _ = deepest(meeting, terms, speed)
+    return math.sqrt(law.stiffest(k, depth, terms.laws.curves) / meeting.reduced_mass)

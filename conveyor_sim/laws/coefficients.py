@@ -8,11 +8,13 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
 from conveyor_sim.engine.arrays.types import F8, I4
-from conveyor_sim.laws.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
+from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC, DampingLaw, ElasticLaw
+from conveyor_sim.engine.contact.laws.table import TABLE
+from conveyor_sim.laws.damping import damping_coefficient, damping_law
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.scene.schema import Floor, Scene
 
-NO_CURVE = -1
+NO_CURVE = int(TABLE.none)
 
 
 class BaseSprings(NamedTuple):
@@ -66,7 +68,7 @@ def build_laws(scene: Scene, rail_materials: Sequence[str], on: Collection[str])
     return Laws(
         pair=_columns(scene, materials, materials, reduced, on) if "bottle_contact" in on else None,
         rail=_columns(scene, materials, rail_materials, against_rails, on) if rails else None,
-        curves=_curves(scene) if "table" in on else None,
+        curves=_curves(scene) if TABLE.name in on else None,
         base_friction=_by_curve(base_friction(scene), springs) if "base_friction" in on else None,
         base_spring=springs,
         base_radius=base_radius(scene) if "ring_base" in on else None,
@@ -119,31 +121,6 @@ def base_radius(scene: Scene) -> F8:
     return np.array([kind.base_radius or 0.0 for kind in scene.bottle_types.values()])
 
 
-def damping_effect(contact: Contact) -> str | None:
-    """The effect that a contact's damping is, None if it has none: `normal` with restitution on Hertz is Tsuji's."""
-    damping = contact.damping
-    if damping.law == "none" or (damping.restitution is None and damping.coefficient == 0.0):
-        return None
-    if damping.restitution == 1.0:
-        return None
-    if damping.law == "normal" and damping.restitution is not None and contact.hertz_stiffness is not None:
-        return "tsuji_damping"
-    return f"{damping.law}_damping"
-
-
-def damping_coefficient(contact: Contact, reduced_mass: float) -> float:
-    """Coefficient of a contact's damping, in the unit of its law: as given, or from the restitution."""
-    damping, e = contact.damping, contact.damping.restitution
-    if e is None:
-        return damping.coefficient
-    if damping.law == "onset":
-        return onset_damping(e, damping.speed or 1.0)
-    if contact.hertz_stiffness is not None:
-        return tsuji_damping(e, contact.hertz_stiffness, reduced_mass)
-    solve = paper_damping if damping.law == "paper" else normal_damping
-    return solve(e, contact.stiffness or 0.0, reduced_mass)
-
-
 def _mindlin(contact: Contact) -> float:
     """N/m^1.5: times sqrt(delta) it is stiffness_ratio times dN/d delta, 1.5 k_h sqrt(delta)."""
     if contact.tangential is None or contact.tangential.stiffness_ratio is None:
@@ -168,24 +145,25 @@ def _columns(
         ]
         return np.array(entries) if any(entries) else None
 
-    def damping(effect: str) -> F8 | None:
+    def damping(law: DampingLaw) -> F8 | None:
         return column(
-            effect,
-            lambda contact, mass: damping_coefficient(contact, mass) if damping_effect(contact) == effect else 0.0,
+            law.effect,
+            lambda contact, mass: damping_coefficient(contact, law, mass) if damping_law(contact) is law else 0.0,
         )
 
+    def stiffness(law: ElasticLaw) -> F8 | None:
+        return column(law.name, lambda contact, _: getattr(contact, law.field))
+
+    laws = {law.column: stiffness(law) for law in ELASTIC if law is not TABLE}
+    laws |= {law.column: damping(law) for law in DAMPING}
+    curve = _curve_column([curve_of.get(index, NO_CURVE) for index in found]) if TABLE.name in on else None
     mindlin = column("tangential_spring", lambda contact, _: _mindlin(contact))
     springs = column(
         "tangential_spring", lambda contact, _: contact.tangential.stiffness if contact.tangential else 0.0
     )
     return ContactLaw(
-        stiffness=column("linear", lambda contact, _: contact.stiffness),
-        hertz=column("hertz", lambda contact, _: contact.hertz_stiffness),
-        curve=_curve_column([curve_of.get(index, NO_CURVE) for index in found]) if "table" in on else None,
-        damping_paper=damping("paper_damping"),
-        damping_normal=damping("normal_damping"),
-        damping_tsuji=damping("tsuji_damping"),
-        damping_onset=damping("onset_damping"),
+        **laws,
+        **{TABLE.column: curve},
         friction=column("contact_friction", lambda contact, _: contact.friction),
         tangential_stiffness=np.zeros(len(found)) if springs is None and mindlin is not None else springs,
         tangential_mindlin=mindlin,

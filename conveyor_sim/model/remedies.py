@@ -13,6 +13,7 @@ from conveyor_sim.effects.terms import impact_speed
 from conveyor_sim.errors import SceneError
 from conveyor_sim.model.step_choice import StepChoice, choose_steps
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
+from conveyor_sim.scene.contacts import DAMPING_CHOICES
 from conveyor_sim.scene.load import parse_overrides, parse_scene
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.timestep.bounds import Bound, fewest_steps
@@ -185,7 +186,8 @@ def _onset(scene: Scene) -> list[dict[str, Any]] | None:
     changed = False
     for contact in scene.contacts:
         data = contact.model_dump(mode="json", exclude_none=True)
-        if contact.damping.law in ("normal", "paper") and contact.damping.restitution:
+        choice = DAMPING_CHOICES.get(contact.damping.law)
+        if choice is not None and not choice.at_speed and contact.damping.restitution:
             restitution, speed = contact.damping.restitution, impact_speed(scene)
             data["damping"] = {"law": "onset", "restitution": restitution, "speed": speed}
             changed = True

@@ -1,19 +1,12 @@
 """Contacts that can't be: laws that exclude each other, restitution that has no closed form, tables that fall."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from conveyor_sim.scene.contacts import ELASTIC, Base, Contact, Tangential
+from conveyor_sim.scene.contacts import DAMPING_CHOICES, ELASTIC, Base, Contact, Tangential
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.scene.types import MOST
 from conveyor_sim.scene.words import listed, shown
-
-_RESTITUTION = {
-    "normal": ("stiffness", "hertz_stiffness"),
-    "paper": ("stiffness",),
-    "onset": ELASTIC,
-}
-"""Laws of damping, and the elastic laws beside which they have a restitution."""
 
 BASE_SPRINGS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators with springs under the bottles: one evaluation a step, at places that bottles really come to."""
@@ -83,8 +76,18 @@ def _damping(path: Path, contact: Contact) -> Iterator[Problem]:
             if value:
                 yield Problem(
                     (*path, field),
-                    f'{shown(value)} given, expected law "paper", "normal" or "onset" beside it (the law is "none")',
+                    f'{shown(value)} given, expected law {_quoted(DAMPING_CHOICES)} beside it (the law is "none")',
                 )
+        return
+    elastic = next((field for field in ELASTIC if getattr(contact, field) is not None), "stiffness")
+    choice = DAMPING_CHOICES[damping.law]
+    if elastic not in choice.elastic:
+        laws = [law for law, other in DAMPING_CHOICES.items() if elastic in other.elastic]
+        yield Problem(
+            (*path, "law"),
+            f'"{damping.law}" given, expected {listed(list(choice.elastic))} beside it, or law {_quoted(laws)}: '
+            f"with {elastic} it has no meaning",
+        )
         return
     if damping.restitution is None:
         if damping.speed is not None:
@@ -92,21 +95,24 @@ def _damping(path: Path, contact: Contact) -> Iterator[Problem]:
         return
     if "coefficient" in damping.model_fields_set:
         yield Problem(path, "coefficient and restitution given, expected one of them")
-    elastic = next((field for field in ELASTIC if getattr(contact, field) is not None), "stiffness")
-    if elastic not in _RESTITUTION[damping.law]:
-        laws = [f'"{law}"' for law, beside in _RESTITUTION.items() if elastic in beside]
+    if elastic not in choice.restitution:
+        laws = [law for law, other in DAMPING_CHOICES.items() if elastic in other.restitution]
         yield Problem(
             (*path, "restitution"),
-            f"{shown(damping.restitution)} given, expected a coefficient, or law {listed(laws)}: "
+            f"{shown(damping.restitution)} given, expected a coefficient, or law {_quoted(laws)}: "
             f'with {elastic} the restitution of law "{damping.law}" depends on speed',
         )
-    elif damping.law == "onset" and damping.speed is None:
+    elif choice.at_speed and damping.speed is None:
         yield Problem((*path, "speed"), "missing, expected the speed at which the restitution holds (m/s)")
-    elif damping.law != "onset" and damping.speed is not None:
+    elif not choice.at_speed and damping.speed is not None:
         yield Problem(
             (*path, "speed"),
             f'{shown(damping.speed)} given, expected none: the restitution of law "{damping.law}" holds at any speed',
         )
+
+
+def _quoted(laws: Iterable[str]) -> str:
+    return listed([f'"{law}"' for law in laws])
 
 
 def _tangential(path: Path, contact: Contact, spring: Tangential) -> Iterator[Problem]:

@@ -1,6 +1,7 @@
 """What a scene says where two materials meet: contacts with their laws, and friction of bottles on belts."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Len
 
@@ -9,6 +10,29 @@ from conveyor_sim.scene.types import Component, NotNegative, Pair, Positive, Res
 
 ELASTIC = ("stiffness", "hertz_stiffness", "table")
 """The fields of a contact that each choose an elastic law."""
+
+
+class DampingChoice(NamedTuple):
+    """What goes with a law of damping."""
+
+    restitution: tuple[str, ...]
+    """The elastic laws beside which it can be given by a restitution."""
+    at_speed: bool = False
+    """Whether that depends on the speed of impact, and so is given at one."""
+    elastic: tuple[str, ...] = ELASTIC
+    """The elastic laws beside which it can be at all."""
+
+
+DAMPING_CHOICES: Mapping[str, DampingChoice] = {
+    "paper": DampingChoice(("stiffness",)),
+    "normal": DampingChoice(("stiffness", "hertz_stiffness")),
+    "onset": DampingChoice(ELASTIC, at_speed=True),
+    "viscoelastic": DampingChoice(("hertz_stiffness",), at_speed=True, elastic=("hertz_stiffness",)),
+}
+"""The values of `Damping.law` but none; the laws themselves are in `engine/contact/laws/`."""
+
+DampingEffect = Literal["paper_damping", "normal_damping", "tsuji_damping", "onset_damping", "viscoelastic_damping"]
+"""The effects that they are."""
 
 TablePoints = Annotated[
     tuple[tuple[Component, Component], ...],
@@ -20,22 +44,28 @@ TablePoints = Annotated[
 class Damping(Part):
     """Damping of a contact, by a coefficient or by the restitution of a head-on impact.
 
-    A restitution can be given with law `normal` for linear and Hertz contacts, with `paper` for linear ones, and with
-    `onset`, at a speed, for all.
+    A restitution can be given with law `normal` for linear and Hertz contacts, with `paper` for linear ones, with
+    `onset`, at a speed, for all, and with `viscoelastic`, at a speed, for Hertz contacts.
     """
 
-    law: Literal["none", "paper", "normal", "onset"] = quantity(
+    law: Literal["none", "paper", "normal", "onset", "viscoelastic"] = quantity(
         "none; paper: -c v*, v* the relative velocity of the contact points, in all directions (22); "
         "normal: along the normal only, and a contact never pulls; "
-        "onset: the elastic force times 1 + c x speed of approach (Hunt and Crossley), so that it sets in at zero.",
+        "onset: the elastic force times 1 + c x speed of approach (Hunt and Crossley), so that it sets in at zero; "
+        "viscoelastic: c x overlap^0.5 x speed of approach on a Hertz contact, which never pulls (Kuwabara and Kono): "
+        "a restitution that falls with the speed, as on glass.",
         default="none",
     )
-    coefficient: NotNegative = quantity("Damping coefficient c; for onset in s/m.", "kg/s", default=0.0)
+    coefficient: NotNegative = quantity(
+        "Damping coefficient c; for onset in s/m, for viscoelastic in kg/(s m^0.5).", "kg/s", default=0.0
+    )
     restitution: Restitution | None = quantity(
         "Instead of the coefficient: speed after over speed before a head-on impact.", "1", default=None
     )
     speed: Positive | None = quantity(
-        "Speed of impact at which the restitution holds; needed for onset, where it depends on it.", "m/s", default=None
+        "Speed of impact at which the restitution holds; needed for onset and viscoelastic, where it depends on it.",
+        "m/s",
+        default=None,
     )
 
 

@@ -2,6 +2,7 @@
 
 from typing import Annotated, Literal, get_args
 
+from conveyor_sim.scene.contacts import DampingEffect
 from conveyor_sim.scene.types import Says
 from conveyor_sim.scene.words import listed
 
@@ -14,10 +15,7 @@ EffectName = Literal[
     "linear",
     "hertz",
     "table",
-    "paper_damping",
-    "normal_damping",
-    "tsuji_damping",
-    "onset_damping",
+    DampingEffect,
     "contact_friction",
     "base_friction",
     "atan_friction",

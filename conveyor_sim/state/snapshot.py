@@ -35,20 +35,20 @@ def snapshot(part: Any) -> Any:
     return part
 
 
-def restore(part: Any, told: Any, name: str = "memory") -> None:
+def restore(part: Any, kept: Any, name: str = "memory") -> None:
     """Put what `snapshot` returned of an object, or of a dict of objects, back into one that is built alike.
 
     What is given must be alike: the same attributes, of the types of the class's annotations, or else of the values
     that they have now; numbers are finite. Raises ValueError, in words, where it is not.
     """
     now = _public(part)
-    entries(told, now, name)
+    entries(kept, now, name)
     kind: Any = type(part)
     hints = {} if isinstance(part, dict) else _hints(kind)
     for key, value in now.items():
-        place, given = f"{name}.{key}", told[key]
+        place, given = f"{name}.{key}", kept[key]
         if isinstance(value, np.random.Generator):
-            _recall_random(value, given, place)
+            _restore_random(value, given, place)
         elif isinstance(value, np.ndarray):
             value[...] = _array(value.shape, given, place)
         elif hasattr(value, "__dict__"):
@@ -59,24 +59,24 @@ def restore(part: Any, told: Any, name: str = "memory") -> None:
             setattr(part, key, typed(hints.get(key, type(value)), given, place))
 
 
-def entries(told: Any, expected: Any, name: str) -> None:
+def entries(kept: Any, expected: Any, name: str) -> None:
     """ValueError unless the plain data are a mapping with the expected keys."""
-    if not isinstance(told, dict) or told.keys() != set(expected):
+    if not isinstance(kept, dict) or kept.keys() != set(expected):
         raise ValueError(f"{name} has other entries than {', '.join(map(str, expected)) or 'none'}")
 
 
-def typed(kind: Any, told: Any, name: str) -> Any:
+def typed(kind: Any, kept: Any, name: str) -> Any:
     """Plain data as a type such as `tuple[int, ...]`, for JSON has lists only; numbers must be finite, unless the type
     says that they need not be.
 
     Raises ValueError, in words, for data of another type.
     """
     if kind is type(None):
-        if told is not None:
+        if kept is not None:
             raise ValueError(f"{name} {wrong('extra_forbidden')}")
         return None
     try:
-        value = _adapter(kind).validate_json(json.dumps(told), strict=True)
+        value = _adapter(kind).validate_json(json.dumps(kept), strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = "".join(f"[{part}]" for part in first["loc"])
@@ -109,19 +109,19 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind, config=ConfigDict(allow_inf_nan=False))
 
 
-def _recall_random(generator: np.random.Generator, told: Any, name: str) -> None:
-    entries(told, generator.bit_generator.state, name)
+def _restore_random(generator: np.random.Generator, kept: Any, name: str) -> None:
+    entries(kept, generator.bit_generator.state, name)
     try:
-        generator.bit_generator.state = told
+        generator.bit_generator.state = kept
     except Exception as error:  # NumPy's depend on what is wrong
         raise ValueError(f"{name}: not the state of a random generator") from error
 
 
-def _array(shape: tuple[int, ...], told: Any, name: str) -> Any:
+def _array(shape: tuple[int, ...], kept: Any, name: str) -> Any:
     kind: Any = float
     for _ in shape:
         kind = list[kind]
-    array = np.array(typed(kind, told, name))
+    array = np.array(typed(kind, kept, name))
     if array.shape != shape:
         raise ValueError(f"{name} has the shape {array.shape}, expected {shape}")
     if not math.isfinite(array.sum()):

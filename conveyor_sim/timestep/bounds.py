@@ -4,9 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-HERTZ_TIME = 2.0 * math.sqrt(math.pi) * math.gamma(1.4) / math.gamma(0.9)
-"""2.943, duration of a Hertz contact in units of the deepest overlap over the speed of impact."""
-
 
 @dataclass(frozen=True)
 class Bound:
@@ -26,20 +23,6 @@ def least_steps(tolerance: float) -> float:
     tolerance: relative error in contact force. A peak between two of so many steps is missed by a third of it.
     """
     return 2.0 / math.sqrt(tolerance)
-
-
-def contact_time(stiffness: float, reduced_mass: float) -> float:
-    """Duration of an undamped linear contact, pi sqrt(m_r / k), in s. N/m, kg."""
-    return math.pi * math.sqrt(reduced_mass / stiffness)
-
-
-def hertz_contact_time(stiffness: float, reduced_mass: float, speed: float) -> float:
-    """Duration of an undamped Hertz contact N = k delta^1.5, 3.218 (m_r^2 / (k^2 v))^(1/5), in s. N/m^1.5, kg, m/s.
-
-    It is 2.943 times the deepest overlap over v (Landau and Lifshitz, Theory of Elasticity, section 9).
-    """
-    deepest = math.pow(1.25 * reduced_mass * speed**2 / stiffness, 0.4)
-    return HERTZ_TIME * deepest / speed
 
 
 def lattice_bound(stiffness: float, mass: float) -> float:

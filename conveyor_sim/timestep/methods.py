@@ -93,8 +93,13 @@ class Method:
         """Steps in v_lim / (mu g) by which creep is off by at most so much; 0: it never is."""
         return max(self.creep_steps, math.pow(self.creep / creep, 1.0 / self.creep_order))
 
-    def growing(self, name: str, coefficient: float, exponent: float, rate: float, frequency: float) -> Share:
-        """A dashpot that grows with the overlap as (w t)^exponent, c / m_r in 1/s at its largest; rad/s."""
+    def growing(self, exponent: float, rate: float, frequency: float) -> Share:
+        """A dashpot that grows with the overlap as (w t)^exponent, c / m_r in 1/s at its largest; rad/s.
+
+        Coefficients were measured at exponents of 1/4 and 1; between them they are interpolated.
+        """
+        onset = min(max((exponent - 0.25) / 0.75, 0.0), 1.0)
+        name, coefficient = "dashpot", (1.0 - onset) * self.tsuji + onset * self.onset
         if not self.second_order:
             return Share(name, coefficient, 1.0 / rate, 1.0)
         return Share(name, coefficient, (rate * frequency**exponent) ** (-1.0 / (1.0 + exponent)), 1.0 + exponent)

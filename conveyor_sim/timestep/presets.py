@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from conveyor_sim.laws.restitution import paper_damping
+from conveyor_sim.laws.damping import DAMPING_BY_NAME
 from conveyor_sim.scene.accuracy import Accuracy, Preset
 from conveyor_sim.timestep.bounds import least_steps
 from conveyor_sim.timestep.methods import METHODS, Method
@@ -70,7 +70,7 @@ def _impact(method: Method, restitution: float) -> Impact:
     """A linear contact of unit mass, stiffness and speed with a dashpot that jumps at first touch."""
     shares = [method.between_steps(1.0)]
     if restitution < 1.0:
-        c = paper_damping(restitution, 1.0, 1.0)
+        c = DAMPING_BY_NAME["paper"].coefficient(restitution, 1.0, 1.0, 1.0)
         shares += method.first_touch(c, 1.0 / c)
     return Impact("", "", math.pi, tuple(shares), 0.0, 1.0, 1.0, lambda force: force)
 

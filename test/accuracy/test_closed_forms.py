@@ -8,13 +8,14 @@ import pytest
 from scenes import base, belt, bottle, kind, scene, segment, stiffness_for
 
 from conveyor_sim.accuracy.closed_forms import cases_of, orders
-from conveyor_sim.accuracy.collision import Collision, collision_of, duration, onset_restitution, terms_of
+from conveyor_sim.accuracy.collision import Collision, collision_of, duration, terms_of
+from conveyor_sim.accuracy.head_on import HeadOn
 from conveyor_sim.accuracy.results import Order
 from conveyor_sim.effects.terms import meetings
+from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
+from conveyor_sim.engine.contact.laws.onset import onset_damping, onset_restitution
 from conveyor_sim.engine.integrators import INTEGRATORS
-from conveyor_sim.laws.restitution import onset_damping
 from conveyor_sim.scene import Scene
-from conveyor_sim.timestep.bounds import hertz_contact_time
 
 MASS, SPEED = 0.2, 0.7
 K = stiffness_for(0.002, MASS / 2.0)
@@ -140,6 +141,19 @@ W = math.sqrt(K / (MASS / 2.0))
 )
 def test_duration_of_a_contact(law: dict[str, Any], expected: float) -> None:
     assert duration(collision(pair(**law)), SPEED) == pytest.approx(expected, rel=1e-6)
+
+
+def test_viscoelastic_damping_is_a_case_of_its_own() -> None:
+    """Its rebound is known, by integration, and it is over a little later than without damping."""
+    damping = {"law": "viscoelastic", "restitution": 0.8, "speed": SPEED}
+    of = pair(hertz_stiffness=HERTZ, damping=damping)
+    (case,), skipped = cases_of(of)
+    assert not skipped
+    assert isinstance(case, HeadOn)
+    assert case.name == "head on, Hertz, viscoelastic"
+    assert case.restitution == pytest.approx(0.8, rel=1e-9)
+    undamped = hertz_contact_time(HERTZ, MASS / 2.0, SPEED)
+    assert 0.9 * undamped < duration(collision(of), SPEED) < 1.2 * undamped
 
 
 @pytest.mark.parametrize("e", [0.01, 0.3, 0.999])

@@ -8,14 +8,15 @@ import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, scene, segment
 
 from conveyor_sim.effects.terms import impact_speed
-from conveyor_sim.laws.restitution import onset_damping, tsuji_damping
+from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
+from conveyor_sim.engine.contact.laws.linear import contact_time
+from conveyor_sim.engine.contact.laws.onset import onset_damping
+from conveyor_sim.engine.contact.laws.tsuji import tsuji_damping
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.timestep.bounds import (
     base_friction_bound,
     contact_friction_bound,
-    contact_time,
     damping_bound,
-    hertz_contact_time,
     lattice_bound,
     mover_bound,
     slip_time,

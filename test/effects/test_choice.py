@@ -190,7 +190,8 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
     assert not any(choice.on or choice.forced or choice.path for choice in found)
     off = [choice.name for choice in choose_effects(scene(**line())) if not choice.on]
     assert off == [
-        "moving_rails", "hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction",
+        "moving_rails", "hertz", "table", "tsuji_damping", "onset_damping", "viscoelastic_damping",
+        "atan_friction", "implicit_friction",
         "tangential_spring", "static_friction", "ring_base", "peaks", "contact_arrays", "energy_ledger", "scuffing",
         "crushing", "impacts", "tipping",
     ]  # fmt: skip

@@ -18,7 +18,7 @@ FORCE = """
 import numpy as np
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.contact.contact import contact_force
-law = ContactLaw(np.array([5000.0]), *[None] * 6, np.array([0.3]), None, None, None)
+law = ContactLaw(stiffness=np.array([5000.0]), friction=np.array([0.3]))
 print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, None, None)[1])
 """
 

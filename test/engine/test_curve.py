@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from conveyor_sim.engine.arrays.contacts import Curves
-from conveyor_sim.engine.contact.curve import curve_force
+from conveyor_sim.engine.compiler.compile import kernel
+from conveyor_sim.engine.contact.laws import table
 
 OVERLAP = np.array([0.0, 0.001, 0.002, 0.005, 0.0, 0.004])
 FORCE = np.array([0.0, 2.0, 10.0, 70.0, 0.0, 20.0])
 CURVES = Curves(np.array([0, 4, 6], np.uint32), OVERLAP, FORCE)
 """Two tables, the second one a line of 5 kN/m."""
+COMPILED = kernel(table.force)
+
+
+def curve_force(curves: Curves, c: int, overlap: float) -> float:
+    return COMPILED(c, overlap, curves)
 
 
 def test_between_its_points_it_is_linear() -> None:

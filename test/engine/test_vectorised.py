@@ -55,6 +55,7 @@ ALL = [name for name in ContactLaw._fields if name != "curve"]
         ([*LINEAR, "damping_normal"], False, False, False),
         ([*LINEAR, "damping_onset"], False, False, False),
         (["hertz", "damping_tsuji", "friction"], False, False, False),
+        (["hertz", "damping_viscoelastic", "friction"], False, False, False),
         ([*LINEAR, "damping_paper"], True, False, False),
         ([*LINEAR, "damping_paper"], False, False, True),
         ([*LINEAR, "damping_paper"], True, False, True),
@@ -123,7 +124,7 @@ def test_tangential_springs() -> None:
         for c in range(uint64(count)):
             spring[c] = spring_after(law, c, spring[c], overlap[c], slip[c], 1e-4, normal[c], 1.0)
 
-    law = ContactLaw(*[None] * 7, column(), column(), column(), None)
+    law = ContactLaw(friction=column(), tangential_stiffness=column(), tangential_mindlin=column())
     loop(COUNT, law, column(), column(), column(), column())
     assert_vectorised(loop)
 

@@ -12,7 +12,7 @@ MOVING = INTEGRATORS[:3]
 STEPPED = INTEGRATORS[:4]
 """Those with tangential springs and implicit friction."""
 ELASTIC = ("linear", "hertz", "table")
-DAMPING = ("none", "paper", "normal", "tsuji", "onset")
+DAMPING = ("none", "paper", "normal", "tsuji", "onset", "viscoelastic")
 FORCED = (
     {},
     {"peaks": "on", "contact_arrays": "on"},

@@ -153,7 +153,7 @@ def _contacts(draw: st.DrawFn, family: Family, frame: _Frame) -> list[Data]:
         stiffness = frame.stiffness * draw(scaled(1.0, 10.0))
         elastic = family.elastic[n % len(family.elastic)]
         damping = family.damping[n % len(family.damping)]
-        if damping == "tsuji":
+        if damping in ("tsuji", "viscoelastic"):
             elastic = "hertz"
         contact: Data = {"between": list(pair), **_elastic(elastic, stiffness, frame)}
         contact["damping"] = draw(_damping(damping, elastic, stiffness, frame))
@@ -184,7 +184,7 @@ def _damping(law: str, elastic: str, stiffness: float, frame: _Frame) -> st.Sear
         return st.just({})
     if law == "tsuji":
         return restitution.map(lambda data: {**data, "law": "normal"})
-    if law == "onset":
+    if law in ("onset", "viscoelastic"):
         return restitution.map(lambda data: {**data, "speed": frame.speed})
     linear = elastic == "linear"
     return st.one_of(coefficient, restitution) if linear else coefficient

@@ -8,8 +8,11 @@ import pytest
 from scenes import MASS, bottle, contact, kind, line, scene, segment
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.contact.laws.normal import normal_damping
+from conveyor_sim.engine.contact.laws.onset import onset_damping
+from conveyor_sim.engine.contact.laws.paper import paper_damping
+from conveyor_sim.engine.contact.laws.tsuji import tsuji_damping
 from conveyor_sim.laws.coefficients import base_radius
-from conveyor_sim.laws.restitution import normal_damping, onset_damping, paper_damping, tsuji_damping
 from conveyor_sim.model import Model, build_model
 
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]

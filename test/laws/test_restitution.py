@@ -5,15 +5,12 @@ from collections.abc import Callable
 
 import pytest
 
-from conveyor_sim.laws.restitution import (
-    clamped_damping_ratio,
-    clamped_restitution,
-    normal_damping,
-    onset_damping,
-    paper_damping,
-    tsuji_damping,
-)
-from conveyor_sim.timestep.bounds import contact_time, hertz_contact_time
+from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
+from conveyor_sim.engine.contact.laws.linear import contact_time
+from conveyor_sim.engine.contact.laws.normal import clamped_damping_ratio, clamped_restitution, normal_damping
+from conveyor_sim.engine.contact.laws.onset import onset_damping
+from conveyor_sim.engine.contact.laws.paper import paper_damping
+from conveyor_sim.engine.contact.laws.tsuji import tsuji_damping
 
 MASS = 0.1
 """kg, reduced, of two bottles of the paper."""

@@ -4,14 +4,14 @@ import math
 
 import pytest
 
+from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
+from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.timestep.bounds import (
     Bound,
     base_friction_bound,
     contact_friction_bound,
-    contact_time,
     damping_bound,
     fewest_steps,
-    hertz_contact_time,
     lattice_bound,
     least_steps,
     slip_time,

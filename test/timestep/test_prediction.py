@@ -60,6 +60,7 @@ def laws() -> dict[str, dict[str, Any]]:
         found[f"Tsuji, e = {e}"] = {**hertz, "damping": {"law": "normal", "restitution": e}}
         found[f"onset, e = {e}"] = {**linear, "damping": onset}
         found[f"Hertz onset, e = {e}"] = {**hertz, "damping": onset}
+        found[f"viscoelastic, e = {e}"] = {**hertz, "damping": {**onset, "law": "viscoelastic"}}
     return found
 
 
@@ -109,7 +110,7 @@ def peak_force(law: dict[str, Any]) -> float:
     model = build_model(scene(contacts=[{"between": ["glass", "glass"], **law}], bottles=two))
     columns, curves = model.pair_law, model.curves
     assert columns is not None
-    k, hertz, paper, normal, tsuji, onset = (
+    k, hertz, paper, normal, tsuji, onset, viscoelastic = (
         0.0 if column is None else float(column[0])
         for column in (
             columns.stiffness,
@@ -118,6 +119,7 @@ def peak_force(law: dict[str, Any]) -> float:
             columns.damping_normal,
             columns.damping_tsuji,
             columns.damping_onset,
+            columns.damping_viscoelastic,
         )
     )
 
@@ -128,8 +130,8 @@ def peak_force(law: dict[str, Any]) -> float:
             beyond = max(0.0, x - curves.overlap[-1])
             slope = (curves.force[-1] - curves.force[-2]) / (curves.overlap[-1] - curves.overlap[-2])
             elastic += float(np.interp(x, curves.overlap, curves.force)) + beyond * slope
-        damped = elastic * (1.0 + onset * v) + tsuji * x**0.25 * v + normal * v
-        return paper * v + (max(0.0, damped) if onset or tsuji or normal else damped)
+        damped = elastic * (1.0 + onset * v) + (tsuji * x**0.25 + viscoelastic * x**0.5 + normal) * v
+        return paper * v + (max(0.0, damped) if onset or tsuji or viscoelastic or normal else damped)
 
     path = solve_ivp(
         lambda _, y: (y[1], -force(y[0], y[1]) / REDUCED),

@@ -1,39 +1,32 @@
 """Contacts of bottles: laws, pairs, tangential springs."""
 
-from typing import NamedTuple
+from collections import namedtuple
+from typing import Any, NamedTuple
 
 from conveyor_sim.engine.arrays.integrators import PairTangent, Triple
-from conveyor_sim.engine.arrays.types import F8, I4, I8, U4
+from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC
 
 
-class ContactLaw(NamedTuple):
+def _with_columns() -> Any:
+    names = [law.column for law in ELASTIC] + [law.column for law in DAMPING]
+    names += ["friction", "tangential_stiffness", "tangential_mindlin", "tangential_damping"]
+    return namedtuple("_with_columns", names, defaults=[None] * len(names))
+
+
+class ContactLaw(_with_columns()):  # type: ignore[misc]
     """Coefficients of contact as flat columns; None where no contact of the scene has that law.
 
     As a table by type: (T * T,), entry a * T + b, or (T * M,), entry type * M + material. By pair: (P,). What a contact
-    does not have is 0 in the column, for the laws add up.
+    does not have is 0 in the column, for the laws add up. First the columns of the laws in `contact/laws/`, then
+
+    - friction: mu
+    - tangential_stiffness: N/m, of the spring with history; 0, not None, where only Mindlin's springs are
+    - tangential_mindlin: N/m^1.5, times sqrt(delta): what overlap adds to that stiffness
+    - tangential_damping: kg/s, beside that spring
     """
 
-    stiffness: F8 | None
-    """N/m, N = k delta."""
-    hertz: F8 | None
-    """N/m^1.5, N = k_h delta^1.5."""
-    curve: I4 | None
-    """Which of the Curves gives N; -1: none."""
-    damping_paper: F8 | None
-    """kg/s, against the whole relative velocity."""
-    damping_normal: F8 | None
-    """kg/s, along the normal; the contact never pulls."""
-    damping_tsuji: F8 | None
-    """kg/(s m^0.25), times delta^0.25; the contact never pulls."""
-    damping_onset: F8 | None
-    """s/m, lambda in N (1 + lambda v_n); the contact never pulls."""
-    friction: F8 | None
-    tangential_stiffness: F8 | None
-    """N/m, of the spring with history; 0, not None, where only Mindlin's springs are."""
-    tangential_mindlin: F8 | None
-    """N/m^1.5, times sqrt(delta): what overlap adds to that stiffness."""
-    tangential_damping: F8 | None
-    """kg/s, beside that spring."""
+    __slots__ = ()
 
 
 class Curves(NamedTuple):

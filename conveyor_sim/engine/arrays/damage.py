@@ -121,7 +121,7 @@ class LoadHistory(NamedTuple):
     """Bin of the rail; -1 for a bottle."""
 
 
-def borne() -> LoadHistory:
+def empty_history() -> LoadHistory:
     """Room for the contacts of one bottle."""
 
     def reals() -> F8:

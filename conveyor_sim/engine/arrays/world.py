@@ -87,4 +87,4 @@ class Worker(NamedTuple):
     """(SYNC_SIZE,), shared: counts of the barrier and flags."""
     gathered: Gathered
     found: RailContacts
-    borne: LoadHistory
+    history: LoadHistory

@@ -103,6 +103,15 @@ def _compiled(function: Function, **options: bool) -> Function:
     return kept
 
 
+def written(source: str, **names: Any) -> Any:
+    """A part from the text of a function named `function`, for what numba can't loop over: fields, a list of functions.
+
+    names: what the text uses.
+    """
+    exec(source, names)
+    return part(names["function"])
+
+
 @part
 def at(column: Any, index: int) -> Any:
     """Entry of a column, or None where the effect behind the column is absent."""

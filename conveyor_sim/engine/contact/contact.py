@@ -1,8 +1,7 @@
-"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10; docs/effects.md has others').
+"""The force in one contact: elastic law, damping, friction (paper eqs. 22-23, 7-10, and the laws added to them).
 
 Between a and b, with the unit normal n from a to b and the tangent t = (-n_y, n_x): the force on a is -N n + T t, on b
-its negative. The laws of a pair of materials add up; what a pair does not have is 0 in its column, what no pair of the
-scene has is None and not in the machine code.
+its negative. Laws along the normal have a file each in `laws/`, and are added up by `law_sums.py`.
 
 No branches: a loop over pairs is vectorised, and pairs apart get exactly 0. Only a curve breaks that.
 """
@@ -12,8 +11,14 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.compiler.compile import kernel, part
-from conveyor_sim.engine.contact.curve import curve_energy, curve_force
 from conveyor_sim.engine.contact.friction import friction_share, implicit_share
+from conveyor_sim.engine.contact.law_sums import (
+    add_damping,
+    add_drag,
+    add_elastic_energy,
+    add_elastic_force,
+    never_pull,
+)
 
 
 @kernel
@@ -38,9 +43,9 @@ def contact_force(
     implicit: (dt/m_t times `Settings.ahead`, s/kg, `Settings.at_once`) for implicit friction, or None.
     """
     depth = 0.0 if overlap < 0.0 else overlap
-    normal = elastic_force(law.stiffness, law.hertz, law.curve, curves, e, depth)
-    normal = _damped(normal, law.damping_normal, law.damping_tsuji, law.damping_onset, e, depth, closing)
-    normal = share * _dragged(normal, law.damping_paper, e, depth, closing)
+    elastic = elastic_force(law, e, curves, depth)
+    damped = never_pull(law, add_damping(law, e, elastic, elastic, depth, closing))
+    normal = share * add_drag(law, e, damped, elastic, depth, closing)
     tangential = _tangential(
         law.friction,
         law.tangential_stiffness,
@@ -57,50 +62,25 @@ def contact_force(
         spring,
         implicit,
     )
-    return normal, _dragged(tangential, law.damping_paper, e, depth, -slip * share)
+    return normal, add_drag(law, e, tangential, elastic, depth, -slip * share)
 
 
 @part
-def elastic_force(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
-    """k delta (23) + k_h delta^1.5 + table, N; depth: m, not negative."""
-    normal = 0.0
-    if stiffness is not None:
-        normal += stiffness[e] * depth
-    if hertz is not None:
-        normal += hertz[e] * (depth * math.sqrt(depth))
-    if curve is not None:
-        normal += curve_force(curves, curve[e], depth)
-    return normal
+def elastic_force(law: ContactLaw, e: int, curves: Any, depth: float) -> float:
+    """N by the elastic laws; depth: m, not negative."""
+    return add_elastic_force(law, e, 0.0, depth, curves)
 
 
 @part
-def _damped(elastic: float, normal: Any, tsuji: Any, onset: Any, e: int, depth: float, closing: float) -> float:
-    """With c v_n, c delta^0.25 v_n (Tsuji et al. 1992) or N lambda v_n (Hunt and Crossley 1975), never pulling."""
-    total = elastic
-    if onset is not None:
-        total += elastic * (onset[e] * closing)
-    if tsuji is not None:
-        total += tsuji[e] * math.sqrt(math.sqrt(depth)) * closing
-    if normal is not None:
-        total += (normal[e] if depth > 0.0 else 0.0) * closing
-    return _clamped(total, normal, tsuji, onset)
+def elastic_energy(law: ContactLaw, e: int, curves: Any, depth: float) -> float:
+    """What the elastic laws have stored, J; depth: m, not negative."""
+    return add_elastic_energy(law, e, 0.0, depth, curves)
 
 
 @part
-def _clamped(total: float, normal: Any, tsuji: Any, onset: Any) -> float:
-    if normal is None:
-        if tsuji is None:
-            if onset is None:
-                return total
-    return 0.0 if total < 0.0 else total
-
-
-@part
-def _dragged(force: float, coefficient: Any, e: int, depth: float, velocity: float) -> float:
-    """With c v (22), not without contact: a dashpot alone does not know that the surfaces are apart."""
-    if coefficient is None:
-        return force
-    return force + (coefficient[e] if depth > 0.0 else 0.0) * velocity
+def drag_force(law: ContactLaw, e: int, elastic: float, depth: float, velocity: float) -> float:
+    """What isotropic damping alone adds to a force along a velocity (m/s), N, at an elastic force (N)."""
+    return add_drag(law, e, 0.0, elastic, depth, velocity)
 
 
 @part
@@ -158,25 +138,6 @@ def _add_damping(force: float, damping: Any, e: int, slip: float) -> float:
 
 
 @part
-def elastic_energy(stiffness: Any, hertz: Any, curve: Any, curves: Any, e: int, depth: float) -> float:
-    """What those laws have stored, J: k delta^2 / 2 + 2/5 k_h delta^2.5 + the area under the table."""
-    energy = 0.0
-    if stiffness is not None:
-        energy += 0.5 * stiffness[e] * depth * depth
-    if hertz is not None:
-        energy += 0.4 * hertz[e] * (depth * depth * math.sqrt(depth))
-    if curve is not None:
-        energy += curve_energy(curves, curve[e], depth)
-    return energy
-
-
-@part
-def drag_force(law: ContactLaw, e: int, overlap: float, velocity: float) -> float:
-    """What paper damping alone adds to a force along a velocity (m/s), N."""
-    return _dragged(0.0, law.damping_paper, e, overlap, velocity)
-
-
-@part
 def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float:
     """What a tangential spring of some elongation (m), or None, has stored at an overlap (m), J."""
     if spring is None:
@@ -229,7 +190,7 @@ def spring_after(
     depth = 0.0 if overlap < 0.0 else overlap
     stiffness = _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth)
     longer = spring + dt * slip
-    most = law.friction[e] * (0.0 if normal < 0.0 else normal)  # type: ignore[index]
+    most = law.friction[e] * (0.0 if normal < 0.0 else normal)
     # The force is that of the share of a spring, as is N.
     scaled = share * stiffness
     cut = math.copysign(most, longer) / (scaled if scaled > 0.0 else 1.0)

@@ -31,7 +31,7 @@ from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
-from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, watch_rebuilt
+from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, probe_rebuilt
 from conveyor_sim.engine.integrators.phase import RESUME
 from conveyor_sim.engine.integrators.runge_kutta import (
     add_impulses,
@@ -128,7 +128,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
                 note_damage(world, worker, h)
                 left -= h
-                watch_rebuilt(line, worker)
+                probe_rebuilt(line, worker)
                 if left == 0.0:
                     left = dt
                     taken += 1

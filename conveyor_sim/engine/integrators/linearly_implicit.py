@@ -31,7 +31,7 @@ from conveyor_sim.engine.integrators.conjugate_gradients import (
     largest_kick,
     search,
 )
-from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, settle, watch_rebuilt
+from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, probe_rebuilt, settle
 from conveyor_sim.engine.integrators.tangent_base import resist_base
 from conveyor_sim.engine.integrators.tangent_pairs import add_pair_blocks, linear_pairs, stiffest_pairs
 from conveyor_sim.engine.integrators.tangent_rails import linear_rails, stiffest_rails
@@ -64,7 +64,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             _begin(bottles, linear, first, end)
             _look_ahead(world, dt, 0.0, first, end)
         squared = dt * dt * _stiffest(world, worker)
-        theta = _lean(squared)
+        theta = _theta_of(squared)
         small = enough = 0.0
         for again in range(PASSES if theta > 0.5 else 1):
             for first in range(begin, stop, BLOCK):
@@ -98,7 +98,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         _book_solution(world, linear, world.ledger, worker, dt, theta)
         if not lists_hold(line, worker):
             return step + 1
-        watch_rebuilt(line, worker)
+        probe_rebuilt(line, worker)
     return steps
 
 
@@ -174,7 +174,7 @@ def _most_of_pairs(pairs: Any) -> float:
 
 
 @part
-def _lean(squared: float) -> float:
+def _theta_of(squared: float) -> float:
     """Where in a step forces are taken: in the middle, or towards its end, by (w dt)^2 of the stiffest contact."""
     squared = 1.0 if squared < 1.0 else squared
     return 1.0 - 0.5 / (squared * squared)

@@ -11,7 +11,7 @@ from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
-from conveyor_sim.engine.observers.guard_probe import watch_overlaps
+from conveyor_sim.engine.observers.guard_probe import probe_overlaps
 from conveyor_sim.engine.threads.workers import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
 from conveyor_sim.engine.world_views import for_lists
 
@@ -73,11 +73,11 @@ def lists_hold(world: World, worker: Worker) -> bool:
 
 
 @part
-def watch_rebuilt(world: World, worker: Worker) -> None:
+def probe_rebuilt(world: World, worker: Worker) -> None:
     """At the end of a step: look at the overlaps if the lists were made anew since the last look (`guard_probe.py`)."""
     if world.probe.due[0] != 0:
         wait_for_all(worker)
         if worker.rank == 0:
-            watch_overlaps(for_lists(world), worker.found)
+            probe_overlaps(for_lists(world), worker.found)
             world.probe.due[0] = 0
         wait_for_all(worker)

@@ -23,7 +23,7 @@ from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.contact.pairs import pack
 from conveyor_sim.engine.contact.path import forget_path, note_stage
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
-from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, watch_rebuilt
+from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, probe_rebuilt
 from conveyor_sim.engine.integrators.phase import RESUME, START
 from conveyor_sim.engine.integrators.runge_kutta import (
     add_impulses,
@@ -102,4 +102,4 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 slopes.progress[0] = stage
             return taken
         if stage == 0:
-            watch_rebuilt(line, worker)
+            probe_rebuilt(line, worker)

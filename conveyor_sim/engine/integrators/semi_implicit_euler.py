@@ -20,7 +20,7 @@ from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
-from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, note_moved, settle, watch_rebuilt
+from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, note_moved, probe_rebuilt, settle
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -53,7 +53,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         pass_step(line.moving, line.ledger, worker, dt, False)
         if not hold:
             return step + 1
-        watch_rebuilt(line, worker)
+        probe_rebuilt(line, worker)
     return steps
 
 

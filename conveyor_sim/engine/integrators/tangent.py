@@ -76,7 +76,8 @@ def linear_contact(
 def resistance(slope: float, secant: float, theta: float, mobility: float) -> float:
     """What resists (kg), from a force's slope over velocity and its quotient by velocity, both times dt (kg).
 
-    Of the slope theta, the method's own, but so much of the secant that the step does not turn the velocity round.
+    theta times the slope, as the method has it, and as much of the secant as keeps the step from turning the velocity
+    round.
     mobility: 1/kg, what the velocity gains from a unit of impulse, times the contacts that may act together.
     """
     return theta * slope + firmness(secant * mobility) * (secant - theta * slope)

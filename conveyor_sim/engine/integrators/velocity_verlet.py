@@ -22,7 +22,7 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
 from conveyor_sim.engine.contact.path import note_path
 from conveyor_sim.engine.forces import bottle_forces, evaluate_forces, pack_all, pair_phase
-from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, settle, watch_rebuilt
+from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, probe_rebuilt, settle
 from conveyor_sim.engine.integrators.phase import START
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
@@ -56,7 +56,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         pass_step(line.moving, line.ledger, worker, dt, True)
         if not hold:
             return 0
-        watch_rebuilt(line, worker)
+        probe_rebuilt(line, worker)
     else:
         pack_all(line, worker)
     while True:
@@ -78,7 +78,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         pass_step(line.moving, line.ledger, worker, dt, True)
         if not hold:
             return done
-        watch_rebuilt(line, worker)
+        probe_rebuilt(line, worker)
 
 
 @part

@@ -8,7 +8,7 @@ from typing import Any
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
 from conveyor_sim.engine.arrays.lists import Neighbourhood
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import kernel, part, written
 from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
 
 
@@ -57,27 +57,23 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell
 
 
 @part
-def _fill_laws(pairs: Pairs, columns: ContactLaw, tables: ContactLaw, bottles: Bottles) -> None:
-    _fill(columns.stiffness, tables.stiffness, pairs, bottles)
-    _fill(columns.hertz, tables.hertz, pairs, bottles)
-    _fill(columns.curve, tables.curve, pairs, bottles)
-    _fill(columns.damping_paper, tables.damping_paper, pairs, bottles)
-    _fill(columns.damping_normal, tables.damping_normal, pairs, bottles)
-    _fill(columns.damping_tsuji, tables.damping_tsuji, pairs, bottles)
-    _fill(columns.damping_onset, tables.damping_onset, pairs, bottles)
-    _fill(columns.friction, tables.friction, pairs, bottles)
-    _fill(columns.tangential_stiffness, tables.tangential_stiffness, pairs, bottles)
-    _fill(columns.tangential_mindlin, tables.tangential_mindlin, pairs, bottles)
-    _fill(columns.tangential_damping, tables.tangential_damping, pairs, bottles)
-
-
-@part
 def _fill(column: Any, table: Any, pairs: Pairs, bottles: Bottles) -> None:
     if column is None:
         return
     types = round(table.size**0.5)
     for p in range(pairs.used[0]):
         column[p] = table[bottles.type[pairs.i[p]] * types + bottles.type[pairs.j[p]]]
+
+
+_fill_laws: Any = written(
+    "\n    ".join(
+        [
+            "def function(pairs, columns, tables, bottles):",
+            *(f"fill(columns.{name}, tables.{name}, pairs, bottles)" for name in ContactLaw._fields),
+        ]
+    ),
+    fill=_fill,
+)
 
 
 @part

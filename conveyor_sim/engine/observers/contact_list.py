@@ -21,7 +21,7 @@ def list_contacts(world: World, found: RailContacts, kind: NDArray[np.uint8], a:
     """Write the contacts of the present state; return how many there are, which may exceed the columns' length.
 
     found: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m),
-    N, T (N). The neighbour lists must hold. Friction that is solved implicitly is told as the explicit law has it.
+    N, T (N). The neighbour lists must hold. Friction that is solved implicitly is listed as the explicit law has it.
     """
     count = _pair_contacts(world.settings, world.bottles, world.spin, world.pairs, world.curves, kind, a, b, values)
     return _rail_contacts(world, world.bottles, world.spin, world.rail_law, found, kind, a, b, values, count)

@@ -47,19 +47,19 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
         _find_base(world, world.bottles, world.spin, damage.tipping, dt, first, end)
         for i in range(first, end):
             if world.bottles.id[i] >= 0:
-                count = _list_pairs(i, world, world.pairs, world.slots, damage.impacts, worker.borne)
+                count = _list_pairs(i, world, world.pairs, world.slots, damage.impacts, worker.history)
                 count = _list_rails(i, world, world.rail_law, damage, worker, count)
-                _scuff(i, damage.scuffing, worker.borne, count, dt)
-                _crush(i, damage.crushing, worker.borne, count)
-                _hit(i, damage.impacts, worker.borne, count)
-                _tip(i, world.bottles, damage.tipping, worker.borne, count, dt)
+                _scuff(i, damage.scuffing, worker.history, count, dt)
+                _crush(i, damage.crushing, worker.history, count)
+                _hit(i, damage.impacts, worker.history, count)
+                _tip(i, world.bottles, damage.tipping, worker.history, count, dt)
     wait_for_all(worker)
     _keep_velocities(world.bottles, damage.impacts, begin, stop)
 
 
 @part
-def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, borne: LoadHistory) -> int:
-    """Write the closed contacts of bottle i with others to `borne`; return how many."""
+def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, history: LoadHistory) -> int:
+    """Write the closed contacts of bottle i with others to `history`; return how many."""
     if pairs is None:
         return 0
     count = 0
@@ -67,12 +67,12 @@ def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, born
         # In one loop, or all of the law would be compiled twice.
         further = int(slots.more_start[i]) + place - WIDTH
         entry = slots.entry[i * WIDTH + place] if place < WIDTH else slots.more_entry[further]
-        count = _list_pair(i, int(entry), world, pairs, impacts, borne, count)
+        count = _list_pair(i, int(entry), world, pairs, impacts, history, count)
     return count
 
 
 @part
-def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne: LoadHistory, count: int) -> int:
+def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, history: LoadHistory, count: int) -> int:
     bottles = world.bottles
     p = entry if entry < pairs.i.size else entry - pairs.i.size
     j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
@@ -87,7 +87,7 @@ def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, borne
         world.settings, bottles, world.spin, pairs, pairs.spring, world.curves, p, overlap, sign * nx, sign * ny
     )
     approach = _approach(impacts, i, nx, ny) - _approach(impacts, j, nx, ny)
-    _write(borne, count, nx, ny, normal, tangential, slip, approach, bottles.id[j] + 1, -1)
+    _write(history, count, nx, ny, normal, tangential, slip, approach, bottles.id[j] + 1, -1)
     return count + 1
 
 
@@ -132,14 +132,14 @@ def _list_rails(i: int, world: World, law: Any, damage: Any, worker: Worker, cou
                 place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
             ux, uy = surface_velocity(world.moving, found, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
-            _write(worker.borne, count, nx, ny, normal, tangential, slip, approach, key, place)
+            _write(worker.history, count, nx, ny, normal, tangential, slip, approach, key, place)
             count += 1
     return count
 
 
 @part
 def _write(
-    borne: LoadHistory,
+    history: LoadHistory,
     c: int,
     nx: float,
     ny: float,
@@ -150,15 +150,15 @@ def _write(
     key: int,
     place: int,
 ) -> None:
-    borne.nx[c] = nx
-    borne.ny[c] = ny
+    history.nx[c] = nx
+    history.ny[c] = ny
     # Paper damping may pull at the end of a rebound.
-    borne.normal[c] = normal if normal > 0.0 else 0.0
-    borne.tangential[c] = tangential
-    borne.slip[c] = slip
-    borne.approach[c] = approach
-    borne.key[c] = key
-    borne.place[c] = place
+    history.normal[c] = normal if normal > 0.0 else 0.0
+    history.tangential[c] = tangential
+    history.slip[c] = slip
+    history.approach[c] = approach
+    history.key[c] = key
+    history.place[c] = place
 
 
 @part
@@ -222,14 +222,14 @@ def _bin_at(first: int, end: int, way: float) -> int:
 
 
 @part
-def _scuff(i: int, scuffing: Any, borne: LoadHistory, count: int, dt: float) -> None:
+def _scuff(i: int, scuffing: Any, history: LoadHistory, count: int, dt: float) -> None:
     """Add |T s| dt to the bottle, and to the rail where it slides."""
     if scuffing is None:
         return
     for c in range(count):
-        work = dt * abs(borne.tangential[c] * borne.slip[c])
+        work = dt * abs(history.tangential[c] * history.slip[c])
         scuffing.work[i] += work
-        _wear(scuffing.bins, i // UNIT, borne.place[c], work, dt * borne.normal[c])
+        _wear(scuffing.bins, i // UNIT, history.place[c], work, dt * history.normal[c])
 
 
 @part
@@ -242,22 +242,22 @@ def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None
 
 
 @part
-def _crush(i: int, crushing: Any, borne: LoadHistory, count: int) -> None:
+def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
     """Note the sum of normal forces, and the largest min(N_a, N_b) |cos| of two that oppose each other."""
     if crushing is None:
         return
     total = opposed = 0.0
     for a in range(count):
-        total += borne.normal[a]
+        total += history.normal[a]
         for b in range(a):
-            cosine = borne.nx[a] * borne.nx[b] + borne.ny[a] * borne.ny[b]
-            opposed = max(opposed, -cosine * min(borne.normal[a], borne.normal[b]))
+            cosine = history.nx[a] * history.nx[b] + history.ny[a] * history.ny[b]
+            opposed = max(opposed, -cosine * min(history.normal[a], history.normal[b]))
     _raise(crushing.total, i, total)
     _raise(crushing.opposed, i, opposed)
 
 
 @part
-def _hit(i: int, impacts: Any, borne: LoadHistory, count: int) -> None:
+def _hit(i: int, impacts: Any, history: LoadHistory, count: int) -> None:
     """Note the largest force of one contact, and the speed at which those closed that were open at the last look."""
     if impacts is None:
         return
@@ -266,14 +266,14 @@ def _hit(i: int, impacts: Any, borne: LoadHistory, count: int) -> None:
         impacts.touched[i, before] = impacts.touching[i, before]
         before += 1
     for c in range(count):
-        _raise(impacts.force, i, borne.normal[c])
+        _raise(impacts.force, i, history.normal[c])
         known = before == MOST_TOUCHES
         for place in range(before):
-            known = known or impacts.touched[i, place] == borne.key[c]
+            known = known or impacts.touched[i, place] == history.key[c]
         if not known:
-            _raise(impacts.speed, i, borne.approach[c])
+            _raise(impacts.speed, i, history.approach[c])
         if c < MOST_TOUCHES:
-            impacts.touching[i, c] = borne.key[c]
+            impacts.touching[i, c] = history.key[c]
     if count < MOST_TOUCHES:
         impacts.touching[i, count] = 0
 
@@ -330,7 +330,7 @@ def _apart(spin: Any, moment: Any) -> Any:
 
 
 @part
-def _tip(i: int, bottles: Bottles, tipping: Any, borne: LoadHistory, count: int, dt: float) -> None:
+def _tip(i: int, bottles: Bottles, tipping: Any, history: LoadHistory, count: int, dt: float) -> None:
     """Note |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed: a blow is over before a bottle can tip."""
     if tipping is None:
         return
@@ -339,8 +339,8 @@ def _tip(i: int, bottles: Bottles, tipping: Any, borne: LoadHistory, count: int,
     kind = bottles.type[i]
     fx = fy = 0.0
     for c in range(count):
-        fx -= borne.normal[c] * borne.nx[c] + borne.tangential[c] * borne.ny[c]
-        fy += borne.tangential[c] * borne.nx[c] - borne.normal[c] * borne.ny[c]
+        fx -= history.normal[c] * history.nx[c] + history.tangential[c] * history.ny[c]
+        fy += history.tangential[c] * history.nx[c] - history.normal[c] * history.ny[c]
     along, under = tipping.contact_lever[kind] / bottles.weight[i], tipping.base_lever[kind] / bottles.weight[i]
     weight = dt / (dt + tipping.delay[kind])
     tipping.mean_x[i] += weight * (along * fx - under * tipping.fx[i] - tipping.mean_x[i])

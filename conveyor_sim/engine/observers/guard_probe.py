@@ -37,10 +37,10 @@ def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
 
 
 @part
-def watch_overlaps(world: World, found: RailContacts) -> None:
+def probe_overlaps(world: World, found: RailContacts) -> None:
     """Note the deepest overlaps in `world.probe`; the lists must hold."""
-    _watch_pairs(world.bottles, world.pairs, world.probe)
-    _watch_rails(world, world.railed, world.probe, found)
+    _probe_pairs(world.bottles, world.pairs, world.probe)
+    _probe_rails(world, world.railed, world.probe, found)
 
 
 @part
@@ -58,7 +58,7 @@ def _turning_energy(spin: Any, i: int) -> float:
 
 
 @part
-def _watch_pairs(bottles: Bottles, pairs: Any, watch: GuardProbe) -> None:
+def _probe_pairs(bottles: Bottles, pairs: Any, probe: GuardProbe) -> None:
     if pairs is None:
         return
     for p in range(pairs.used[0]):
@@ -66,11 +66,11 @@ def _watch_pairs(bottles: Bottles, pairs: Any, watch: GuardProbe) -> None:
         reach = bottles.radius[i] + bottles.radius[j]
         overlap, _, _ = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
         if overlap > 0.0:
-            _note(watch, 0, overlap / min(bottles.radius[i], bottles.radius[j]), i, j)
+            _note(probe, 0, overlap / min(bottles.radius[i], bottles.radius[j]), i, j)
 
 
 @part
-def _watch_rails(world: World, railed: Any, watch: GuardProbe, found: RailContacts) -> None:
+def _probe_rails(world: World, railed: Any, probe: GuardProbe, found: RailContacts) -> None:
     if railed is None:
         return
     bottles = world.bottles
@@ -81,12 +81,12 @@ def _watch_rails(world: World, railed: Any, watch: GuardProbe, found: RailContac
             i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
         )
         for c in range(count):
-            _note(watch, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
+            _note(probe, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
 
 
 @part
-def _note(watch: GuardProbe, place: int, depth: float, bottle: int, other: int) -> None:
-    if depth > watch.depth[place]:
-        watch.depth[place] = depth
-        watch.bottle[place] = bottle
-        watch.other[place] = other
+def _note(probe: GuardProbe, place: int, depth: float, bottle: int, other: int) -> None:
+    if depth > probe.depth[place]:
+        probe.depth[place] = depth
+        probe.bottle[place] = bottle
+        probe.other[place] = other

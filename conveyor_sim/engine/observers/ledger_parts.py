@@ -1,8 +1,8 @@
 """Parts of the forces for the energy ledger (`ledger.py`): what dissipates, and what belts do, in an evaluation.
 
 Beside the sum of forces on a bottle stay those of the damping in its contacts, of the friction in them, and of what it
-stands on. Damping is all along the normal that the elastic law does not exert, and the paper's drag across it; friction
-is the rest across, tangential springs and the dashpots beside them included. Nothing here changes a force.
+stands on. Damping is all along the normal that the elastic law does not exert, and isotropic damping across it;
+friction is the rest across, tangential springs and the dashpots beside them included. Nothing here changes a force.
 """
 
 from typing import Any
@@ -46,16 +46,12 @@ def find_pair_parts(
                 shorter = 0.5 * settings.lever * overlap
                 arm_i, arm_j = bottles.radius[i] - shorter, bottles.radius[j] - shorter
                 slip += spin.omega[i] * arm_i + spin.omega[j] * arm_j
-            drag = drag_force(pairs.law, p, overlap, -slip)
-            along = -(pairs.fx[p] * nx + pairs.fy[p] * ny) - _elastic(pairs.law, p, curves, overlap)
+            elastic = elastic_force(pairs.law, p, curves, overlap)
+            drag = drag_force(pairs.law, p, elastic, overlap, -slip)
+            along = -(pairs.fx[p] * nx + pairs.fy[p] * ny) - elastic
             across = pairs.fy[p] * nx - pairs.fx[p] * ny - drag
         _write(pairs.parts.damping, p, uint64(pairs.i.size), along, drag, nx, ny, arm_i, arm_j)
         _write(pairs.parts.friction, p, uint64(pairs.i.size), 0.0, across, nx, ny, arm_i, arm_j)
-
-
-@part
-def _elastic(law: ContactLaw, e: int, curves: Any, overlap: float) -> float:
-    return elastic_force(law.stiffness, law.hertz, law.curve, curves, e, overlap)
 
 
 @part
@@ -124,8 +120,9 @@ def add_rail_parts(
 ) -> None:
     """Take N and T (N) of contact c of bottle i with a rail apart; arm in m, slip in m/s."""
     nx, ny, overlap, shared = found.nx[c], found.ny[c], found.overlap[c], found.share[c]
-    drag = shared * drag_force(law, e, overlap, -slip)
-    along = normal - shared * _elastic(law, e, curves, overlap)
+    elastic = elastic_force(law, e, curves, overlap)
+    drag = shared * drag_force(law, e, elastic, overlap, -slip)
+    along = normal - shared * elastic
     across = tangential - drag
     damping, friction = ledger.damping, ledger.friction
     damping.x[i] += -along * nx - drag * ny

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
@@ -50,7 +49,7 @@ def _in_pairs(bottles: Any, pairs: Any, curves: Any, energy: F8) -> None:
         reach = bottles.radius[i] + bottles.radius[j]
         overlap, _, _ = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
         if overlap > 0.0:
-            energy[ELASTIC] += _elastic(pairs.law, p, curves, overlap)
+            energy[ELASTIC] += elastic_energy(pairs.law, p, curves, overlap)
             energy[SPRINGS] += spring_energy(pairs.law, p, elongation(pairs.spring, p), overlap)
 
 
@@ -64,10 +63,5 @@ def _at_rails(world: World, law: Any, found: RailContacts, energy: F8) -> None:
         for c in range(count):
             e = law_entry(world.settings, bottles, found, c, i)
             spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
-            energy[ELASTIC] += found.share[c] * _elastic(law, e, world.curves, found.overlap[c])
+            energy[ELASTIC] += found.share[c] * elastic_energy(law, e, world.curves, found.overlap[c])
             energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring, found.overlap[c])
-
-
-@part
-def _elastic(law: ContactLaw, e: int, curves: Any, overlap: float) -> float:
-    return elastic_energy(law.stiffness, law.hertz, law.curve, curves, e, overlap)

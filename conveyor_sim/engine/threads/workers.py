@@ -12,7 +12,7 @@ import numpy as np
 from numba.extending import intrinsic
 
 from conveyor_sim.engine.arrays.contacts import Gathered
-from conveyor_sim.engine.arrays.damage import borne
+from conveyor_sim.engine.arrays.damage import empty_history
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8, U4
 from conveyor_sim.engine.arrays.world import Worker
@@ -38,7 +38,7 @@ SPINS = 2000
 def workers(size: int) -> tuple[Worker, ...]:
     """Return `size` workers of one group."""
     sync = np.zeros(SYNC_SIZE, np.int64)
-    return tuple(Worker(rank, size, sync, _gathered(), _rail_contacts(), borne()) for rank in range(size))
+    return tuple(Worker(rank, size, sync, _gathered(), _rail_contacts(), empty_history()) for rank in range(size))
 
 
 def _gathered() -> Gathered:

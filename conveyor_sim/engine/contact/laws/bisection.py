@@ -1,0 +1,15 @@
+"""Where a function is 0, to the last digits."""
+
+from collections.abc import Callable
+
+
+def root(rising: Callable[[float], float], below: float, above: float) -> float:
+    """Where a function that is negative at `below` and positive at `above` is 0, by bisection."""
+    while True:
+        middle = 0.5 * (below + above)
+        if not below < middle < above:
+            return middle
+        if rising(middle) < 0.0:
+            below = middle
+        else:
+            above = middle
