@@ -41,7 +41,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class GuardProbe:
+class Assertion:
     """A condition that is asserted, from a time on."""
 
     condition: Condition
@@ -84,7 +84,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.scene = scene
         self.simulation = Simulation(scene)
         self.history = History(self.simulation.process_image)
-        self.failed: GuardProbe | None = None
+        self.failed: Assertion | None = None
         """The condition that failed."""
         self.failure = ""
         """What became of it, in words."""
@@ -98,7 +98,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._answer: dict[str, float] = {}
         self._alarms: dict[str, float] = {}
         self._changes = AlarmChanges()
-        self._standing: list[GuardProbe] = []
+        self._standing: list[Assertion] = []
         self._signals: dict[str, float] = {}
         self._look()
 
@@ -199,12 +199,12 @@ class Scenario(AbstractContextManager["Scenario"]):
         For what a scenario needs to begin with; raises AssertionError if it takes more than `within` seconds.
         """
         __tracebackhide__ = True
-        return self._wait(GuardProbe(condition, "run_until", self.time), within)
+        return self._wait(Assertion(condition, "run_until", self.time), within)
 
     def eventually(self, condition: Condition, within: float) -> float:
         """Assert that a condition comes true within so many seconds, let them pass until then; returns how many."""
         __tracebackhide__ = True
-        return self._wait(GuardProbe(condition, "eventually", self.time), within)
+        return self._wait(Assertion(condition, "eventually", self.time), within)
 
     def always(self, condition: Condition, for_: float | None = None) -> None:
         """Assert that a condition is true now and at every tick of the next `for_` seconds, and let them pass.
@@ -212,47 +212,51 @@ class Scenario(AbstractContextManager["Scenario"]):
         for_: None: lets no time pass, and asserts it at every tick of whatever is run later.
         """
         __tracebackhide__ = True
-        self._hold(GuardProbe(condition, "always", self.time), for_)
+        self._hold(Assertion(condition, "always", self.time), for_)
 
     def never(self, condition: Condition, for_: float | None = None) -> None:
         """Assert that a condition is true at no tick, as `always` does."""
         __tracebackhide__ = True
-        self._hold(GuardProbe(condition, "never", self.time), for_)
+        self._hold(Assertion(condition, "never", self.time), for_)
 
-    def _hold(self, watch: GuardProbe, for_: float | None) -> None:
+    def _hold(self, assertion: Assertion, for_: float | None) -> None:
         __tracebackhide__ = True
-        self._check(watch)
-        self._standing.append(watch)
+        self._check(assertion)
+        self._standing.append(assertion)
         if for_ is not None:
             self.run_for(for_)
-            self._standing.remove(watch)
+            self._standing.remove(assertion)
 
-    def _wait(self, watch: GuardProbe, within: float) -> float:
+    def _wait(self, assertion: Assertion, within: float) -> float:
         __tracebackhide__ = True
         first, last = self.simulation.tick, self.simulation.tick + self._ticks(within)
-        while not self._true(watch, present := self.signals):
+        while not self._true(assertion, present := self.signals):
             if self.simulation.tick >= last:
-                span = f"within {within:g} s, from {watch.since:.2f} s to {self.time:.2f} s"
-                self._fail(watch, f"{watch.text} did not come true {span}", present)
+                span = f"within {within:g} s, from {assertion.since:.2f} s to {self.time:.2f} s"
+                self._fail(assertion, f"{assertion.text} did not come true {span}", present)
             self._step()
         return round((self.simulation.tick - first) * self.scene.tick, 9)
 
-    def _check(self, watch: GuardProbe) -> None:
+    def _check(self, assertion: Assertion) -> None:
         __tracebackhide__ = True
-        unwanted = watch.word == "never"
-        if self._true(watch, present := self.signals) is unwanted:
-            after = f", {self.time - watch.since:.2f} s after it was first asserted" if self.time > watch.since else ""
+        unwanted = assertion.word == "never"
+        if self._true(assertion, present := self.signals) is unwanted:
+            after = (
+                f", {self.time - assertion.since:.2f} s after it was first asserted"
+                if self.time > assertion.since
+                else ""
+            )
             when = f"at {self.time:.2f} s (tick {self.simulation.tick}){after}"
-            self._fail(watch, f"{watch.text} was {str(unwanted).lower()} {when}", present)
+            self._fail(assertion, f"{assertion.text} was {str(unwanted).lower()} {when}", present)
 
-    def _true(self, watch: GuardProbe, present: Present) -> bool:
-        true = bool(watch.condition(present))
+    def _true(self, assertion: Assertion, present: Present) -> bool:
+        true = bool(assertion.condition(present))
         self._read = {**present.read, **self._read}
         return true
 
-    def _fail(self, watch: GuardProbe, head: str, present: Present) -> NoReturn:
+    def _fail(self, assertion: Assertion, head: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
-        self.failed, self.failure = watch, head
+        self.failed, self.failure = assertion, head
         raise AssertionError(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
 
     def _step(self) -> None:
@@ -279,8 +283,8 @@ class Scenario(AbstractContextManager["Scenario"]):
             raise CommandError(f"at {self.time - self.scene.tick:.2f} s a command was refused: {'; '.join(refused)}")
         if self._controller is not None:
             self._scan(self._controller)
-        for watch in self._standing:
-            self._check(watch)
+        for assertion in self._standing:
+            self._check(assertion)
 
     def _end_node(self) -> None:
         if self._node is not None:

@@ -18,7 +18,7 @@ from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.simulation import Simulation
 
-__all__ = ["GuardProbe", "Sent", "Violation", "work"]
+__all__ = ["Invariants", "Sent", "Violation", "work"]
 
 F8 = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ Sent = list[tuple[tuple[str, ...], tuple[float, ...], bool]]
 """Names and values of the inputs of a tick, and whether they are faults."""
 
 
-class GuardProbe:
+class Invariants:
     """Looks at a Simulation after every single tick. Raises Violation."""
 
     def __init__(self, simulation: Simulation) -> None:

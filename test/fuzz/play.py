@@ -13,7 +13,7 @@ from itertools import cycle
 from pathlib import Path
 
 from fuzz.case import Case
-from fuzz.invariants import GuardProbe, Sent
+from fuzz.invariants import Invariants, Sent
 from fuzz.violation import Violation
 
 from conveyor_sim.bag.outputs import Outputs
@@ -189,7 +189,7 @@ def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched
     recorder = Recorder(bag) if bag is not None else None
     outputs = Outputs(simulation, [] if recorder is None else [recorder], run_id="fuzz")
     outputs.start()
-    watch, sent = GuardProbe(simulation), by_tick(case)
+    invariants, sent = Invariants(simulation), by_tick(case)
     seen = _Watched([], [], "", simulation.counts.present, 0, 0)
     while simulation.tick < ticks and not seen.stopped:
         now = sent.get(simulation.tick, [])
@@ -200,13 +200,13 @@ def _watched(scene: Scene, case: Case, ticks: int, bag: Path | None) -> _Watched
             seen.stopped = str(error)
             continue
         outcomes = outputs.after_tick()
-        watch.after_tick(now, outcomes)
+        invariants.after_tick(now, outcomes)
         seen.outcomes += outcomes
         seen.hashes.append(state_of(simulation))
     if recorder is not None:
         recorder.close()
     seen.bottles += simulation.counts.fed
-    seen.bottle_ticks, seen.contacts = watch.bottle_ticks, watch.most_contacts
+    seen.bottle_ticks, seen.contacts = invariants.bottle_ticks, invariants.most_contacts
     return seen
 
 

@@ -12,7 +12,7 @@ from fuzz.case import Case, cases, load_case
 from fuzz.commands import Command
 from fuzz.crossing import crossed
 from fuzz.families import CI_FAMILIES, Family, random_family
-from fuzz.invariants import GuardProbe, Sent
+from fuzz.invariants import Invariants, Sent
 from fuzz.play import failure_kind, play
 from fuzz.violation import Violation
 from fuzz.wrong import judge, wrong_texts
@@ -111,11 +111,11 @@ class Passing(Simulation):
 
 def test_a_bottle_through_a_rail_is_noticed() -> None:
     simulation = Passing(parse_scene(small().scene_text))
-    watch = GuardProbe(simulation)
+    invariants = Invariants(simulation)
     with pytest.raises(Violation, match="through a rail"):
         for _ in range(5):
             simulation.advance()
-            watch.after_tick([], simulation.take_outcomes())
+            invariants.after_tick([], simulation.take_outcomes())
     assert simulation.tick == 3
 
 
@@ -153,12 +153,12 @@ class Misread(Simulation):
 def test_a_signal_that_is_wrong_is_noticed(signal: str, by: float, kind: str) -> None:
     simulation = Misread(parse_scene(small(**DEVICES).scene_text))
     simulation.signal, simulation.by = signal, by
-    watch = GuardProbe(simulation)
+    invariants = Invariants(simulation)
     found = ""
     try:
         for _ in range(7):
             simulation.advance()
-            watch.after_tick([], simulation.take_outcomes())
+            invariants.after_tick([], simulation.take_outcomes())
     except Violation as violation:
         found = violation.kind
         assert simulation.tick == 5
@@ -171,31 +171,31 @@ def test_a_drive_that_does_not_ramp_is_noticed() -> None:
     simulation = Simulation(
         parse_scene(small(belts={"b": belt}, base=[{"between": ["glass", "chain"], "friction": 0.1}]).scene_text)
     )
-    watch = GuardProbe(simulation)
+    invariants = Invariants(simulation)
     sent: Sent = [(("belts/b/cmd_speed",), (1.0,), False)]
     simulation.command(*sent[0][:2])
     simulation.advance()
-    watch.after_tick(sent, simulation.take_outcomes())
+    invariants.after_tick(sent, simulation.take_outcomes())
     simulation._line.now.speeds[0] = 0.5
     with pytest.raises(Violation, match="drives"):
-        watch.after_tick([], [])
+        invariants.after_tick([], [])
 
 
 def test_a_bottle_that_is_nowhere_is_noticed() -> None:
     simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
-    watch = GuardProbe(simulation)
+    invariants = Invariants(simulation)
     displace(simulation, np.array([0.0, math.nan]), np.zeros(2))
     with pytest.raises(Violation, match="not finite"):
-        watch.after_tick([], [])
+        invariants.after_tick([], [])
 
 
 def test_a_lost_bottle_is_noticed() -> None:
     simulation = Simulation(scene(contacts=[contact(1e4)], bottles=[bottle(0.0, 0.0), bottle(1.0, 0.0)]))
-    watch = GuardProbe(simulation)
+    invariants = Invariants(simulation)
     simulation._state.remove(0)
     simulation.advance()
     with pytest.raises(Violation, match="lost bottle"):
-        watch.after_tick([], [])
+        invariants.after_tick([], [])
 
 
 @pytest.mark.parametrize(
