@@ -33,10 +33,10 @@ class Clogging:
 
     def end(self, tick: int, removed: Mapping[str, int]) -> list[DamageEvent]:
         """A tick has ended; the outfeeds that clogged in it. removed: bottles so far, by device."""
-        told = len(self.events)
+        before = len(self.events)
         for name, corners in self._exits.items():
             self._look_at(tick, name, corners, removed[f"outfeeds/{name}"])
-        return [DamageEvent(*event) for event in self.events[told:]]
+        return [DamageEvent(*event) for event in self.events[before:]]
 
     def take_events(self) -> list[DamageEvent]:
         """Outfeeds that clogged since the last call, in order."""

@@ -58,14 +58,14 @@ class DamageAccount:
 
     def end(self, tick: int) -> list[DamageEvent]:
         """A tick has ended: what went beyond a limit in it becomes an event."""
-        told = len(self.events)
+        before = len(self.events)
         for worst in self._worst():
             np.maximum(worst.output, worst.tick, out=worst.output)
         damage = self._state.world.damage
         for kind, limit in self._limits.items():
             if damage is not None and (column := _column(damage, kind)) is not None:
                 self._compare(tick, kind, column, limit)
-        return [DamageEvent(*event) for event in self.events[told:]]
+        return [DamageEvent(*event) for event in self.events[before:]]
 
     def take_events(self) -> list[DamageEvent]:
         """What went beyond a limit since the last call, in order."""

@@ -77,12 +77,12 @@ def largest_error(point: Point) -> float:
 def foretelling(point: Point) -> str:
     """Predicted beside measured errors in one sentence, and whether measured <= predicted <= 2 x measured."""
     rows = [("impacts", point.predicted, _error(point)), ("resting load", point.predicted_resting, point.resting)]
-    told = [
+    errors = [
         f"{percent(predicted)} in {what} where {percent(measured)} was measured ({_judged(predicted, measured)})"
         for what, predicted, measured in rows
         if predicted is not None and measured is not None
     ]
-    return f"Predicted: {'; '.join(told)}." if told else ""
+    return f"Predicted: {'; '.join(errors)}." if errors else ""
 
 
 def _judged(predicted: float, measured: float) -> str:

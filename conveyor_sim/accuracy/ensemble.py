@@ -120,7 +120,7 @@ class Ensemble(AbstractContextManager["Ensemble"]):
             self._close_pool(at_once=True)
 
     def _alone(self, run: Run) -> Sample:
-        """A run whose process, or another beside it, has died: once more by itself, which tells."""
+        """A run whose process, or another beside it, has died: once more by itself, to find out."""
         try:
             return self._workers().submit(_run, self._work(run[0]), run[1]).result()
         except BrokenProcessPool:
@@ -165,7 +165,7 @@ class Ensemble(AbstractContextManager["Ensemble"]):
 
 
 def _begin(lifeline: Connection) -> None:
-    """Start of a process: Ctrl-C is its parent's affair, and it ends with its parent, or when told so."""
+    """Start of a process: Ctrl-C is its parent's affair, and it ends with its parent, or when asked to."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
 
@@ -178,7 +178,7 @@ def _end_with(lifeline: Connection) -> None:
 
 @cache
 def _rehearse(work: _Work) -> None:
-    """Have numba compile or load what a setting needs, in this process; what can't be is told by its runs."""
+    """Have numba compile or load what a setting needs, in this process; what can't be is reported by its runs."""
     try:
         simulation = Simulation(work.scene(0), threads=1, shorten=False)
         simulation.advance()

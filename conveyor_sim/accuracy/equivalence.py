@@ -106,7 +106,7 @@ def run_until_decided(
 ) -> tuple[list[Sample], list[Comparison]]:
     """Make long runs until every observable of every setting is decided, or the budget (s of processor time) is spent.
 
-    The first run of each setting is made in any case and tells what it costs. Then the runs of one look after another
+    The first run of each setting is made in any case and shows what it costs. Then the runs of one look after another
     are made, of the reference and of the settings that are still open; the last look is cut to the runs that the budget
     allows. Time spent is the processor time of the runs, as recorded: other work on the machine does not shorten the
     study, and one that was interrupted is taken up from its folder. Settings with a run that fails get no more.
@@ -183,7 +183,7 @@ def _mean(values: NDArray[np.float64]) -> tuple[float, float]:
 def _interval(candidate: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float, float]:
     """Confidence interval of the ratio of two means, less 1.
 
-    All ratios r for which candidate - r reference is not told from 0 (Fieller 1954), with the degrees of freedom of
+    All ratios r for which candidate - r reference cannot be told from 0 (Fieller 1954), with the degrees of freedom of
     Welch (1947) at the ratio that was found. The mean of the reference is not taken for exact.
     """
     if min(len(candidate), len(reference)) < 2 or not np.isfinite([*candidate, *reference]).all():

@@ -19,9 +19,9 @@ def failure_of(run: Trajectory, reference: Trajectory, model: Model) -> str:
     """Why a run can't be compared with its reference run from the same start; empty if it can be."""
     for frame, true in zip(run.frames, reference.frames, strict=not run.broken):
         # An overlap or a place is wrong before the energy that comes of it is.
-        told = _too_deep(frame, model) or _astray(frame, true, model) or _too_fast(frame, reference)
-        if told:
-            return told
+        failure = _too_deep(frame, model) or _astray(frame, true, model) or _too_fast(frame, reference)
+        if failure:
+            return failure
     return run.broken
 
 

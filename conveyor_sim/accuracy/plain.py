@@ -1,4 +1,4 @@
-"""Frozen dataclasses as plain data of JSON and back, exactly; data that is not of its kind is told where and why."""
+"""Frozen dataclasses as plain data of JSON and back, exactly; an error says where data is not of its kind, and why."""
 
 from __future__ import annotations
 

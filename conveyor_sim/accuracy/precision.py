@@ -35,8 +35,8 @@ class WorkPrecision:
     """Compares settings on a scene, which must run at the preset `standard`.
 
     To be called in this order: `find_starts`, `find_horizons`, `make_reference`, then `measure`, as often as there are
-    settings, and before it `find_rest` and `make_resting_reference` if resting load is to be looked at; each tells its
-    progress. SceneError or SimulationError if the scene does not run.
+    settings, and before it `find_rest` and `make_resting_reference` if resting load is to be looked at; each reports
+    its progress. SceneError or SimulationError if the scene does not run.
     """
 
     def __init__(self, scene: Scene) -> None:

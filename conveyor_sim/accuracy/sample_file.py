@@ -101,7 +101,7 @@ def check_origin(folder: Path, scene: Scene) -> None:
 
 
 def fingerprint(scene: Scene) -> str:
-    """A short text that tells a scene and a version from all others."""
+    """A short text by which a scene and a version differ from all others."""
     return _hash(*(value.encode() for value in _origin(scene).values()))[:8]
 
 

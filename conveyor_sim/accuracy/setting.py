@@ -29,7 +29,7 @@ class Setting:
 
     @property
     def key(self) -> str:
-        """A short text that tells it from all other settings of a scene, for files."""
+        """A short text by which it differs from all other settings of a scene, for files."""
         parts = [self.integrator, str(self.per_tick)]
         parts += [f"k{self.stiffness:g}"] if self.stiffness != 1.0 else []
         parts += [f"e{self.error:g}"] if self.error is not None else []

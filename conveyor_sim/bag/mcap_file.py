@@ -44,7 +44,7 @@ class McapFile:
 
     def __init__(self, stream: IO[bytes], name: str, distro: str) -> None:
         self._distro = distro
-        # Of what lies between and around the chunks, only the checksum over all data tells damage.
+        # Of what lies between and around the chunks, only the checksum over all data shows damage.
         self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
         self._schemas: dict[Schema, int] = {}
         self._topics: dict[int, TopicInfo] = {}

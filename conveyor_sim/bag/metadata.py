@@ -147,8 +147,8 @@ def _essence(information: Mapping[str, Any]) -> tuple[Any, ...]:
     topics = {}
     for topic in information["topics_with_message_count"]:
         if count := topic["message_count"]:  # of the others, a recorder may name some or none
-            told = topic["topic_metadata"]
-            topics[told["name"]] = (told["type"], told["serialization_format"], _profiles(told), count)
+            entry = topic["topic_metadata"]
+            topics[entry["name"]] = (entry["type"], entry["serialization_format"], _profiles(entry), count)
     return (
         information["storage_identifier"],
         information["duration"]["nanoseconds"],

@@ -264,11 +264,11 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | No
     old = read_metadata(folder)
     distro = str(old["ros_distro"]) if old and old.get("ros_distro") else default_distro()
     expected = bag_information(merged, [content.file for content in contents], distro)
-    if old is not None:  # what no MCAP file tells
-        told = ["custom_data"]
+    if old is not None:  # what no MCAP file holds
+        keys = ["custom_data"]
         if str(old.get("compression_mode")).lower() == "message":  # a compressed file would not be MCAP
-            told += ["compression_format", "compression_mode"]
-        expected |= {key: old[key] for key in told if key in old}
+            keys += ["compression_format", "compression_mode"]
+        expected |= {key: old[key] for key in keys if key in old}
     if old is not None and fits(old, expected):
         return None
     kept = []

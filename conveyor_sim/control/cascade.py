@@ -31,7 +31,7 @@ class Zone:
 
 @dataclass
 class Cascade:
-    """Zones from the first (upstream) to the last; the last delivers to what `takes` tells of.
+    """Zones from the first (upstream) to the last; the last delivers to the machine of the signal `takes`.
 
     takes: a signal of type bool that is on while bottles are taken at the end of the row (machines/<m>/running).
     full_delay: s for which an eye must be blocked until the zone counts as full: more than a bottle takes to pass.

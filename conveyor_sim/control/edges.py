@@ -9,7 +9,7 @@ from conveyor_sim.control.scan import Inputs, eye_signal
 
 @dataclass
 class EyeEdges:
-    """Read once a scan. The eye tells the time of its last edges only; how many there were, `edges` tells."""
+    """Read once a scan. The eye gives the time of its last edges only; `edges` counts them."""
 
     eye: str
     blocked: bool = field(default=False, init=False)

@@ -2,7 +2,7 @@
 
 A PLC keeps a shift register that is shifted by every pulse, with a bit for each bottle found bad. The same is kept here
 as the pulse counts at which those bits arrive, so the belt may run at any speed, creep or stop. A bottle is put to its
-place within a scan: when it was seen is told as a time, and the belt's speed makes pulses of what has passed since.
+place within a scan: when it was seen is given as a time, and the belt's speed makes pulses of what has passed since.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class TrackedReject:
     """Fires the rejecter when a bottle found bad is before it.
 
     belt: with the encoder, belts/<belt>/pulses, of `pulses_per_metre`. inspection: the count of bottles found bad
-    (machines/<m>/bad). seen: a signal that tells when the last of them was seen (machines/<m>/bad_time), or the last
+    (machines/<m>/bad). seen: a signal that gives when the last of them was seen (machines/<m>/bad_time), or the last
     bottle at all (photo_eyes/<e>/rose), s. fire: the command (machines/<r>/fire). distance: m, from where a bottle is
     when it is seen to where it is to be hit. stroke: m that `fire` stays on for; more than the belt moves in a scan,
     and less than the way from one bottle to the next by two such, for a rejecter acts on what rises. response: s from

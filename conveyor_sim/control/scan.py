@@ -146,7 +146,7 @@ def speed_command(belt: str) -> str:
 
 
 def speed_signal(belt: str) -> str:
-    """The signal that tells a belt's actual speed, m/s."""
+    """The signal of a belt's actual speed, m/s."""
     return f"belts/{belt}/speed"
 
 

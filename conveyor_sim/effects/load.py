@@ -45,7 +45,8 @@ def contact_load(terms: Terms) -> Load:
 
     The lesser of what full belts press with, one behind the other, and of what all bottles that there can be do.
     What a mover's drive can press with beyond that (`MovingShape.limit`, hundreds of newtons) is not in it: it would
-    rule every scene with a gate, for the sake of a bottle that is stuck. The end of a run tells (`achieved.Pressed`).
+    rule every scene with a gate, for the sake of a bottle that is stuck. The end of a run reports it
+    (`force_check.Pressed`).
     """
     friction, most = terms.laws.friction_under_bottles, supply(terms.scene)
     if friction is None or not most:

@@ -11,7 +11,7 @@ INTRODUCTION = """\
 and conveyor_sim/engine/contact/laws/. -->
 
 A scene is simulated with the effects that it calls for and no others. One that is off has no arrays, no branch in the
-compiled loops and no output. `conveyor-sim explain SCENE` tells which effects are on, by which line of the scene, and
+compiled loops and no output. `conveyor-sim explain SCENE` lists which effects are on, by which line of the scene, and
 what bounds the time step; `conveyor-sim explain SCENE --price` measures what each costs.
 
 `effects` in a scene forces an effect on or off:
@@ -53,7 +53,7 @@ effects: {contact_arrays: off, peaks: off}                          # nobody rea
   accumulation tables, in funnels that may clog ([below](#tangential-springs)). The friction curve, without memory, lets
   them creep.
 - `base_radius`: a bottle that straddles two belts turns, and its base brakes its spin. A type without it stands on a
-  point, the paper's base; [base.md](base.md) tells what that changes, and when to give `tangential` in `base`.
+  point, the paper's base; [base.md](base.md) says what that changes, and when to give `tangential` in `base`.
 - `effects`: what the scene calls for and nobody needs is off; here, the outputs of contacts and of peaks.
 
 ## Tangential springs
@@ -84,7 +84,7 @@ LAWS OF DAMPING
 Bounds on dashpots and on friction at rest are those of leapfrog and semi-implicit Euler, which a drag makes unstable at
 dt = 2 / gamma. Velocity Verlet, unstable at 1 / gamma, takes half of them; rk4, at 2.785 / gamma, takes 1.39 times.
 
-`conveyor-sim explain` tells what came of the choice. In the list below, numbers in brackets are equations of the paper
+`conveyor-sim explain` shows what came of the choice. In the list below, numbers in brackets are equations of the paper
 (docs/paper.md).
 """
 

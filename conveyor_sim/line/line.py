@@ -138,8 +138,8 @@ class Line:
                 for name, value in zip(names, values, strict=True):
                     if name in self._owner:  # not an alarm
                         self._owner[name].command(name, value, self.now)
-            told = shown(names) if reason else names
-            self._outcomes.append(CommandOutcome(tick, source, told, values, not reason, reason))
+            kept = shown(names) if reason else names
+            self._outcomes.append(CommandOutcome(tick, source, kept, values, not reason, reason))
             self._log.note_outcome(self._outcomes[-1])
         for belt in self._belts:
             if name := belt.watch(self.now):
@@ -200,7 +200,7 @@ class Line:
         return np.array([value for device in self._devices for value in device.values(self.now)], dtype=np.float64)
 
     def photo_eyes(self) -> dict[str, bool]:
-        """Whether each photo-eye tells that it is blocked, by the device's name."""
+        """Whether each photo-eye is blocked, by the device's name."""
         return {eye.name: eye.blocked for eye in self._eyes}
 
     def carriers(self) -> NDArray[np.int32]:
@@ -233,7 +233,9 @@ class Line:
         entries(memory, self.snapshot(), "line")
         self.now.tick = tick
         self._pending = typed(list[_Pending], memory["pending"], "line.pending")
-        self._outcomes = [CommandOutcome(*told) for told in typed(list[_Outcome], memory["outcomes"], "line.outcomes")]
+        self._outcomes = [
+            CommandOutcome(*entry) for entry in typed(list[_Outcome], memory["outcomes"], "line.outcomes")
+        ]
         speeds = {"setpoints": self.now.setpoints, "speeds": self.now.speeds}
         restore(speeds, {name: memory[name] for name in speeds}, "line")
         self._surfaces.note(self.now.speeds)

@@ -20,7 +20,7 @@ STRAIGHT = -1
 
 
 def reach_code(span: float) -> int:
-    """How the engine tells angles inside a span from those outside (engine/support/sector.py)."""
+    """How the engine finds whether an angle is inside a span (engine/support/sector.py)."""
     if is_full_turn(span):
         return FULL_CIRCLE
     return UP_TO_HALF if span <= math.pi else BEYOND_HALF

@@ -68,7 +68,7 @@ class Remedy:
         """Of a tick with it, in steps of the scene without it."""
         return self.steps * self.cost
 
-    def told(self, before: int) -> str:
+    def sentence(self, before: int) -> str:
         """In words; before: steps without it."""
         return f"{self.words}: {_steps(self.steps)}, {_times(before / self.steps)} fewer"
 
@@ -106,21 +106,21 @@ class StepLimit:
             return ""
         first, *others = self.bounds
         needs = fewest_steps(self.tick, first.dt)
-        told = f"{first.name} needs {_steps(needs)}"
+        text = f"{first.name} needs {_steps(needs)}"
         if others:
-            told += f", {_times(self.ratio)} the next bound, {others[0].name} ({fewest_steps(self.tick, others[0].dt)})"
-        return f"{_steps(self.steps)} are given in the scene; {told}" if self.given else told
+            text += f", {_times(self.ratio)} the next bound, {others[0].name} ({fewest_steps(self.tick, others[0].dt)})"
+        return f"{_steps(self.steps)} are given in the scene; {text}" if self.given else text
 
     def _remedies(self) -> str:
         if not self.remedies:
             return "" if self.steps < MANY_STEPS else "no single change of the scene that is known to help lowers it"
-        return "fewer steps: " + "; or ".join(remedy.told(self.steps) for remedy in self.remedies)
+        return "fewer steps: " + "; or ".join(remedy.sentence(self.steps) for remedy in self.remedies)
 
     def _warning(self) -> str:
         bottles = 100 if self.bottles is None else max(1, self.bottles)
         seconds = self.steps / self.tick * (bottles + BESIDE) * BOTTLE_STEP
-        told = f"{seconds:.2g}" if seconds < 100.0 else f"{seconds:.0f}"
-        return f"slow: a simulated second of {bottles} bottles will take about {told} s of computing on one core"
+        text = f"{seconds:.2g}" if seconds < 100.0 else f"{seconds:.0f}"
+        return f"slow: a simulated second of {bottles} bottles will take about {text} s of computing on one core"
 
 
 def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
@@ -147,7 +147,7 @@ def with_remedy(scene: Scene, overrides: Mapping[str, Any]) -> Scene:
 def too_many(scene: Scene, choice: StepChoice) -> str:
     """Why a scene of more than MOST_STEPS steps is refused, and what helps."""
     remedies = step_limit(scene, choice).remedies
-    helps = f", as with {remedies[0].told(choice.steps)}" if remedies else ""
+    helps = f", as with {remedies[0].sentence(choice.steps)}" if remedies else ""
     return f"{choice.reason}; expected at most {MOST_STEPS} steps a tick{helps}"
 
 

@@ -1,4 +1,4 @@
-"""Marks of devices in a drawing: told apart by their shape first, by their colour second."""
+"""Marks of devices in a drawing: they differ by their shape first, by their colour second."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 LOOK = 0.05  # s of wall time between two looks at whether it still can come
 FRAME = "world"
-LAST_TICK = 10**9  # at which the run ends, as the controller is told: when it does is up to the test
+LAST_TICK = 10**9  # at which the run ends, as the controller sees it: when it does is up to the test
 ENDED = "the test has ended"
 
 
@@ -160,7 +160,7 @@ class _Turns:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self.run_id = uuid.uuid4().hex
-        """As `line` tells it."""
+        """As in `line`."""
         self._lockstep = Lockstep(LAST_TICK)
         self._answer: Future[LockstepAnswer] = Future()
         self._released = False
@@ -245,7 +245,7 @@ class _Turns:
 
 
 def _line(simulation: Simulation, run_id: str) -> Line:
-    """What `line` tells: the test's line, without the scene's end, at which a controller would leave."""
+    """What `line` holds: the test's line, without the scene's end, at which a controller would leave."""
     message = deserialize_message(
         line_message(simulation, run_id, Header(simulation.tick, simulation.stamp_ns, FRAME)), Line
     )

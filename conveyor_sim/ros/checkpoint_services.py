@@ -84,7 +84,7 @@ class CheckpointServices:
 
     async def _between_ticks(self, response: Any, what: Callable[[], None], done: str) -> Any:
         def now() -> None:
-            # The state that the answer tells of is the one that was saved, not one some ticks later.
+            # The state in the answer is the one that was saved, not one some ticks later.
             try:
                 what()
                 response.success, response.message = True, done

@@ -103,7 +103,7 @@ class ControllerRun:
         while line is None or tick < last:
             if self._line is not line:  # at the start, and after a reset
                 line = self._line
-                # Stale by intent: the refusal tells the present tick, which is not 0 if this controller was restarted.
+                # Stale by intent: the refusal holds the present tick, which is not 0 if this controller was restarted.
                 present = self._call(line, 0, {})
                 if self._left(line, present):
                     continue
@@ -146,7 +146,7 @@ class ControllerRun:
         return Scanner(self._make(line), line, self._alarms)
 
     def _left(self, line: Any, response: Any) -> bool:
-        """Whether the simulation is in another run than that of `line`; if so, returns once it has told its line."""
+        """Whether the simulation is in another run than that of `line`; if so, returns once its line has come."""
         if response.sim_run_id == line.run_id:
             return False
         while self._line is line:

@@ -51,7 +51,7 @@ def run(stop: StopRequest) -> None:
         except ControlError as error:
             raise ConveyorError(str(error)) from error
 
-    make(None)  # what can't be made is told before there is a simulation
+    make(None)  # what can't be made is reported before there is a simulation
     controller = ControllerRun(node, make, scan_ticks=given["scan_ticks"], run_id=given["run_id"], stop=stop)
     with closing(controller), suppress(Stopped):
         if given["mode"] == "free":

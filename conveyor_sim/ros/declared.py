@@ -39,7 +39,7 @@ class Entry:
         return ""
 
     def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows. refusal() judges the type, so that its sentence is told, not rclpy's."""
+        """What `ros2 param describe` shows. refusal() judges the type, so that its sentence is shown, not rclpy's."""
         descriptor = ParameterDescriptor(description=self.description, read_only=self.fixed, dynamic_typing=True)
         if type(self.default) is float:
             descriptor.floating_point_range = [FloatingPointRange(from_value=self.low, to_value=self.high)]

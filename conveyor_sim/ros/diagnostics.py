@@ -108,9 +108,9 @@ class Diagnostics:
 def _verdict(stepper: Stepper, overruns: int, refused: int, lost: int, noticed: int) -> tuple[bytes, str]:
     if stepper.failure:
         return DiagnosticStatus.ERROR, f"stopped: {stepper.failure}"
-    told = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
-    told += [f"{lost} lost commands"] * bool(lost)
-    told += [f"{noticed} warnings of the guard"] * bool(noticed)
-    if told:
-        return DiagnosticStatus.WARN, f"{' and '.join(told)} since the last message"
+    warnings = [f"{overruns} overruns"] * bool(overruns) + [f"{refused} refused commands"] * bool(refused)
+    warnings += [f"{lost} lost commands"] * bool(lost)
+    warnings += [f"{noticed} warnings of the guard"] * bool(noticed)
+    if warnings:
+        return DiagnosticStatus.WARN, f"{' and '.join(warnings)} since the last message"
     return DiagnosticStatus.OK, State(stepper.state).name

@@ -1,6 +1,6 @@
 """Messages that were sent and never came, from the numbers that DDS gives to each publisher's messages.
 
-Fast DDS reports no message-lost event for what a full history drops, but its numbers have gaps there. rclpy tells the
+Fast DDS reports no message-lost event for what a full history drops, but its numbers have gaps there. rclpy gives the
 number without the publisher. With one publisher the count is exact, from the first message on that is received; with
 several, numbers are matched to publishers as they fit best, and a gap may be taken for a new publisher, once for each.
 """

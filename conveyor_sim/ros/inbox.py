@@ -58,7 +58,7 @@ class Inbox:
             return Counts(self._received, self._lost, self._turned_away, self._waiting, self._bytes)
 
     def receive(self) -> None:
-        """Count a command that came; what becomes of it is told by one of the others."""
+        """Count a command that came; what becomes of it is counted by one of the others."""
         with self._lock:
             self._received += 1
 

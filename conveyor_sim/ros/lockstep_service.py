@@ -39,7 +39,7 @@ class Stepped(Protocol):
 
     @property
     def run_id(self) -> str:
-        """Of the present run, as `line` tells it."""
+        """Of the present run, as in `line`."""
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """From any thread: have a function called in that thread, between two ticks."""

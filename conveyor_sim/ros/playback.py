@@ -1,4 +1,4 @@
-"""A recording as a stream to be told again: what belongs to each tick, and what holds at a tick that is gone to."""
+"""A recording as a stream to be published: what belongs to each tick, and what holds at a tick that is gone to."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from conveyor_sim.line.line import ARRIVAL, WATCHDOG
 from conveyor_sim.line.process_image import speed_command
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
-"""What a node that plays back tells of itself."""
+"""What a node that plays back publishes of itself."""
 
 NOT_SENT = frozenset({WATCHDOG, FAULT, ARRIVAL})
 """Sources of outcomes that nobody sent as a command."""
@@ -52,7 +52,7 @@ class Topic:
 
     @property
     def event(self) -> bool:
-        """Whether each message counts for its own moment only, and none tells a state."""
+        """Whether each message counts for its own moment only, and none holds a state."""
         row = topics.TOPICS.get(self.name)
         return row is not None and row.each_counts
 
@@ -95,7 +95,7 @@ class Playback:
         self._recorded = known
         self._made = {topic.name for topic in self.topics} - known
         self._eyes = {eye: column for eye, column in eyes.items() if eye in self._made}
-        self._seen: dict[str, bool] = {}  # what was told of each eye since the last cue
+        self._seen: dict[str, bool] = {}  # what was published of each eye since the last cue
         self._latched = {topic.name for topic in recorded if topic.latched}
         self._states = {topic.name for topic in recorded if not topic.latched and not topic.event}
         self._cued_ns = 0
@@ -162,7 +162,7 @@ class Playback:
         return [Message(topic, found[topic][2]) for topic in sorted(found, key=lambda name: found[name][:2])]
 
     def _sent(self, data: bytes) -> Iterator[Message]:
-        """The command that an outcome tells of, if it was one and the bag does not hold it itself."""
+        """The command of an outcome, if it was one and the bag does not hold it itself."""
         message = self._bag.decode("outcomes", data)
         outcome: Outcome = to_outcome(message)
         if outcome.source in NOT_SENT:
@@ -180,7 +180,7 @@ def _header(message: Any) -> Header:
 
 
 def _photo_eyes(signal_names: Sequence[str]) -> dict[str, int]:
-    """Where in the signals each photo-eye tells that it is blocked, by the eye's own topic."""
+    """Where in the signals each photo-eye says that it is blocked, by the eye's own topic."""
     ends = ("photo_eyes/", "/blocked")
     return {
         name.removesuffix(ends[1]): column

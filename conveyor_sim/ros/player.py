@@ -40,7 +40,7 @@ class Player:
         self._pacer = Pacer(rate, playback.tick_ns * 1e-9)
         self.paused = paused
         self._next = playback.first_tick if start is None else self._tick_at("start", start)
-        self._shown = self._next  # tick that /clock tells
+        self._shown = self._next  # tick that /clock shows
         self._cue(self._next)
 
     @property

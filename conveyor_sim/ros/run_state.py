@@ -1,4 +1,4 @@
-"""What a run may be doing, and where it tells of it."""
+"""What a run may be doing, and where it reports it."""
 
 from enum import IntEnum
 from typing import Protocol

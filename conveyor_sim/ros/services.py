@@ -46,7 +46,7 @@ async def settled(executor: Executor, future: Future[T]) -> T:
 
     def wake(_: Future[T]) -> None:
         arrived.set_result(None)
-        executor.wake()  # it would sleep on otherwise: nothing else tells it that the callback can go on
+        executor.wake()  # it would sleep on otherwise: nothing else wakes it when the callback can go on
 
     future.add_done_callback(wake)
     await arrived

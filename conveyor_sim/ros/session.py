@@ -63,11 +63,11 @@ class Session:
         """How fast the run was, and what its forces say of its accuracy, in one line."""
         simulation = self.simulation
         simulated = simulation.time - self._began
-        told = f"{simulated:g} s simulated in {self.wall:.2f} s"
+        account = f"{simulated:g} s simulated in {self.wall:.2f} s"
         if self.wall > 0.0:
-            told += f", {simulated / self.wall:.3g} x real time"
+            account += f", {simulated / self.wall:.3g} x real time"
         reached = achieved(simulation.model, self._peaks.force)
-        return told if reached is None else f"{told}; {reached.sentence}"
+        return account if reached is None else f"{account}; {reached.sentence}"
 
     def take_last_outcomes(self) -> list[CommandOutcome]:
         """What became of the commands of a tick that failed."""
@@ -94,6 +94,6 @@ class Session:
         """End the recording; nothing more is recorded. Raises BagError if it can't be completed."""
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
-            # What is still told, of commands that come too late, is told to those who listen.
+            # Outcomes of commands that come too late are still published.
             self.outputs = Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
             recorder.close()

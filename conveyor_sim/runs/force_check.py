@@ -67,10 +67,12 @@ class Pressed:
     def sentence(self) -> str:
         """All of it."""
         bound = f"the {self.expected:.3g} N that friction in contacts is stable at ({self.expected_of})"
-        told = f"pressed for {WINDOW:g} s with at most {self.load:.3g} N"
+        pressed = f"pressed for {WINDOW:g} s with at most {self.load:.3g} N"
         if self.as_expected:
-            return f"{told}, within {bound}"
-        return f"{told}, more than {bound}: friction may chatter; friction_solver: implicit or more steps a tick help"
+            return f"{pressed}, within {bound}"
+        return (
+            f"{pressed}, more than {bound}: friction may chatter; friction_solver: implicit or more steps a tick help"
+        )
 
 
 class PressWatch:

@@ -41,7 +41,7 @@ class Accuracy(Part):
         "Relative error in contact force to stay below; the time step follows.", "1", default=None
     )
     integrator: IntegratorName = quantity(
-        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md tells how to choose.",
+        "Integration method; semi_implicit_euler is the paper's, (5)-(6). docs/accuracy.md says how to choose.",
         default="leapfrog",
     )
     dt: Positive | None = quantity(

@@ -6,7 +6,7 @@ from typing import Any
 
 from conveyor_sim.scene.schema import Scene
 
-_LONGEST = 60  # characters of a value that is told
+_LONGEST = 60  # characters of a value that is shown
 
 
 def scene_difference(one: Scene, other: Scene, ignored: Collection[str] = ()) -> tuple[str, str, str] | None:

@@ -1,4 +1,4 @@
-"""Conditions of the present signals: what they read, and how a failure tells of them."""
+"""Conditions of the present signals: what they read, and how a failure shows them."""
 
 from __future__ import annotations
 

@@ -43,6 +43,8 @@ class Method:
     """Of the fall of the force in a step, where it is largest at first touch (c^2 > k m_r)."""
     tsuji: float
     """Of c dt / m_r for a dashpot that grows as delta^0.25; times (w dt)^0.25 if `second_order`."""
+    viscoelastic: float
+    """The same as delta^0.5; times (w dt)^0.5 if `second_order`."""
     onset: float
     """Of c dt / m_r for a dashpot that grows as the force; times w dt if `second_order`."""
     slip: float
@@ -96,10 +98,12 @@ class Method:
     def growing(self, exponent: float, rate: float, frequency: float) -> Share:
         """A dashpot that grows with the overlap as (w t)^exponent, c / m_r in 1/s at its largest; rad/s.
 
-        Coefficients were measured at exponents of 1/4 and 1; between them they are interpolated.
+        Coefficients were measured at exponents of 1/4, 1/2 and 1; between them they are interpolated.
         """
-        onset = min(max((exponent - 0.25) / 0.75, 0.0), 1.0)
-        name, coefficient = "dashpot", (1.0 - onset) * self.tsuji + onset * self.onset
+        steep = min(max(2.0 * (exponent - 0.5), 0.0), 1.0)
+        flat = min(max(4.0 * (0.5 - exponent), 0.0), 1.0)
+        coefficient = flat * self.tsuji + (1.0 - flat - steep) * self.viscoelastic + steep * self.onset
+        name = "dashpot"
         if not self.second_order:
             return Share(name, coefficient, 1.0 / rate, 1.0)
         return Share(name, coefficient, (rate * frequency**exponent) ** (-1.0 / (1.0 + exponent)), 1.0 + exponent)
@@ -113,6 +117,7 @@ METHODS: Mapping[str, Method] = {
         jump=0.6,
         touch=0.0,
         tsuji=0.4,
+        viscoelastic=0.38,
         onset=0.35,
         slip=1.3,
         second_order=False,
@@ -120,22 +125,50 @@ METHODS: Mapping[str, Method] = {
         implicit_creep=2.0,
     ),
     "semi_implicit_euler": Method(
-        peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, onset=0.35, slip=1.3, second_order=False, creep=1.0
+        peak=0.6, jump=0.6, touch=0.0, tsuji=0.4, viscoelastic=0.38, onset=0.35, slip=1.3, second_order=False, creep=1.0
     ),
     # Its velocity ahead is v + a dt, a of the step before: l^2 - (1 - 3 z / 2) l - z / 2 = 0, and l = -1 at z = 1.
     "velocity_verlet": Method(
-        peak=0.6, jump=0.6, touch=0.0, tsuji=0.3, onset=0.2, slip=2.7, second_order=True, drag_limit=0.5
+        peak=0.6,
+        jump=0.6,
+        touch=0.0,
+        tsuji=0.3,
+        viscoelastic=0.2,
+        onset=0.2,
+        slip=2.7,
+        second_order=True,
+        drag_limit=0.5,
     ),
     # 1 - z + z^2 / 2 - z^3 / 6 + z^4 / 24 = 1 at z = 2.785.
-    "rk4": Method(peak=0.55, jump=0.2, touch=0.7, tsuji=0.11, onset=0.17, slip=0.5, second_order=True, drag_limit=1.39),
+    "rk4": Method(
+        peak=0.55,
+        jump=0.2,
+        touch=0.7,
+        tsuji=0.11,
+        viscoelastic=0.09,
+        onset=0.17,
+        slip=0.5,
+        second_order=True,
+        drag_limit=1.39,
+    ),
     "dormand_prince": Method(
-        peak=0.5, jump=0.0, touch=0.0, tsuji=0.0, onset=0.17, slip=0.0, second_order=True, explicit=False, own_error=8.0
+        peak=0.5,
+        jump=0.0,
+        touch=0.0,
+        tsuji=0.0,
+        viscoelastic=0.06,
+        onset=0.17,
+        slip=0.0,
+        second_order=True,
+        explicit=False,
+        own_error=8.0,
     ),
     "linearly_implicit": Method(
         peak=0.57,
         jump=0.34,
         touch=1.0,
         tsuji=0.24,
+        viscoelastic=0.17,
         onset=0.22,
         slip=1.0,
         second_order=True,

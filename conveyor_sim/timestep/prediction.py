@@ -51,9 +51,9 @@ class Impact:
         """Longest time step of at most a relative error in contact force, and of `least_steps` a contact."""
         few, allowed = self.duration / least_steps(tolerance), tolerance / WHOLE_SCENE
         dt = few if self._of_steps(few) <= allowed else _root(lambda dt: self._of_steps(dt) - allowed, few)
-        return Bound(f"impact of {self.what}", dt, f"{self.told(dt)} {self.at}")
+        return Bound(f"impact of {self.what}", dt, f"{self.sentence(dt)} {self.at}")
 
-    def told(self, dt: float) -> str:
+    def sentence(self, dt: float) -> str:
         """What makes the error at a time step in s, the largest part first."""
         shares = sorted(self.shares, key=lambda share: -share.at(dt))
         parts = [f"{share.name} {percent(WHOLE_SCENE * share.at(dt))}" for share in shares]
@@ -116,7 +116,7 @@ def predict(
         nothing = "nothing makes contact forces"
         return Prediction(None, nothing, None, nothing, tuple(terms), force, reason)
     worst = max(impacts, key=lambda impact: impact.error(dt))
-    peak_reason = f"impact of {worst.what}, {worst.told(dt)} {worst.at}"
+    peak_reason = f"impact of {worst.what}, {worst.sentence(dt)} {worst.at}"
     rest, rest_reason = _resting(resting, pressing[0])
     return Prediction(worst.error(dt), peak_reason, rest, rest_reason, tuple(terms), force, reason)
 

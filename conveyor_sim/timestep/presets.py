@@ -14,7 +14,7 @@ PRESETS: Mapping[Preset, float] = {"draft": 0.05, "standard": 0.01, "fine": 0.00
 """Relative error in contact force to stay below; all else follows from it."""
 
 DEFAULT: Preset = "standard"
-"""What a scene gets that says nothing, and what the bounds are told for where it gives the time step itself."""
+"""What a scene gets that says nothing, and what the bounds assume where it gives the time step itself."""
 
 RESTITUTIONS = (1.0, 0.9, 0.5)
 """Of the impacts in the table of steps."""

@@ -58,7 +58,7 @@ class BeltDevice(Device):
         return float(now.speeds[self._index])
 
     def wanted(self, now: ScanContext) -> float:
-        """The speed that it is told to run at, m/s."""
+        """The speed that it is commanded to run at, m/s."""
         return float(now.setpoints[self._index])
 
     def values(self, now: ScanContext) -> Sequence[float]:

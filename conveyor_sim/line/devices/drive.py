@@ -82,7 +82,7 @@ class DriveDevice(BeltDevice):
         return self.run and not self.tripped, self.tripped
 
     def wanted(self, now: ScanContext) -> float:
-        """The speed that it is told to run at, m/s: none while it is stopped or tripped."""
+        """The speed that it is commanded to run at, m/s: none while it is stopped or tripped."""
         if not self.run or self.tripped:
             return 0.0
         setpoint = float(now.setpoints[self._index])

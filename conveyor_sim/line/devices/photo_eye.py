@@ -65,7 +65,7 @@ class PhotoEyeDevice(Device):
 
     @property
     def blocked(self) -> bool:
-        """What it tells."""
+        """Its output, after all delays."""
         return self.delayed.output
 
     def command(self, name: str, value: float, now: ScanContext) -> None:

@@ -25,11 +25,11 @@ class Indicator(DevicePart):
     )
     window: Positive = quantity("`flow` is over the last so many seconds.", "s", default=60.0)
     downstream: Name | None = quantity(
-        "Belt that takes the bottles on. `blocked`: it stands, while bottles wait and `belt` runs or is told to.",
+        "Belt that takes the bottles on. `blocked`: it stands, while bottles wait and `belt` runs or should run.",
         default=None,
     )
     backup: Name | None = quantity(
-        "Zone behind the exit, with full_at. `blocked`: it is full, while bottles wait and `belt` runs or is told to.",
+        "Zone behind the exit, with full_at. `blocked`: it is full, while bottles wait and `belt` runs or should run.",
         default=None,
     )
 

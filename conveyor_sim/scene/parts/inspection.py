@@ -10,7 +10,7 @@ from conveyor_sim.scene.words import shown
 
 
 class Inspection(DevicePart):
-    """A machine that tells bad bottles from good ones as their axes pass a line."""
+    """A machine that finds the bad bottles as their axes pass a line."""
 
     KIND: ClassVar[str] = "inspection"
 
