@@ -378,3 +378,5 @@ def compile_kernels(scene: Scene) -> None:
     rehearsal.bottles()
     rehearsal.contacts()
     rehearsal.ledger()
+    rehearsal.signals()
+    rehearsal._line.rehearse()

@@ -111,6 +111,9 @@ class Device:
     def wake(self) -> None:
         """Forget what was only kept to save work: what it remembers was restored."""
 
+    def rehearse(self, now: ScanContext) -> None:
+        """Call what of the engine it calls in some ticks only; nothing of it stays."""
+
     def begin(self, now: ScanContext) -> None:
         """Act before the steps of a tick; `now` is the tick that they start from."""
 

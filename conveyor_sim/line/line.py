@@ -157,6 +157,11 @@ class Line:
         for device in self._ending:
             device.end(self.now)
 
+    def rehearse(self) -> None:
+        """Call what devices may call of the engine in a later tick, so that it is compiled before a run begins."""
+        for device in self._devices:
+            device.rehearse(self.now)
+
     def take(self) -> None:
         """Let the devices take bottles off the line."""
         for device in self._taking:

@@ -37,6 +37,10 @@ class RejectDevice(Device):
         elif self.fire.rises(value) and not self.stop:
             self.strokes = (*self.strokes, now.time + self._reject.delay)
 
+    def rehearse(self, now: ScanContext) -> None:
+        """Look into the region."""
+        self._region.inside(now.state.world.bottles)
+
     def take(self, now: ScanContext) -> None:
         """Throw out one bottle a stroke, within its window."""
         if not self.strokes:
