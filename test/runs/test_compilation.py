@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 CODE = """
-import sys
-from conveyor_sim import Simulation, load_scene
+from scenes import NO_FLOOR, bottle, scene
+from conveyor_sim import Simulation
+from conveyor_sim.engine.sensors.regions import find_inside
 from conveyor_sim.simulation import compile_kernels
-from conveyor_sim.support.resources import scene_path
 
-scene = load_scene(scene_path("scenarios/" + sys.argv[1]))
-compile_kernels(scene)
-simulation = Simulation(scene, threads=1)
-from conveyor_sim.engine.sensors import beams, crossings, regions
-sensors = (beams.block_beams, crossings.find_crossings, regions.find_inside)
-before = [len(kernel.signatures) for kernel in sensors]
-for name in simulation.process_image.command_names:
-    if name.endswith("/fire"):
-        simulation.command((name,), (1.0,))
-simulation.advance(300)
-simulation.signals()
-after = [len(kernel.signatures) for kernel in sensors]
-print(before == after, max(after))
+region = [[0.2, -1.0], [0.3, -1.0], [0.3, 1.0]]
+parts = {{"part": {{"region": region{more}}}}}
+compile_kernels(scene(bottles=[bottle(0.0, 0.0)], {part}=parts, **NO_FLOOR))
+print(len(find_inside.signatures))
 """
 
 
-@pytest.mark.parametrize("scene", ["reject_line", "zoned_line", "buffer_lane"])
-def test_sensors_and_rejects_compile_nothing_in_the_middle_of_a_run(scene: str) -> None:
-    run = subprocess.run([sys.executable, "-c", CODE, scene], capture_output=True, text=True, check=False)
-    assert run.stdout.split() == ["True", "1"], run.stderr
+@pytest.mark.parametrize(("part", "more"), [("machines", ', "kind": "reject"'), ("zones", ""), ("outfeeds", "")])
+def test_whatever_looks_into_a_region_compiles_nothing_in_the_middle_of_a_run(part: str, more: str) -> None:
+    """A reject looks when it is fired, a zone when somebody reads its signals."""
+    code = CODE.format(part=part, more=more)
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=Path(__file__).parents[1], capture_output=True, text=True, check=False
+    )
+    assert run.stdout.strip() == "1", run.stderr
