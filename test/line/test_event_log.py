@@ -108,6 +108,14 @@ def test_an_alarm_beside_a_refused_command_is_noted() -> None:
     assert [e.kind for e in sim.happened] == ["command_refused", "alarm_raised"]
 
 
+def test_an_alarm_that_somebody_injects_is_refused_and_not_raised() -> None:
+    sim = Simulation(REJECT)
+    sim.inject("alarms/full", 1.0)
+    sim.advance()
+    assert [e.kind for e in sim.happened] == ["command_refused"]
+    assert not sim.alarms
+
+
 @pytest.mark.parametrize("given", [0.5, float("nan"), -1.0, 2.0])
 def test_an_alarm_is_zero_or_one(given: float) -> None:
     sim = Simulation(REJECT)
