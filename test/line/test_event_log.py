@@ -153,6 +153,11 @@ def test_the_alarms_that_stand_are_bounded() -> None:
     sim.advance()
     assert [o.accepted for o in sim.take_outcomes()] == [True, False, True]
     assert len(sim.alarms) == MOST_ALARMS
+    sim.command((many[0], "alarms/in its place"), (0.0, 1.0))
+    sim.advance()
+    assert [o.accepted for o in sim.take_outcomes()] == [True]
+    assert len(sim.alarms) == MOST_ALARMS
+    assert "in its place" in sim.alarms
 
 
 def test_controllers_and_lines_know_alarms_by_the_same_name() -> None:
