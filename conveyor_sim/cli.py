@@ -331,7 +331,7 @@ def events(bag: Path, file: Path | None, **chosen: Any) -> None:
     if file is None:
         _print(event_table(rows))
     else:
-        write_csv(rows, file)
+        write_csv(rows, file, bag)
         click.echo(f"{len(rows)} events written to {file}")
 
 

@@ -176,7 +176,10 @@ class _Replay:
     def _compare(self, topic: str, recorded: Any, now: Snapshot) -> Difference | None:
         header, row = Header(self._sim.tick, self._sim.stamp_ns, recorded.header.frame_id), COMPARED[topic]
         assert row.state is not None
-        replayed = self._bag.decode(topic, row.pack(row.state(now), header))
+        if (state := row.state(now)) is None:
+            tick, time = self._sim.tick, self._bag.time(self._sim.tick)
+            return Difference(tick, time, topic, "the number of messages", "1", "0")
+        replayed = self._bag.decode(topic, row.pack(state, header))
         return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
 
 

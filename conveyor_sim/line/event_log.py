@@ -54,9 +54,10 @@ class EventLog:
             self.note(at, "command_refused", printable(", ".join(names)), value, text=outcome.reason)
         elif outcome.source == FAULT:
             self.note(at, "fault_injected" if values[0] else "fault_cleared", names[0], values[0])
-        for name, value in zip(names, values, strict=False):
-            if name.startswith(ALARMS):
-                self._note_alarm(at, name, value)
+        if outcome.source != FAULT:  # nobody injects an alarm
+            for name, value in zip(names, values, strict=False):
+                if name.startswith(ALARMS):
+                    self._note_alarm(at, name, value)
 
     def note_removed(self, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
         """A device has taken bottles, by their ids."""

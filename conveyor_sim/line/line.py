@@ -117,9 +117,13 @@ class Line:
         table = self.image.faults if source == FAULT else self.image.commands
         if reason := refusal(table, FAULT if source == FAULT else "command", names, values):
             return reason
-        raised = {name for name, value in zip(names, values, strict=True) if name.startswith(ALARMS) and value}
-        if raised and len(raised.union(self._log.alarms)) > MOST_ALARMS:
-            return f"{len(raised)} alarms given while {len(self._log.alarms)} stand, expected {MOST_ALARMS} at most"
+        alarms = [(name, value) for name, value in zip(names, values, strict=True) if name.startswith(ALARMS)]
+        standing = set(self._log.alarms) if alarms else set()
+        for name, value in alarms:
+            (standing.add if value else standing.discard)(name)
+            if len(standing) > MOST_ALARMS:
+                raised = sum(bool(value) for _, value in alarms)
+                return f"{raised} alarms given while {len(self._log.alarms)} stand, expected {MOST_ALARMS} at most"
         return ""
 
     def take_outcomes(self) -> list[CommandOutcome]:

@@ -13,7 +13,7 @@ from rich.box import SIMPLE
 from rich.console import RenderableType
 from rich.table import Table
 
-from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.events import Kind
@@ -107,8 +107,14 @@ def event_table(rows: Sequence[Row]) -> RenderableType:
     return table
 
 
-def write_csv(rows: Sequence[Row], file: Path) -> None:
-    """A line for each event, below one of heads. Raises OSError."""
+def write_csv(rows: Sequence[Row], file: Path, bag: Path) -> None:
+    """A line for each event, below one of heads.
+
+    Raises ConveyorError for a file of the bag that they are from, OSError.
+    """
+    parts = [part for part in (*mcap_files(bag), bag / "metadata.yaml") if part.exists()]
+    if file.exists() and any(map(file.samefile, parts)):
+        raise ConveyorError(f"--csv: {file} given, which is a file of the recording, expected another one")
     with file.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(Row._fields)

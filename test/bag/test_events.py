@@ -111,6 +111,21 @@ def test_an_event_that_the_recording_lacks_is_found(run: tuple[Path, Any], tmp_p
     assert (difference.topic, difference.field) == ("events", "total")
 
 
+def test_an_event_that_does_not_happen_again_is_found(run: tuple[Path, Any], tmp_path: Path) -> None:
+    """That of a command which the line is not given, for its outcome claims that it never reached it."""
+
+    def edit(topic: str, message: Any) -> None:
+        if topic == "outcomes" and message.tick == 3:
+            message.source = "arrival"
+
+    with open_bag(run[0]) as bag, Recorder(tmp_path / "events", topics=["line", "outcomes", "events"]) as recorder:
+        for topic, log_time, data in bag.raw({"line", "outcomes", "events"}):
+            recorder.write(topic, data, log_time)
+    difference = replay(edited(tmp_path / "events", tmp_path / "changed", edit)).difference
+    assert difference is not None
+    assert str(difference).endswith("topic events: the number of messages was recorded as 1 and replayed as 0")
+
+
 def test_a_recording_without_events_is_replayed_as_before(run: tuple[Path, Any], tmp_path: Path) -> None:
     with open_bag(run[0]) as bag, Recorder(tmp_path / "old", topics=[t for t in OUTPUTS if t != "events"]) as recorder:
         for topic, log_time, data in bag.raw():

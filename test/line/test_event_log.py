@@ -108,6 +108,14 @@ def test_an_alarm_beside_a_refused_command_is_noted() -> None:
     assert [e.kind for e in sim.happened] == ["command_refused", "alarm_raised"]
 
 
+def test_an_alarm_that_somebody_injects_is_refused_and_not_raised() -> None:
+    sim = Simulation(REJECT)
+    sim.inject("alarms/full", 1.0)
+    sim.advance()
+    assert [e.kind for e in sim.happened] == ["command_refused"]
+    assert not sim.alarms
+
+
 @pytest.mark.parametrize("given", [0.5, float("nan"), -1.0, 2.0])
 def test_an_alarm_is_zero_or_one(given: float) -> None:
     sim = Simulation(REJECT)
@@ -145,6 +153,11 @@ def test_the_alarms_that_stand_are_bounded() -> None:
     sim.advance()
     assert [o.accepted for o in sim.take_outcomes()] == [True, False, True]
     assert len(sim.alarms) == MOST_ALARMS
+    sim.command((many[0], "alarms/in its place"), (0.0, 1.0))
+    sim.advance()
+    assert [o.accepted for o in sim.take_outcomes()] == [True]
+    assert len(sim.alarms) == MOST_ALARMS
+    assert "in its place" in sim.alarms
 
 
 def test_controllers_and_lines_know_alarms_by_the_same_name() -> None:

@@ -103,6 +103,18 @@ def test_csv_has_all_columns_and_no_control_characters(events: Events, tmp_path:
     assert (fed["name"], fed["bottle"], fed["value"]) == ("infeeds/supply", "7", "1.0")
 
 
+@pytest.mark.parametrize("file", ["bag_0.mcap", "metadata.yaml"])
+def test_csv_does_not_take_the_place_of_the_recording(bag: Path, events: Events, file: str) -> None:
+    held = (bag / file).read_bytes()
+    for path in (bag / file, bag / ".." / "bag" / file):
+        result = events("--csv", path)
+        assert (result.exit_code, result.output.count("\n")) == (1, 1)
+        assert "which is a file of the recording" in result.output
+    single = CliRunner().invoke(main, ["events", str(bag / "bag_0.mcap"), "--csv", str(bag / "bag_0.mcap")])
+    assert single.exit_code == 1
+    assert (bag / file).read_bytes() == held
+
+
 def test_what_never_happened_is_said(events: Events) -> None:
     result = events("--kind", "limit_passed")
     assert (result.exit_code, result.output.count("\n")) == (0, 1)
