@@ -17,7 +17,7 @@ from conveyor_sim.accounts.energy import EnergyAccount
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
 from conveyor_sim.line.commands import FAULT, CommandOutcome
-from conveyor_sim.line.line import Line
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG, Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
@@ -155,10 +155,13 @@ class Simulation:
     def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
         """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together.
 
-        `take_outcomes` returns what became of them. Raises ValueError for the source that faults have.
+        `take_outcomes` returns what became of them. Raises ValueError for the sources that faults and the
+        line itself have.
         """
-        if source == FAULT:
-            raise ValueError(f"source: {source} given, expected another: faults are injected")
+        if source in (FAULT, WATCHDOG, ARRIVAL):
+            raise ValueError(
+                f"source: {source} given, expected another: {FAULT}, {WATCHDOG} and {ARRIVAL} are the line's"
+            )
         self._line.queue(names, values, source)
 
     def inject(self, name: str, value: float) -> None:

@@ -54,8 +54,8 @@ class EventLog:
             self.note(at, "command_refused", printable(", ".join(names)), value, text=outcome.reason)
         elif outcome.source == FAULT:
             self.note(at, "fault_injected" if values[0] else "fault_cleared", names[0], values[0])
-        if outcome.source != FAULT:  # nobody injects an alarm
-            for name, value in zip(names, values, strict=False):
+        if outcome.source != FAULT and len(names) == len(values):  # nobody injects an alarm
+            for name, value in zip(names, values, strict=True):
                 if name.startswith(ALARMS):
                     self._note_alarm(at, name, value)
 

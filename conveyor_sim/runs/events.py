@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
@@ -17,6 +18,7 @@ from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.events import Kind
+from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -108,14 +110,18 @@ def event_table(rows: Sequence[Row]) -> RenderableType:
 
 
 def write_csv(rows: Sequence[Row], file: Path, bag: Path) -> None:
-    """A line for each event, below one of heads.
+    """A line for each event, below one of heads; if that can't be written, what the file held is untouched.
 
-    Raises ConveyorError for a file of the bag that they are from, OSError.
+    Raises ConveyorError, also for a file of the bag that they are from.
     """
     parts = [part for part in (*mcap_files(bag), bag / "metadata.yaml") if part.exists()]
     if file.exists() and any(map(file.samefile, parts)):
         raise ConveyorError(f"--csv: {file} given, which is a file of the recording, expected another one")
-    with file.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(Row._fields)
-        writer.writerows(rows)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(Row._fields)
+    writer.writerows(rows)
+    try:
+        write_file(file, text.getvalue().encode())
+    except FileError as error:
+        raise ConveyorError(f"--csv: {file}: {error}") from error

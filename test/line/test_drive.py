@@ -101,7 +101,7 @@ def test_faults_are_no_commands_and_commands_no_faults() -> None:
     reasons = [outcome.reason for outcome in sim.take_outcomes()]
     assert reasons[0].startswith("belts/one/trip: no such command, expected one of belts/one/cmd_speed, ")
     assert reasons[1] == "belts/one/run: no such fault, expected one of belts/one/trip"
-    with pytest.raises(ValueError, match="faults are injected"):
+    with pytest.raises(ValueError, match="expected another: fault, watchdog and arrival are the line's"):
         sim.command(["belts/one/run"], [0.0], source="fault")
 
 
