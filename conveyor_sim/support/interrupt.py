@@ -38,7 +38,13 @@ def one_line() -> Iterator[None]:
 
     Raises SystemExit.
     """
-    before, lost = sys.unraisablehook, False
+    before, lost, struck = sys.unraisablehook, False, False
+
+    def strike(number: int, frame: FrameType | None) -> None:
+        # Libraries that are called in the midst of their own C code make another error of a KeyboardInterrupt.
+        nonlocal struck
+        struck = True
+        signal.default_int_handler(number, frame)
 
     def not_lost(unraisable: sys.UnraisableHookArgs) -> None:
         # Where Python can't raise, in the compiler's callbacks for one, it comes again a little later.
@@ -51,16 +57,22 @@ def one_line() -> Iterator[None]:
             before(unraisable)
 
     sys.unraisablehook = not_lost
+    by_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    watched = by_default and threading.current_thread() is threading.main_thread()
+    if watched:
+        signal.signal(signal.SIGINT, strike)
     try:
         yield
     except (KeyboardInterrupt, Exception) as error:
-        if not (lost or isinstance(error, KeyboardInterrupt)):
+        if not (lost or struck or isinstance(error, KeyboardInterrupt)):
             raise
         # A callback that was broken off makes others fail: still the same interrupt.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         print("interrupted", file=sys.stderr)
         raise SystemExit(STATUS) from None
     finally:
+        if watched and signal.getsignal(signal.SIGINT) is strike:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         if lost:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = before

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from conveyor_sim.accuracy.collision import onset_restitution
 from conveyor_sim.accuracy.root import root
+from conveyor_sim.engine.contact.laws.onset import onset_restitution
 
 
 def test_roots_are_found_to_the_last_digits_also_between_infinite_ends() -> None:

@@ -24,7 +24,7 @@ def cloud(integrator: str, lever_arm: str = "overlap") -> Simulation:
                 contact(5000.0, damping=("paper", 2.0), friction=0.3),
                 contact(8000.0, "steel", damping=("normal", 3.0), friction=0.2),
                 {"between": ["steel", "steel"], "stiffness": 3000.0, "friction": 0.5},
-                *({"between": ["steel", other], "stiffness": 1000.0} for other in ("odd", "rare")),
+                *({"between": ["steel", other], "stiffness": 1000.0} for other in ("odd", "rare", "scarce")),
             ],
             {
                 name: kind(radius, mass, "glass" if name == "bottle" else "steel", inertia=share * mass * radius**2)

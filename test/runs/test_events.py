@@ -127,7 +127,7 @@ def test_what_never_happened_is_said(events: Events) -> None:
         (["--kind", "alarm"], f"--kind: alarm given, expected one of {', '.join(KINDS)}"),
         (["--from", "5", "--to", "3"], "--from and --to: 5 and 3 given, expected two times in s, in this order"),
         (["--from", "nan"], "--from and --to: nan and inf given"),
-        (["--csv", "/nowhere/events.csv"], "/nowhere/events.csv: No such file or directory"),
+        (["--csv", "/nowhere/events.csv"], "/nowhere/events.csv: can't be written (No such file or directory)"),
     ],
 )
 def test_errors_are_one_sentence(events: Events, arguments: list[str], words: str) -> None:

@@ -91,3 +91,13 @@ def test_other_errors_stay_what_they_are() -> None:
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, "ZeroDivisionError" in done.stderr) == (1, True)
+
+
+def test_an_interrupt_that_a_library_makes_an_error_of_is_one_all_the_same() -> None:
+    """As pydantic does, when it is struck while it builds a validator."""
+    code = (
+        "import time\nfrom conveyor_sim.support.interrupt import one_line\nwith one_line():\n    try:\n"
+        "        print('began', flush=True); time.sleep(60)\n"
+        "    except KeyboardInterrupt as struck:\n        raise ValueError('no validator') from struck\n"
+    )
+    assert interrupted(["-c", code], 0.2, "began") == (130, "began\ninterrupted\n")

@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from rosbags.highlevel import AnyReader
 from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, scene, segment, stiffness_for
 
-from conveyor_sim.bag.messages import GUARD_EVENT
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.bag.replay import replay
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.runs.runner import run_scene
@@ -40,9 +40,9 @@ def decoded(bag: Path) -> list[Any]:
     """The guard's messages by two libraries, which agree."""
     with AnyReader([bag], default_typestore=typestore()) as reader:
         raw = [data for connection, _, data in reader.messages() if connection.topic == "/guard"]
-        messages = [reader.deserialize(data, GUARD_EVENT) for data in raw]
+        messages = [reader.deserialize(data, TOPICS["guard"].type) for data in raw]
     for data, message in zip(raw, messages, strict=True):
-        assert_same(deserialize(GUARD_EVENT, data), message)
+        assert_same(deserialize(TOPICS["guard"].type, data), message)
     return messages
 
 
