@@ -70,6 +70,10 @@ def _throughput(study: Study, answer: Answer) -> str:
     rows = [row for row in study.comparisons if row.setting == answer.setting]
     runs = max((row.runs for row in rows), default=0)
     only = "rely on this setting for impacts and resting forces only"
+    if not rows and answer.setting == study.ensemble_reference:
+        return (
+            f"Throughput: cheaper settings differ from this one in long runs, and none was run that is better; {only}."
+        )
     if runs < FEW:
         return f"Throughput: not known, too few long runs were made; {only} (--thorough makes more)."
     flow = next((row for row in rows if row.observable == "throughput"), None)

@@ -75,6 +75,15 @@ def test_few_runs_compare_nothing(rows: tuple[Comparison, ...]) -> None:
     )
 
 
+def test_a_setting_that_others_were_compared_with_was_compared_with_none() -> None:
+    """Cheaper ones were found different from it; how good it is itself nobody has looked at."""
+    of = replace(with_runs(), ensemble_reference=CHOSEN)
+    assert three_lines(of)[1] == (
+        "Throughput: cheaper settings differ from this one in long runs, and none was run that is better; "
+        "rely on this setting for impacts and resting forces only."
+    )
+
+
 def test_a_scene_that_never_settles_says_so() -> None:
     of = study()
     assert of.answer is not None and of.rest is not None
