@@ -134,8 +134,8 @@ def _verdict(case: Case, outcome: Outcome, job: Job, early: bool) -> tuple[str, 
         wrong = case.broken(outcome.measures, outcome.sentence, job.preset)
     if not wrong:
         return ("kept so far" if early and not outcome.sentence else "kept"), outcome.sentence
-    if job.integrator in case.limits:
-        return "limit", case.limits[job.integrator]
+    if (limit := case.limits.get(f"{job.integrator} {job.preset}")) is not None:
+        return "limit", limit
     return "broken", "; ".join(wrong)
 
 

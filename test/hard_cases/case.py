@@ -73,7 +73,7 @@ class Case:
     work: float = 1.0
     """How many times as long as other rows a run may take in the matrix."""
     limits: Mapping[str, str] = field(default_factory=dict)
-    """By integrator: a known limit, in a sentence; its runs are listed with it and need not keep what is expected."""
+    """By integrator and preset: a known limit, in a sentence; that run need not keep what is expected."""
 
     def __post_init__(self) -> None:
         unknown = set(self.variants) - set(VARIANTS)
