@@ -4,11 +4,10 @@ Numba compiles for the types of a World, that is for the groups that are there. 
 to the forces, and what forces alone need is nothing to the lists.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.compiler.groups import without
 
 NOT_FOR_FORCES = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
 NOT_FOR_LISTS = NOT_FOR_FORCES | {
@@ -16,20 +15,14 @@ NOT_FOR_LISTS = NOT_FOR_FORCES | {
 }  # fmt: skip
 
 
-def _without(groups: frozenset[str]) -> Callable[[World], Any]:
-    """A function from a World to one without some groups; numba knows no `_replace`, so it is written out here."""
-    values = ", ".join("None" if name in groups else f"world.{name}" for name in World._fields)
-    names: dict[str, Any] = {"World": World}
-    exec(f"def view(world): return World({values})", names)
-    view: Callable[[World], Any] = names["view"]
-    return view
+def lists_of(world: World) -> World:
+    """The World for `rebuild`, and for a look at the overlaps; from Python."""
+    absent: dict[str, Any] = dict.fromkeys(NOT_FOR_LISTS)
+    return world._replace(**absent)
 
 
-lists_of = _without(NOT_FOR_LISTS)
-"""The World for `rebuild`, and for a look at the overlaps; from Python."""
-
-for_forces: Any = part(_without(NOT_FOR_FORCES))
+for_forces: Any = without(World, NOT_FOR_FORCES)
 """The World for all in `forces.py`; for kernels."""
 
-for_lists: Any = part(lists_of)
+for_lists: Any = without(World, NOT_FOR_LISTS)
 """The same as `lists_of`, for kernels."""

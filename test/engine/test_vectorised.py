@@ -14,6 +14,7 @@ import pytest
 from numba import uint64
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.compiler.pipelines import KernelCompiler
 from conveyor_sim.engine.contact.contact import contact_force, spring_after
 from conveyor_sim.engine.contact.friction import implicit_regularisation, regularisation
 from conveyor_sim.engine.support.ring import ring_means, ring_share
@@ -27,7 +28,7 @@ COUNT = 64
 
 def compiled(function: Any) -> Any:
     """As a kernel is compiled, but not from the cache, for numba shows no code that it did not compile itself."""
-    return numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
+    return numba.njit(nogil=True, error_model="numpy", _nrt=False, pipeline_class=KernelCompiler)(function)
 
 
 def assert_vectorised(loop: Any) -> None:

@@ -3,8 +3,10 @@
 from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Bottles(NamedTuple):
     """Bottles by slot, (S,). A free slot has id -1, weight and inverse mass 0, and rests."""
 
@@ -22,6 +24,7 @@ class Bottles(NamedTuple):
     """(4 S,), x, y, vx, vy of each bottle side by side: the copy that the pairs are gathered from."""
 
 
+@group
 class Spin(NamedTuple):
     """Rotation about the vertical, (S,); absent when nothing can turn a bottle."""
 
@@ -32,6 +35,7 @@ class Spin(NamedTuple):
     """N m, of the last force evaluation."""
 
 
+@group
 class Load(NamedTuple):
     """What the last force evaluation found, (S,)."""
 
@@ -43,6 +47,7 @@ class Load(NamedTuple):
     """N, normal forces of all contacts."""
 
 
+@group
 class Peaks(NamedTuple):
     """Accumulated every step since the last output, (S,)."""
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from conveyor_sim.engine.arrays.integrators import PairTangent, Triple
 from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.compiler.groups import group
 from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC
 
 
@@ -14,6 +15,7 @@ def _with_columns() -> Any:
     return namedtuple("_with_columns", names, defaults=[None] * len(names))
 
 
+@group
 class ContactLaw(_with_columns()):  # type: ignore[misc]
     """Coefficients of contact as flat columns; None where no contact of the scene has that law.
 
@@ -29,6 +31,7 @@ class ContactLaw(_with_columns()):  # type: ignore[misc]
     __slots__ = ()
 
 
+@group
 class Curves(NamedTuple):
     """Tables of normal force against overlap, one behind the other."""
 
@@ -38,6 +41,7 @@ class Curves(NamedTuple):
     force: F8
 
 
+@group
 class PairSprings(NamedTuple):
     """Tangential springs of the pairs, (P,), and a copy by pair that outlives a rebuild of the list."""
 
@@ -50,6 +54,7 @@ class PairSprings(NamedTuple):
     """(1,)"""
 
 
+@group
 class PairParts(NamedTuple):
     """What of the pair forces does not give its work back, (2 P + 1,) as `Pairs.fx` (`ledger.py`)."""
 
@@ -58,6 +63,7 @@ class PairParts(NamedTuple):
     friction: Triple
 
 
+@group
 class Pairs(NamedTuple):
     """Verlet list of bottle pairs, sorted by (i, j), i < j, (P,) by capacity. Explained in `pairs.py`."""
 
@@ -84,6 +90,7 @@ class Pairs(NamedTuple):
     parts: PairParts | None
 
 
+@group
 class Gathered(NamedTuple):
     """Scratch: what a block of pairs needs to know of its bottles."""
 
@@ -99,6 +106,7 @@ class Gathered(NamedTuple):
     """(4 * BLOCK,), how far j has gone less i, x and y (m), how far both have turned (rad), and their rims (m)."""
 
 
+@group
 class Slots(NamedTuple):
     """Which entries of the pair forces act on each bottle; explained in `slots.py`."""
 
@@ -112,6 +120,7 @@ class Slots(NamedTuple):
     more_entry: U4
 
 
+@group
 class Implicit(NamedTuple):
     """For friction solved implicitly, (S,)."""
 

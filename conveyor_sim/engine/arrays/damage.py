@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.compiler.groups import group
 
 MOST_TOUCHES = 16
 """Contacts of one bottle that are remembered as closed; of any more it is not known when they closed."""
@@ -18,6 +19,7 @@ MOST_BORNE = 64
 """Contacts of one bottle at a time that are looked at."""
 
 
+@group
 class Worst(NamedTuple):
     """The largest of a quantity, (S,)."""
 
@@ -27,6 +29,7 @@ class Worst(NamedTuple):
     """In the ticks before it since the last output."""
 
 
+@group
 class RailBins(NamedTuple):
     """Rails cut into bins: those of segment g are segment_first[g]:segment_first[g + 1]; likewise those of arcs."""
 
@@ -42,6 +45,7 @@ class RailBins(NamedTuple):
     """(units, B), N s, likewise."""
 
 
+@group
 class Scuffing(NamedTuple):
     """Sliding work."""
 
@@ -50,6 +54,7 @@ class Scuffing(NamedTuple):
     bins: RailBins | None
 
 
+@group
 class Crushing(NamedTuple):
     """Normal forces that act on a bottle at once."""
 
@@ -59,6 +64,7 @@ class Crushing(NamedTuple):
     """N, the largest squeeze by two of them."""
 
 
+@group
 class Impacts(NamedTuple):
     """Contacts as they close."""
 
@@ -75,6 +81,7 @@ class Impacts(NamedTuple):
     """Scratch: the same at the look before."""
 
 
+@group
 class Tipping(NamedTuple):
     """Overturning moment over the one that weight can hold."""
 
@@ -95,6 +102,7 @@ class Tipping(NamedTuple):
     moment: F8
 
 
+@group
 class Damage(NamedTuple):
     """What is looked at in every step."""
 
@@ -104,6 +112,7 @@ class Damage(NamedTuple):
     tipping: Tipping | None
 
 
+@group
 class LoadHistory(NamedTuple):
     """Scratch: the closed contacts of one bottle, (MOST_BORNE,)."""
 

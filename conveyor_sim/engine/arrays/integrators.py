@@ -6,8 +6,10 @@ Shapes: S bottle slots, P pairs. SI units, float64.
 from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Triple(NamedTuple):
     """Two components and one of turning for every bottle, (S,)."""
 
@@ -16,6 +18,7 @@ class Triple(NamedTuple):
     turn: F8
 
 
+@group
 class Stage(NamedTuple):
     """Velocities kept within a step by integrators that need them, (S,)."""
 
@@ -24,6 +27,7 @@ class Stage(NamedTuple):
     omega: F8
 
 
+@group
 class Slopes(NamedTuple):
     """Scratch of the Runge-Kutta methods (`runge_kutta.py`): where a step begins, (S,), and its slopes, (stages, S)."""
 
@@ -45,6 +49,7 @@ class Slopes(NamedTuple):
     """(4,), what a call that is interrupted leaves for the next one."""
 
 
+@group
 class Blocks(NamedTuple):
     """A symmetric 3 x 3 matrix for every bottle, over x, y and turning, (S,)."""
 
@@ -56,6 +61,7 @@ class Blocks(NamedTuple):
     tt: F8
 
 
+@group
 class Linear(NamedTuple):
     """Scratch of the linearly implicit method (`tangent.py`, `conjugate_gradients.py`)."""
 
@@ -82,6 +88,7 @@ class Linear(NamedTuple):
     """(units,), part of a maximum."""
 
 
+@group
 class PairTangent(NamedTuple):
     """Contacts of the pairs as the linearly implicit method has them, (P,) by capacity."""
 

@@ -3,8 +3,10 @@
 from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Listed(NamedTuple):
     """Some of the bottles, in order; those of the u-th unit (`workers.py`) are bottle[first[u]:first[u + 1]]."""
 
@@ -12,6 +14,7 @@ class Listed(NamedTuple):
     first: U4
 
 
+@group
 class NearSprings(NamedTuple):
     """Tangential springs by entry of a Near list, and a copy by bottle and piece that outlives a rebuild."""
 
@@ -23,6 +26,7 @@ class NearSprings(NamedTuple):
     """(1,)"""
 
 
+@group
 class Near(NamedTuple):
     """Rail pieces near each bottle: those of slot s are piece[start[s]:start[s + 1]], in order."""
 
@@ -31,6 +35,7 @@ class Near(NamedTuple):
     springs: NearSprings | None
 
 
+@group
 class Neighbourhood(NamedTuple):
     """What a rebuild needs and leaves behind."""
 
@@ -47,6 +52,7 @@ class Neighbourhood(NamedTuple):
     """(S,), slots by bucket."""
 
 
+@group
 class StaticGrid(NamedTuple):
     """Cells over the plant; each lists what a bottle with its axis in it can come near: pieces and belts."""
 

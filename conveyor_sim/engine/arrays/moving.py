@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.rails import Ends
 from conveyor_sim.engine.arrays.types import F8, I1, U4
+from conveyor_sim.engine.compiler.groups import group
 
 PHASES = 4
 """Of a course: speed up or turn round, go on, brake, rest."""
@@ -20,6 +21,7 @@ UNLIMITED = 1e300
 """N or N m: the force of a drive that has no limit, beside others that have."""
 
 
+@group
 class Actuators(NamedTuple):
     """What drives the rails (`actuators.py`); None where no drive has a limit."""
 
@@ -43,6 +45,7 @@ class Actuators(NamedTuple):
     """
 
 
+@group
 class MovingSprings(NamedTuple):
     """Tangential springs at rails that move: by bottle slot and rail, so that no list has to remember them."""
 
@@ -52,6 +55,7 @@ class MovingSprings(NamedTuple):
     """(Q,), m or rad, how far the rail has gone since springs were last kept."""
 
 
+@group
 class MovingRails(NamedTuple):
     """Straight rails that slide or swing. The fields up to `surface` are those of Segments, as they are now."""
 

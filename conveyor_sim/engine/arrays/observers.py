@@ -4,8 +4,10 @@ from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.integrators import Triple
 from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Ledger(NamedTuple):
     """Where the work of forces goes (`ledger.py`); absent when nobody asks."""
 
@@ -25,6 +27,7 @@ class Ledger(NamedTuple):
     """(units, BELTS + H + 1 + Q), J, the accounts, since the start."""
 
 
+@group
 class GuardProbe(NamedTuple):
     """The deepest overlaps since the guard last looked: of two bottles, and of a bottle with a rail."""
 

@@ -3,8 +3,10 @@
 from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.types import F8, I1, I8, U4
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Ends(NamedTuple):
     """Both ends of each rail piece, (pieces, 2): start, end."""
 
@@ -17,6 +19,7 @@ class Ends(NamedTuple):
     neighbour_y: F8
 
 
+@group
 class Segments(NamedTuple):
     """Straight rail pieces, (G,)."""
 
@@ -33,6 +36,7 @@ class Segments(NamedTuple):
     """Pieces of one surface push a bottle together, not each on its own."""
 
 
+@group
 class Arcs(NamedTuple):
     """Arc rail pieces, (A,)."""
 
@@ -53,6 +57,7 @@ class Arcs(NamedTuple):
     surface: U4
 
 
+@group
 class RailContacts(NamedTuple):
     """Scratch: the contacts of one bottle with rails, (MOST_CONTACTS,)."""
 

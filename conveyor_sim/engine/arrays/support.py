@@ -4,8 +4,10 @@ from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.lists import Listed
 from conveyor_sim.engine.arrays.types import F8, I1, I4, U4
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Sectors(NamedTuple):
     """The curved ones among the belts, (H,)."""
 
@@ -21,6 +23,7 @@ class Sectors(NamedTuple):
     """As in Arcs; -1 for a straight belt."""
 
 
+@group
 class Belts(NamedTuple):
     """Where belts lie, (H,), and which bottle stands on which, (S,)."""
 
@@ -41,6 +44,7 @@ class Belts(NamedTuple):
     uncertain: Listed
 
 
+@group
 class Surface(NamedTuple):
     """Velocity field of each belt's surface, (H + 1,): (ux - turn y, uy + turn x); the floor rests."""
 
@@ -52,6 +56,7 @@ class Surface(NamedTuple):
     """(H + 1, T), coefficient by bottle type."""
 
 
+@group
 class Footing(NamedTuple):
     """What each bottle stands on, (S,): the field of its belt, copied so that the friction loop gathers nothing."""
 
@@ -64,6 +69,7 @@ class Footing(NamedTuple):
     """mu m g, N; 0 where a ring may straddle belts and is summed point by point."""
 
 
+@group
 class Ring(NamedTuple):
     """Base rings, (S,)."""
 
@@ -71,6 +77,7 @@ class Ring(NamedTuple):
     """R_b, m."""
 
 
+@group
 class StaticFriction(NamedTuple):
     """Springs between bases and belts (`static_friction.py`)."""
 

@@ -12,8 +12,10 @@ from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import I8
+from conveyor_sim.engine.compiler.groups import group
 
 
+@group
 class Settings(NamedTuple):
     """Plain numbers."""
 
@@ -40,6 +42,7 @@ class Settings(NamedTuple):
     """Steps by which velocities are older than positions, in the slip on belts: 1/2 with leapfrog, else 0."""
 
 
+@group
 class World(NamedTuple):
     """All that a force evaluation reads and writes."""
 
@@ -78,6 +81,7 @@ class World(NamedTuple):
     damage: Damage | None
 
 
+@group
 class Worker(NamedTuple):
     """One of the threads that take steps together, with its scratch; explained in `workers.py`."""
 

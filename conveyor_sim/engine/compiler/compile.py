@@ -20,6 +20,7 @@ import numba
 
 from conveyor_sim.engine.compiler.cache_folder import choose_cache_folder
 from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
+from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
 from conveyor_sim.engine.compiler.source_hash import source_hash
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -84,7 +85,7 @@ def _rare_garbage_collection() -> Iterator[None]:
 
 
 def part(function: Function) -> Function:
-    """Compile a kernel that only kernels call: the way in from Python, with its many arrays, takes most of the time."""
+    """Compile a kernel that only kernels call: without a way in from Python, nor machine code of its own."""
     return _compiled(function, no_cpython_wrapper=True)
 
 
@@ -95,6 +96,7 @@ def _compiled(function: Function, **options: bool) -> Function:
         forceinline=True,
         no_cfunc_wrapper=True,
         _nrt=False,
+        pipeline_class=PartCompiler if options["no_cpython_wrapper"] else KernelCompiler,
         **options,
     )(function)
     if not options["no_cpython_wrapper"]:

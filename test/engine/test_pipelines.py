@@ -1,0 +1,137 @@
+"""What kernels get beside numba's own passes: groups by address, absent members pruned, parts linked once."""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+
+from conveyor_sim.engine.compiler.groups import group, without
+from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
+
+
+def kernel(function: Any) -> Any:
+    return numba.njit(error_model="numpy", forceinline=True, _nrt=False, pipeline_class=KernelCompiler)(function)
+
+
+def part(function: Any) -> Any:
+    options = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+    return numba.njit(error_model="numpy", pipeline_class=PartCompiler, **options)(function)
+
+
+@group
+class Inner(NamedTuple):
+    values: Any
+    factor: float
+
+
+@group
+class Outer(NamedTuple):
+    inner: Any
+    sums: Any
+
+
+OUTER = Outer(Inner(np.array([1.0, 2.0, 3.0]), 10.0), np.zeros(3))
+
+
+@part
+def scaled(inner: Any, i: int) -> Any:
+    if inner.values is None:
+        return 0.5 * inner.factor
+    return inner.factor * inner.values[i]
+
+
+@part
+def add(outer: Any, i: int) -> None:
+    outer.sums[i] += scaled(outer.inner, i)
+
+
+@kernel
+def add_all(outer: Any) -> float:
+    for i in range(outer.sums.size):
+        add(outer, i)
+    return outer.inner.factor
+
+
+def test_parts_reach_the_arrays_of_a_group() -> None:
+    """Groups within groups, through two calls, and again with other arrays."""
+    for _ in range(2):
+        assert add_all(OUTER) == 10.0
+    assert OUTER.sums.tolist() == [20.0, 40.0, 60.0]
+    other = Outer(Inner(np.array([5.0]), 2.0), np.zeros(1))
+    assert add_all(other) == 2.0
+    assert other.sums.tolist() == [10.0]
+
+
+def test_a_member_that_is_absent_is_pruned() -> None:
+    """Else numba could not compile what the branch does with it."""
+    outer = Outer(Inner(None, 3.0), np.zeros(2))
+    assert add_all(outer) == 3.0
+    assert outer.sums.tolist() == [1.5, 1.5]
+
+
+def test_a_member_of_a_member_is_pruned() -> None:
+    """The group itself is an argument, its members are not."""
+
+    @kernel
+    def first(outer: Any) -> float:
+        inner = outer.inner
+        if inner.values is not None:
+            return inner.values[0]
+        return -1.0
+
+    assert first(OUTER) == 1.0
+    assert first(Outer(Inner(None, 3.0), OUTER.sums)) == -1.0
+
+
+def test_a_group_without_some_members() -> None:
+    """What is left out is `None` for whatever takes the view."""
+    view = without(Outer, ["inner"])
+
+    @part
+    def has_inner(outer: Any) -> int:
+        if outer.inner is None:
+            return 0
+        return 1
+
+    @kernel
+    def both(outer: Any) -> Any:
+        return has_inner(outer), has_inner(view(outer)), view(outer).sums[0]
+
+    assert both(Outer(OUTER.inner, np.array([7.0]))) == (1, 0, 7.0)
+
+
+def test_a_part_is_linked_whoever_calls_it_first() -> None:
+    """LLVM drops the first call, in a branch that is never taken, before all parts are put together."""
+
+    @part
+    def twice(x: float) -> float:
+        return max(x, 0.0) + max(x, 0.0)
+
+    @part
+    def never(x: float, ring: Any) -> float:
+        if ring is None:
+            return twice(x)
+        return x
+
+    @part
+    def always(x: float) -> float:
+        return twice(x) + 1.0
+
+    @kernel
+    def sum_of_both(x: float, ring: Any) -> float:
+        return never(x, ring) + always(x)
+
+    assert sum_of_both(3.0, OUTER.sums) == 10.0
+    assert sum_of_both(3.0, None) == 13.0
+
+
+def test_a_wrong_member_is_refused() -> None:
+    """As numba refuses any attribute that is not there."""
+
+    @kernel
+    def wrong(outer: Any) -> float:
+        return outer.outer
+
+    with pytest.raises(numba.TypingError, match="outer"):
+        wrong(OUTER)
