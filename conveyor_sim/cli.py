@@ -251,25 +251,12 @@ def recover(bag: Path) -> None:
     """Verify a recording, and repair it.
 
     If BAG is damaged, or its recording was interrupted, a repaired copy takes its place; the original is kept.
+    BAG may be the folder of inputs that a killed test has left: its run is simulated again, and recorded.
     """
-    from conveyor_sim.bag.recover import recover as recover_bag
+    from conveyor_sim.runs.recovery import recover_bag, recover_runs
 
-    report = recover_bag(bag)
-    for sentence in report.damage:
-        click.echo(printable(sentence, SENTENCE))
-    for phrase in report.unverified:
-        click.echo(f"{printable(phrase, SENTENCE)}: has no checksum, so it can't be verified")
-    what = f"{report.message_count} messages up to {report.end_ns * 1e-9:.2f} s"
-    if not report.healthy:
-        click.echo(f"{bag}: repaired, with {what}")
-    elif report.unverified:
-        click.echo(f"{bag}: no damage was found, nothing to do ({what})")
-    else:
-        click.echo(f"{bag}: is whole, every checksum is right, nothing to do ({what})")
-    for file in report.kept:
-        click.echo(f"the damaged original is kept as {file} and may be deleted")
-    if report.unusable and not report.healthy:
-        raise click.ClickException(f"{report.unusable}; other programs can read it, but it can't be replayed or drawn")
+    if not recover_runs(bag):
+        recover_bag(bag)
 
 
 @main.command()

@@ -102,5 +102,12 @@ class Outputs:
         return Header(tick, max(1, tick * self._sim.model.tick_ns), self._frame_id)
 
 
+def forget_past(sim: Simulation) -> None:
+    """Have a simulation that was loaded from a checkpoint report nothing that happened before."""
+    for topic in OUTPUTS.values():
+        if topic.events is not None:
+            topic.events(sim)
+
+
 def _itself(what: Any) -> Any:
     return what

@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
+from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.messages import Header, Outcome, to_outcome
+from conveyor_sim.bag.outputs import forget_past
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.commands import FAULT
 from conveyor_sim.line.line import ARRIVAL, WATCHDOG
+from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 
 
@@ -82,17 +85,22 @@ def replay(path: str | Path, progress: Callable[[float, float], None] | None = N
 
     What is in topics.COMPARED, and the outcomes of commands, is compared bit for bit where the engine, versions and
     machine are those of the recording; elsewhere within the tolerances of the topics, those without any left out.
+    A run that began from a checkpoint is replayed from it, if it is in the bag's folder as `start.npz`.
     Stops at the first difference. progress(done, total) is called with simulated times, s.
     Raises BagError, also for a recording from before rails that move had limits; SceneError if the recorded scene is
-    refused.
+    refused; CheckpointError for a checkpoint that is damaged or of another version.
     """
     with open_bag(path) as bag, bag.sense():
-        if bag.line.tick > 0:
+        start = (bag.path if bag.path.is_dir() else bag.path.parent) / START_NAME
+        if start.exists():
+            simulation = _from_checkpoint(bag, start)
+        elif bag.line.tick > 0:
             raise BagError(
-                f"{bag.path}: began from a checkpoint at tick {bag.line.tick}, expected a run from tick 0: "
-                "the recording does not hold what was before"
+                f"{bag.path}: began from a checkpoint at tick {bag.line.tick}, expected a run from tick 0, or the "
+                f"checkpoint as {START_NAME} beside it: the recording does not hold what was before"
             )
-        simulation = _simulation(bag)
+        else:
+            simulation = _simulation(bag)
         environment = _environment(bag, simulation)
         return _Replay(bag, simulation, environment, progress).run()
 
@@ -194,6 +202,20 @@ def _simulation(bag: Bag) -> Simulation:
                 f"{bag.path}: recorded when {shape.name} pushed with unlimited force, expected a recording with the "
                 f"signal {shape.name}/blocked: by this version it would be another run"
             )
+    return simulation
+
+
+def _from_checkpoint(bag: Bag, start: Path) -> Simulation:
+    # In the defaults of today, unlike `recorded_scene`: a checkpoint is of this version.
+    name, overrides = f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
+    simulation = Simulation.load(start, scene=parse_scene(bag.line.scene_text, name, overrides))
+    if simulation.tick != bag.line.tick:
+        raise BagError(
+            f"{start}: a checkpoint at tick {simulation.tick}, expected the one at tick {bag.line.tick}, "
+            "from which the recording began"
+        )
+    simulation.take_waiting()  # it is among the recorded outcomes
+    forget_past(simulation)
     return simulation
 
 

@@ -1,0 +1,164 @@
+"""A run made again from its inputs (`input_log.py`), and recorded: the bag that it would have had."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, environment_of
+from conveyor_sim.bag.lock import alone
+from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import BagError, SimulationError
+from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.line import ARRIVAL, WATCHDOG
+from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.printable import printable
+
+MOST = 512 * MB
+"""Bytes of a file of inputs."""
+
+_Input = tuple[tuple[str, ...], tuple[float, ...], str]
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """What was made."""
+
+    bag: Path
+    end: float
+    """s, simulated time up to which it goes."""
+    departure: str
+    """Why it is not the run that it was to be, in a sentence; "": every state that was noted is the same."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What a file of inputs says."""
+
+    scene: Scene
+    from_checkpoint: bool
+    environment: list[str]
+    inputs: dict[int, list[_Input]]
+    """By the tick from which on they are applied."""
+    hashes: dict[int, int]
+    last: int
+    """The tick that was reached at least."""
+    failed: bool
+
+
+def rerun(folder: Path, bag: Path, progress: Callable[[float, float], None] | None = None) -> Rerun:
+    """Simulate a run again with the inputs in a folder, and record it to another folder, new or empty.
+
+    A copy of the checkpoint from which the run began, if it did, is put into the bag's folder: a replay needs it.
+    progress(done, total) is called with simulated times, s. Raises BagError for inputs that are missing, damaged or
+    still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not sound.
+    """
+    path = folder / FILE_NAME
+    run = _read(path)
+    with alone(path):
+        start = folder / START_NAME
+        simulation = Simulation.load(start, scene=run.scene) if run.from_checkpoint else Simulation(run.scene)
+        simulation.take_waiting()  # of a checkpoint; it is among the inputs
+        if run.last < simulation.tick:
+            raise BagError(f"{path}: ends at tick {run.last}, expected the start, tick {simulation.tick}, or later")
+        with Recorder(bag) as recorder:
+            departure = _simulate(run, simulation, recorder, progress)
+        if run.from_checkpoint:
+            shutil.copyfile(start, bag / START_NAME)
+    if departure:
+        departure = f"{path}: {departure}, expected {_expected(run, simulation)}"
+    return Rerun(bag, simulation.time, departure)
+
+
+def _simulate(
+    run: _Run, simulation: Simulation, recorder: Recorder, progress: Callable[[float, float], None] | None
+) -> str:
+    """Run to the end; where it departs from the states that were noted, in words."""
+    forget_past(simulation)
+    outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
+    outputs.start()
+    total = run.last * simulation.model.tick_ns * 1e-9
+    applied: list[_Input] = []
+    departure = _departure(run, simulation)
+    while simulation.tick < run.last or run.failed:
+        applied = run.inputs.get(simulation.tick, applied)
+        for names, values, source in applied:
+            if source == FAULT:
+                simulation.inject(names[0], values[0])
+            else:
+                simulation.command(names, values, source)
+        try:
+            simulation.advance()
+        except SimulationError as error:
+            outputs.after_failure()
+            expected = run.failed and simulation.tick == run.last
+            return departure or ("" if expected else f"the run stops at {simulation.time:.2f} s ({error})")
+        outputs.after_tick()
+        departure = departure or _departure(run, simulation)
+        if simulation.tick > run.last:
+            return departure or f"the run goes on after {total:.2f} s, where it stopped"
+        if progress is not None:
+            progress(simulation.time, total)
+    return departure
+
+
+def _departure(run: _Run, simulation: Simulation) -> str:
+    noted = run.hashes.get(simulation.tick)
+    same = noted is None or noted == simulation.state_hash()
+    return "" if same else f"the run made again is another at {simulation.time:.2f} s (tick {simulation.tick})"
+
+
+def _expected(run: _Run, simulation: Simulation) -> str:
+    here = environment_of(simulation)
+    then = [entry for entry in run.environment if entry not in here]
+    if then:
+        return f"the versions and the machine of the first run ({', '.join(then)})"
+    return "a test that changes its line by commands and faults only"
+
+
+def _read(path: Path) -> _Run:
+    """A file of inputs; a last line that was cut short is left out. Raises BagError, SceneError."""
+    try:
+        text = read_file(path, MOST).decode("ascii", errors="replace")
+    except FileError as error:
+        raise BagError(f"{path}: {error}, expected the inputs of a run") from error
+    inputs: dict[int, list[_Input]] = {}
+    hashes: dict[int, int] = {}
+    last, failed = 0, False
+    lines = text.split("\n")[:-1]
+    try:
+        header = json.loads(lines[0])
+        if header["format"] != FORMAT:
+            raise BagError(f"{path}: format {header['format']!r} of inputs, expected {FORMAT}")
+        source = {key: str(header["scene"][key]) for key in ("text", "name", "overrides")}
+        scene = parse_scene(source["text"], source["name"], parse_overrides(source["overrides"]))
+        from_checkpoint, environment = bool(header["start"]), [str(entry) for entry in header["environment"]]
+        for line in lines[1:]:
+            entry = json.loads(line)
+            tick = int(entry["tick"])
+            if tick < last or failed:
+                raise ValueError("ticks out of order")
+            last = tick
+            if "inputs" in entry:
+                inputs[tick] = [_input(*given) for given in entry["inputs"]]
+            else:
+                hashes[tick] = int(entry["hash"])
+                failed = bool(entry.get("failed"))
+    except (IndexError, KeyError, TypeError, ValueError, RecursionError) as error:
+        raise BagError(f"{path}: is damaged ({printable(error)}), expected the inputs of a run") from error
+    return _Run(scene, from_checkpoint, environment, inputs, hashes, last, failed)
+
+
+def _input(names: Any, values: Any, source: Any) -> _Input:
+    given = tuple(map(str, names)), tuple(map(float, values)), str(source)
+    if source in (WATCHDOG, ARRIVAL) or (source == FAULT and not len(given[0]) == len(given[1]) == 1):
+        raise ValueError("nobody gives such inputs")
+    return given
