@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Frame, Plant
@@ -51,14 +52,18 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
         return style.save_png(figure, path)
 
 
-def keep_bag(scenario: Scenario, bag: Path, folder: Path) -> Path:
-    """End a scenario's recording and move it to a folder, in place of one of that name."""
+def keep_bag(scenario: Scenario, inputs: Path, folder: Path) -> str:
+    """End a scenario, run it again with its inputs and record that to a folder, in place of one of that name.
+
+    Returns the folder, and why what is in it is not the same run, if so. Raises as `rerun`, and OSError.
+    """
     scenario.close()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    made = rerun(inputs, inputs / folder.name)
     if folder.exists():
         shutil.rmtree(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    shutil.move(bag, folder)
-    return folder
+    shutil.move(made.bag, folder)
+    return f"{folder} ({made.departure})" if made.departure else str(folder)
 
 
 def traced(scenario: Scenario) -> list[str]:

@@ -11,7 +11,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.input_log import InputLog
+from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ON, AlarmChanges, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
@@ -68,21 +69,20 @@ class Scenario(AbstractContextManager["Scenario"]):
         scene: Scene | str | PathLike[str],
         overrides: Mapping[str, Any] | None = None,
         *,
+        start: str | PathLike[str] | None = None,
         bag: Path | None = None,
+        inputs: Path | None = None,
     ) -> None:
         """scene: one that was loaded, a scene file, or the name of a shipped one. overrides: laid over a file's fields.
+        start: checkpoint of the same scene to begin from; None: its bottles are as the scene has them.
         bag: folder to record to from the start, new or empty; None: nothing is recorded.
+        inputs: folder to write the inputs to as they come, of which `conveyor-sim recover` makes the bag; None: none.
 
-        Raises SceneError for a scene that can't be, BagError if it can't be recorded, ValueError for overrides of a
-        loaded scene.
+        Raises SceneError for a scene that can't be, CheckpointError for a start that is missing, damaged or of another
+        scene, BagError if it can't be recorded, ValueError for overrides of a loaded scene.
         """
-        if isinstance(scene, Scene):
-            if overrides is not None:
-                raise ValueError("overrides given for a scene that is loaded, expected them where it is loaded")
-        else:
-            scene = load_scene(scene_path(Path(scene)), overrides)
-        self.scene = scene
-        self.simulation = Simulation(scene)
+        self.scene = scene_of(scene, overrides)
+        self.simulation = Simulation(self.scene) if start is None else Simulation.load(start, scene=self.scene)
         self.history = History(self.simulation.process_image)
         self.failed: Assertion | None = None
         """The condition that failed."""
@@ -92,7 +92,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._scan_read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag)
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
+        forget_past(self.simulation)
         self._outputs.start()
+        began = None if start is None else Path(start)
+        self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
         self._controller: Controller | None = None
         self._node: AttachedNode | None = None
         self._answer: dict[str, float] = {}
@@ -101,6 +104,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._standing: list[Assertion] = []
         self._signals: dict[str, float] = {}
         self._look()
+        if standing := {f"{ALARMS}{name}": 1.0 for name in sorted(self.simulation.alarms)}:
+            self._alarms = self._changes.of(standing)
+            self.history.alarms(self._alarms)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -110,6 +116,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._end_node()
         if self._recorder is not None:
             self._recorder.close()
+        if self._inputs is not None:
+            self._inputs.close()
+            self._inputs = None
 
     @property
     def time(self) -> float:
@@ -264,11 +273,17 @@ class Scenario(AbstractContextManager["Scenario"]):
         if self._answer:
             source = CONTROLLER if self._node is None else LOCKSTEP
             self.simulation.command(tuple(self._answer), tuple(self._answer.values()), source)
+        if self._inputs is not None:
+            self._inputs.before_tick()
         try:
             self.simulation.advance()
         except SimulationError:
             self._outputs.after_failure()
+            if self._inputs is not None:
+                self._inputs.after_failure()
             raise
+        if self._inputs is not None:
+            self._inputs.after_tick()
         refused = []
         outcomes = self._outputs.after_tick()
         if self._node is not None:
@@ -322,3 +337,12 @@ class Scenario(AbstractContextManager["Scenario"]):
         if not (math.isfinite(seconds) and seconds >= 0.0):
             raise ValueError(f"{seconds:g} s given, expected 0 s or more")
         return math.ceil(seconds / self.scene.tick - _ROUNDING)
+
+
+def scene_of(scene: Scene | str | PathLike[str], overrides: Mapping[str, Any] | None) -> Scene:
+    """The scene that a Scenario's arguments mean; raises as that does."""
+    if not isinstance(scene, Scene):
+        return load_scene(scene_path(Path(scene)), overrides)
+    if overrides is not None:
+        raise ValueError("overrides given for a scene that is loaded, expected them where it is loaded")
+    return scene

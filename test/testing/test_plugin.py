@@ -94,7 +94,7 @@ def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) 
     (place / "bag").mkdir(parents=True)
     (place / "bag" / "old").touch()
     pytester.runpytest_inprocess(*PLUGIN, "-k", "test_fails").assert_outcomes(failed=1, deselected=4)
-    assert sorted(file.name for file in (place / "bag").iterdir()) == ["bag_1_0.mcap", "metadata.yaml"]
+    assert sorted(file.name for file in (place / "bag").iterdir()) == ["bag_0.mcap", "metadata.yaml"]
 
 
 def test_pytest_finds_it_by_itself() -> None:
