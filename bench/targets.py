@@ -55,6 +55,11 @@ def _control(contestant: str, quantity: str) -> Callable[[Rows], float | None]:
     return lambda rows: _middle(rows.spread(control.CASE, 0, contestant, quantity))
 
 
+def _evidence(rows: Rows) -> float | None:
+    ratio = _middle(rows.ratio(control.CASE, 0, control.WITH_EVIDENCE, control.DOWNSTREAM_STOP, control.WHOLE))
+    return None if ratio is None else ratio - 1.0
+
+
 def _middle(spread: Spread | None) -> float | None:
     return None if spread is None else spread.middle
 
@@ -120,6 +125,7 @@ TARGETS = (
         40.0,
         _control(control.DOWNSTREAM_STOP, control.FACTOR),
     ),
+    Target("what evidence adds to it", "control", MOST, 0.2, _evidence),
 )
 
 

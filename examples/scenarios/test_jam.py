@@ -76,10 +76,8 @@ def test_a_wedged_pair_is_alarmed(line: Lines, wedge: str) -> None:
     check_wedge(wedged(line, wedge), alarm())
 
 
-def test_ten_minutes_nose_to_tail_raise_no_alarm() -> None:
-    # Not recorded, as `line` would: that costs as much as the run.
-    with Scenario(LINE) as plant:
-        check_queue(plant, alarm())
+def test_ten_minutes_nose_to_tail_raise_no_alarm(line: Lines) -> None:
+    check_queue(line(LINE), alarm())
 
 
 def test_edges_of_an_eye_are_no_passages(line: Lines) -> None:

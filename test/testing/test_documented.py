@@ -11,7 +11,7 @@ from conveyor_sim.testing import Scenario
 DOCS = Path(__file__).parent.parent.parent / "docs"
 PAGE = (DOCS / "testing_control_logic.md").read_text()
 BLOCKS = re.findall(r"```(?:python|yaml)\n# (\S+)\n(.*?)```", PAGE, re.DOTALL)
-NAMES = ["test_first.py", "table.yaml", "level.py", "test_level.py", "level.py", "by_hand.py"]
+NAMES = ["test_first.py", "table.yaml", "level.py", "test_level.py", "level.py", "test_warm.py", "by_hand.py"]
 PLUGIN = ("-p", "conveyor_sim.testing.plugin", "-p", "no:cacheprovider")
 
 
@@ -52,8 +52,13 @@ def test_the_mended_controller_passes(pytester: pytest.Pytester) -> None:
     assert not (pytester.path / "line-failures").exists()
 
 
+def test_it_starts_from_a_warm_line(pytester: pytest.Pytester) -> None:
+    write(pytester.path, 1, 4, 5)
+    pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
+
+
 def test_it_goes_without_pytest(capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(BLOCKS[5][1], "by_hand.py", "exec"), {})
+    exec(compile(BLOCKS[6][1], "by_hand.py", "exec"), {})
     assert capsys.readouterr().out == "0.1\n"
 
 
