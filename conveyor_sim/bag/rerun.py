@@ -59,22 +59,32 @@ def rerun(folder: Path, bag: Path, progress: Callable[[float, float], None] | No
 
     A copy of the checkpoint from which the run began, if it did, is put into the bag's folder: a replay needs it.
     progress(done, total) is called with simulated times, s. Raises BagError for inputs that are missing, damaged or
-    still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not sound.
+    still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not sound. What ends
+    it early leaves no bag.
     """
     path = folder / FILE_NAME
     run = _read(path)
     with alone(path):
         start = folder / START_NAME
-        simulation = Simulation.load(start, scene=run.scene) if run.from_checkpoint else Simulation(run.scene)
-        simulation.take_waiting()  # of a checkpoint; it is among the inputs
+        if run.from_checkpoint:
+            simulation = Simulation.load(start, scene=run.scene)
+            simulation.take_waiting()  # it is among the inputs
+            forget_past(simulation)
+        else:
+            simulation = Simulation(run.scene)
         if run.last < simulation.tick:
             raise BagError(f"{path}: ends at tick {run.last}, expected the start, tick {simulation.tick}, or later")
-        with Recorder(bag) as recorder:
-            departure = _simulate(run, simulation, recorder, progress)
-        if run.from_checkpoint:
-            shutil.copyfile(start, bag / START_NAME)
+        recorder = Recorder(bag)
+        try:
+            with recorder:
+                departure = _simulate(run, simulation, recorder, progress)
+            if run.from_checkpoint:
+                shutil.copyfile(start, bag / START_NAME)
+        except BaseException:
+            shutil.rmtree(bag, ignore_errors=True)
+            raise
     if departure:
-        departure = f"{path}: {departure}, expected {_expected(run, simulation)}"
+        departure += f", expected {_expected(run, simulation)}"
     return Rerun(bag, simulation.time, departure)
 
 
@@ -82,7 +92,6 @@ def _simulate(
     run: _Run, simulation: Simulation, recorder: Recorder, progress: Callable[[float, float], None] | None
 ) -> str:
     """Run to the end; where it departs from the states that were noted, in words."""
-    forget_past(simulation)
     outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
     outputs.start()
     total = run.last * simulation.model.tick_ns * 1e-9

@@ -45,5 +45,5 @@ def recover_runs(folder: Path) -> bool:
             made = rerun(place, place / "bag", bar.update)
         click.echo(f"{made.bag}: the run up to {made.end:.2f} s")
         if made.departure:
-            raise BagError(made.departure)
+            raise BagError(f"{place}: {made.departure}")
     return bool(folders)

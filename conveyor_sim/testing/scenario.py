@@ -92,9 +92,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._scan_read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag)
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
-        forget_past(self.simulation)
-        self._outputs.start()
         began = None if start is None else Path(start)
+        if began is not None:
+            forget_past(self.simulation)
+        self._outputs.start()
         self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
         self._controller: Controller | None = None
         self._node: AttachedNode | None = None

@@ -152,7 +152,7 @@ def test_a_line_that_was_changed_by_hand_is_not_the_same_run(tmp_path: Path) -> 
     recorded(tmp_path, pushed)
     made = rerun(tmp_path / "inputs", tmp_path / "made")
     # It is noticed at the next state that was noted.
-    assert made.departure.endswith(
+    assert made.departure == (
         "the run made again is another at 3.00 s (tick 300), expected a test that changes its line by commands and "
         "faults only"
     )
@@ -189,6 +189,20 @@ def test_inputs_that_make_no_sense(tmp_path: Path, change: Callable[[list[str]],
         rerun(tmp_path / "inputs", tmp_path / "made")
     assert str(error.value).startswith(f"{file}: ") and "\n" not in str(error.value)
     assert not (tmp_path / "made").exists()
+
+
+def test_what_ends_it_early_leaves_no_bag(tmp_path: Path) -> None:
+    recorded(tmp_path, lambda table: table.run_for(1.0))
+
+    def interrupt(done: float, total: float) -> None:
+        assert total == 1.0
+        if done > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rerun(tmp_path / "inputs", tmp_path / "made", interrupt)
+    assert not (tmp_path / "made").exists()
+    assert rerun(tmp_path / "inputs", tmp_path / "made").end == 1.0
 
 
 def test_inputs_that_are_not_there_or_are_there_already(tmp_path: Path, table: Scenario) -> None:

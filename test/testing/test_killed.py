@@ -18,6 +18,7 @@ from conveyor_sim.bag.input_log import FILE_NAME
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.control import Constant
+from conveyor_sim.errors import CheckpointError
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing import Scenario
@@ -127,6 +128,8 @@ def test_a_test_that_is_running_has_left_nothing(tmp_path: Path) -> None:
     one, other = Lines(root / "test"), Lines(root / "test")
     for lines in (one, other):
         lines(TABLE).run_for(0.1)
+        with pytest.raises(CheckpointError, match="no such file, expected a checkpoint"):
+            lines(TABLE, start=tmp_path / "missing.npz")
     names = ["test.unfinished", "test.unfinished_2"]
     assert sorted(folder.name for folder in root.iterdir()) == names
     assert left_over(root) == []

@@ -32,6 +32,13 @@ def test_of_two_lines(line, what):
     lines = [line(TABLE), line(TABLE)]
     assert lines[1].simulation.tick == 1, "not yet"
 
+def test_moves_bottles_by_hand(line):
+    table = line(TABLE)
+    table.run_for(2.0)
+    with table.simulation.editing() as (bottles, slots):
+        bottles.x[slots] += 0.01
+    assert table.simulation.tick == 1
+
 @pytest.mark.xfail(strict=True)
 def test_known_to_fail(line):
     line(TABLE).always(lambda s: False, for_=0.1)
@@ -57,9 +64,9 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Ru
 
 
 def test_a_failure_leaves_bag_and_picture_and_tells_where(run: pytest.RunResult, pytester: pytest.Pytester) -> None:
-    run.assert_outcomes(passed=1, failed=2, xfailed=1, errors=1)
+    run.assert_outcomes(passed=1, failed=3, xfailed=1, errors=1)
     kept = pytester.path / "kept"
-    names = ["fails", "of_two_lines_a_b_c", "that_cannot_begin"]
+    names = ["fails", "moves_bottles_by_hand", "of_two_lines_a_b_c", "that_cannot_begin"]
     assert sorted(folder.name for folder in kept.iterdir()) == [f"test_table.py_test_{name}" for name in names]
     assert not list((pytester.path / "temporary").iterdir())
 
@@ -76,6 +83,8 @@ def test_a_failure_leaves_bag_and_picture_and_tells_where(run: pytest.RunResult,
 
     second = kept / "test_table.py_test_of_two_lines_a_b_c" / "line_2"
     assert (second / "line.png").exists() and (second / "bag" / "metadata.yaml").exists()
+    # What can't be made again is said so.
+    run.stdout.fnmatch_lines([f"bag: {kept}/test_table.py_test_moves_*/bag (the run made again is another at 2.00 s *"])
     # The report ends where the test does, not inside of the kit.
     assert "scenario.py" not in run.stdout.str()
 
@@ -84,7 +93,7 @@ def test_what_cannot_be_kept_is_told(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_table=TESTS)
     (pytester.path / "kept").write_text("a file in the way")
     result = pytester.runpytest_inprocess(*PLUGIN, "--line-failures", "kept", "-k", "test_fails")
-    result.assert_outcomes(failed=1, deselected=4)
+    result.assert_outcomes(failed=1, deselected=5)
     result.stdout.fnmatch_lines(["bag: not kept: *", "picture: not kept: *"])
 
 
@@ -93,7 +102,7 @@ def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) 
     place = pytester.path / "line-failures" / "test_table.py_test_fails"
     (place / "bag").mkdir(parents=True)
     (place / "bag" / "old").touch()
-    pytester.runpytest_inprocess(*PLUGIN, "-k", "test_fails").assert_outcomes(failed=1, deselected=4)
+    pytester.runpytest_inprocess(*PLUGIN, "-k", "test_fails").assert_outcomes(failed=1, deselected=5)
     assert sorted(file.name for file in (place / "bag").iterdir()) == ["bag_0.mcap", "metadata.yaml"]
 
 
