@@ -57,10 +57,8 @@ def pytest_command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "pytest", *PLUGIN, "-p", "no:xdist", *arguments]
 
 
-@pytest.fixture(scope="module")
-def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a pytest that was killed at a known tick."""
-    folder = tmp_path_factory.mktemp("killed")
+def end_by(kind: signal.Signals, folder: Path) -> None:
+    """Run the test that hangs in a pytest of its own, in a folder, and end that by a signal at a known tick."""
     (folder / "test_killed.py").write_text(TESTS)
     with Scenario(TABLE) as table:
         table.run_for(FIRST * 0.01)
@@ -70,7 +68,15 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         while not (folder / "hangs").exists():
             assert child.poll() is None and time.monotonic() < end
             time.sleep(0.05)
-        os.kill(child.pid, signal.SIGKILL)
+        assert (folder / LEFT).is_dir()
+        os.kill(child.pid, kind)
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a pytest that was killed."""
+    folder = tmp_path_factory.mktemp("killed")
+    end_by(signal.SIGKILL, folder)
     return folder
 
 
@@ -120,6 +126,11 @@ def test_the_next_run_says_what_is_left_and_lets_it_be(killed: Path, pytester: p
     assert CliRunner().invoke(main, ["recover", str(left)]).exit_code == 0
     result = pytester.runpytest_inprocess(*PLUGIN, "-k", "passes")
     result.stdout.no_fnmatch_line("*killed tests have left*")
+
+
+def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
+    end_by(signal.SIGINT, tmp_path)
+    assert not (tmp_path / "line-failures").exists()
 
 
 def test_a_test_that_is_running_has_left_nothing(tmp_path: Path) -> None:
