@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -17,6 +18,10 @@ from conveyor_sim.bag.topics import Topic
 from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.pacing import RateCap
+
+NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
+"""An executor asks about each event of each publisher whenever it waits: a third of a lockstep scan. The subscriber,
+which has the same event, logs that the two do not fit."""
 
 
 def ros_qos(qos: Qos) -> QoSProfile:
@@ -50,7 +55,9 @@ class RosSink:
         self._publishers: dict[str, Publisher] = {}
         self._latched = {name for name, topic in topics.items() if topic.qos.latched}
         for name, topic in topics.items():
-            publisher = node.create_publisher(message_class(topic.type), name, ros_qos(topic.qos))
+            publisher = node.create_publisher(
+                message_class(topic.type), name, ros_qos(topic.qos), event_callbacks=NO_EVENTS
+            )
             check_type(node, publisher.topic_name, topic.type, distro)
             self._publishers[name] = publisher
 

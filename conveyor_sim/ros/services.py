@@ -8,7 +8,7 @@ fields, so one handler serves both.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from importlib import import_module
 from types import ModuleType
 from typing import Any, TypeVar
@@ -38,10 +38,14 @@ FEATURES = (20, 24, 25, 26, 31, 32)
 SCOPE_DEFAULT, SCOPE_TIME, SCOPE_STATE = 0, 1, 2
 
 PREFIX = "simulation_interfaces/"
+PROMPT = 0.001
+"""s of wall time that the executor waits for an answer itself: most come sooner than it could be woken for them."""
 
 
 async def settled(executor: Executor, future: Future[T]) -> T:
     """Result of a future that another thread sets, awaited in a callback of `executor`."""
+    if wait([future], PROMPT).done:
+        return future.result()
     arrived = RosFuture(executor=executor)
 
     def wake(_: Future[T]) -> None:
