@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import control, dense, growth, node, plant, start
+from bench import control, dense, growth, lockstep, node, plant, start
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
@@ -53,6 +53,10 @@ def _node(rows: Rows) -> float | None:
 
 def _control(contestant: str, quantity: str) -> Callable[[Rows], float | None]:
     return lambda rows: _middle(rows.spread(control.CASE, 0, contestant, quantity))
+
+
+def _lockstep(quantity: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(lockstep.CASE, 0, lockstep.SCENE, quantity))
 
 
 def _evidence(rows: Rows) -> float | None:
@@ -125,6 +129,8 @@ TARGETS = (
         40.0,
         _control(control.DOWNSTREAM_STOP, control.FACTOR),
     ),
+    Target("scans a second in lockstep over DDS", "lockstep", LEAST, 1500.0, _lockstep(lockstep.RATE)),
+    Target("s from the start of both nodes to the first scans", "lockstep", MOST, 2.0, _lockstep(lockstep.START)),
     Target("what evidence adds to it", "control", MOST, 0.2, _evidence),
 )
 
