@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 PLAIN_SHARE = 0.1
 """Where there is no terminal: a line whenever this share of the whole has been done."""
@@ -27,6 +28,13 @@ def told_if_long(sentence: str) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+class _StageLeft(TimeRemainingColumn):
+    """A guess from what is done; nothing where the caller gives the time left."""
+
+    def render(self, task: Task) -> Text:
+        return super().render(task) if task.fields["left"] is None else Text()
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
@@ -50,16 +58,16 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
                 BarColumn(bar_width=None),
                 TaskProgressColumn(),
                 TextColumn("{task.fields[state]}", markup=False),
-                TimeRemainingColumn(),
+                _StageLeft(),
             )
             self._bar = Progress(*columns, console=self._console)
-            self._task = self._bar.add_task(what, total=total, state="")
+            self._task = self._bar.add_task(what, total=total, state="", left=None)
             self._bar.start()
 
     def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
         """`done`: simulated time so far, s; `total`: the whole, where it was not known at first.
 
-        `left`: s of wall time to go, where the caller knows better than a guess from what is done.
+        `left`: s of wall time to go at most, where the caller knows better than a guess from what is done.
         """
         self._left = left
         if self._start is None:  # building and compiling come before the first tick and would look like slowness
@@ -67,14 +75,14 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         if total is not None and total != self._total:
             self._total, self._next_line = total, PLAIN_SHARE * total
         if self._bar is not None:
-            self._bar.update(self._task, completed=done, total=self._total, state=self._state(done))
+            self._bar.update(self._task, completed=done, total=self._total, state=self._state(done), left=left)
         elif done >= self._next_line:
             self._next_line += PLAIN_SHARE * self._total
-            self._console.print(f"{self._what}: {self._state(done)}", highlight=False)
+            self._console.print(f"{self._what}: {self._state(done)}", highlight=False, soft_wrap=True)
 
     def _state(self, done: float) -> str:
         if self._counted:
-            left = "" if self._left is None else f", about {self._left:.0f} s left"
+            left = "" if self._left is None else f", at most {self._left:.0f} s left"
             return f"{done:.0f} of {self._total:.0f} {self._counted}{left}"
         start, already = self._start or (time.monotonic(), done)
         wall = max(time.monotonic() - start, 1e-9)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ctypes
 import signal
 import threading
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
 from typing import Any
 
@@ -55,6 +55,21 @@ class HandledOnce(AbstractContextManager["HandledOnce"]):
         for other in self._before:
             signal.signal(other, signal.SIG_DFL)
         self._handler(number, frame)
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Ctrl-C waits until what is inside is done and is raised then; a second one ends the process at once."""
+    struck = False
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        nonlocal struck
+        struck = True
+
+    with HandledOnce([signal.SIGINT], note):
+        yield
+    if struck:
+        raise KeyboardInterrupt
 
 
 def _action(number: int) -> _Action:

@@ -101,3 +101,15 @@ def test_an_interrupt_that_a_library_makes_an_error_of_is_one_all_the_same() -> 
         "    except KeyboardInterrupt as struck:\n        raise ValueError('no validator') from struck\n"
     )
     assert interrupted(["-c", code], 0.2, "began") == (130, "began\ninterrupted\n")
+
+
+def test_an_interrupt_that_is_held_back_comes_when_the_work_is_done() -> None:
+    """What is inside ends first; a second one ends the process at once."""
+    code = (
+        "import time\nfrom conveyor_sim.support.interrupt import one_line\n"
+        "from conveyor_sim.support.signals import held_back\nwith one_line():\n    with held_back():\n"
+        "        print('began', flush=True)\n        end = time.monotonic() + 1.0\n"
+        "        while time.monotonic() < end: time.sleep(0.01)\n        print('done', flush=True)\n"
+        "    print('never')\n"
+    )
+    assert interrupted(["-c", code], 0.1, "began") == (130, "began\ndone\ninterrupted\n")

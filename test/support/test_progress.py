@@ -24,3 +24,15 @@ def test_bar_on_a_terminal_ends_at_the_whole() -> None:
         bar.update(0.5, total=1.0)
         bar.update(1.0, total=1.0)
     assert "100%" in out.getvalue()
+
+
+def test_time_left_that_the_caller_knows_is_shown_and_no_guess_beside_it() -> None:
+    out = io.StringIO()
+    with ProgressBar("settings", 0.0, Console(file=out, force_terminal=False, width=40), counted="runs") as bar:
+        bar.update(5, total=10, left=123.4)
+    assert out.getvalue() == "settings: 5 of 10 runs, at most 123 s left\n"
+    out = io.StringIO()
+    with ProgressBar("settings", 0.0, Console(file=out, force_terminal=True, width=100), counted="runs") as bar:
+        bar.update(5, total=10, left=123.4)
+    assert "at most 123 s left" in out.getvalue()
+    assert ":--" not in out.getvalue().splitlines()[-1]
