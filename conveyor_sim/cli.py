@@ -20,7 +20,7 @@ with while_importing():
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.support.progress import ProgressBar
-    from conveyor_sim.support.signals import HandledOnce
+    from conveyor_sim.support.signals import HandledOnce, held_back
     from conveyor_sim.version import __version__
 
 if TYPE_CHECKING:
@@ -208,40 +208,39 @@ def accuracy(
 ) -> None:
     """Compare settings by error and run time.
 
-    Recommends the cheapest setting that meets the tolerance on SCENE. A study that was interrupted goes on where it was
-    when the command is given again.
+    Recommends the cheapest setting that meets the tolerance on SCENE. A predicted answer comes first, then a
+    preliminary one; Ctrl-C shows the best so far, and the same command goes on with what is finished.
     """
     if find_spec("scipy") is None:
         raise ConveyorError("accuracy: scipy is not installed, expected it (pip install 'conveyor_sim[accuracy]')")
-    from conveyor_sim.accuracy.apply import apply
-    from conveyor_sim.accuracy.lines import summary
-    from conveyor_sim.accuracy.study import DEFAULT, THOROUGH, run_study, study_folder
-    from conveyor_sim.accuracy.tables import terminal
-    from conveyor_sim.runs.report import plot_function
-    from conveyor_sim.scene import load_scene
-    from conveyor_sim.support.resources import scene_path
-
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
-    path = scene_path(scene)
-    loaded = load_scene(path, outside_tables=outside_tables)
-    folder = out or study_folder(loaded)
-    effort = THOROUGH if thorough else DEFAULT
-    _say(f"study of {loaded.name} in {folder}; Ctrl-C interrupts it, the same command goes on with it")
-    _say(f"it takes up to {effort.budget / 60.0:.0f} min of processor time, after compiling")
-    study = run_study(loaded, folder, tolerance, effort, lambda what, counted: ProgressBar(what, 0.0, counted=counted))
-    for line in summary(study):
-        click.echo(line)
-    if details:
-        _print(terminal(study))
-    plot_accuracy = plot_function("plot_accuracy")
-    if plot_accuracy is not None:
-        for picture in plot_accuracy(study, folder):
+    with held_back():
+        from conveyor_sim.accuracy.apply import apply
+        from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH
+        from conveyor_sim.accuracy.session import Session
+        from conveyor_sim.accuracy.study import study_folder
+        from conveyor_sim.accuracy.tables import terminal
+        from conveyor_sim.runs.report import plot_function
+        from conveyor_sim.scene import load_scene
+        from conveyor_sim.support.resources import scene_path
+
+        path = scene_path(scene)
+        loaded = load_scene(path, outside_tables=outside_tables)
+        folder = out or study_folder(loaded)
+        session = Session(loaded, tolerance, click.echo, _say)
+        session.predict(folder, effort := THOROUGH if thorough else DEFAULT)
+    study = session.run(folder, effort, lambda what, counted: ProgressBar(what, 0.0, counted=counted))
+    if study is not None:
+        if details:
+            _print(terminal(study))
+        plot_accuracy = plot_function("plot_accuracy")
+        for picture in [] if plot_accuracy is None else plot_accuracy(study, folder):
             click.echo(f"picture: {picture}")
-    click.echo(f"numbers: {folder}/study.json, and CSV files beside it")
-    if write and study.answer is not None:
+        click.echo(f"numbers: {folder}/study.json, and CSV files beside it")
+    if write and session.setting is not None:
         copy = folder / path.name
-        apply(loaded, study.answer.setting, copy)
+        apply(loaded, session.setting, copy)
         click.echo(f"scene with the setting: {copy}")
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager
+from typing import Any
 
 from conveyor_sim.engine.compiler.compile_time import CompileTime
 
@@ -15,11 +17,27 @@ def cpu_time() -> float:
     return time.process_time() + times.children_user + times.children_system
 
 
+class _FirstCompiled(CompileTime):
+    """Says so as numba begins to compile for the first time."""
+
+    def __init__(self, compiles: Callable[[], None]) -> None:
+        super().__init__(cpu_time)
+        self._compiles = compiles
+        self._said = False
+
+    def on_start(self, event: Any) -> None:
+        if not self._said:
+            self._said = True
+            self._compiles()
+        super().on_start(event)
+
+
 class Meter(AbstractContextManager["Meter"]):
     """What this process takes from entering to leaving."""
 
-    def __init__(self) -> None:
-        self._compile_time = CompileTime(cpu_time)
+    def __init__(self, compiles: Callable[[], None] = lambda: None) -> None:
+        """compiles: called as numba begins to compile for the first time."""
+        self._compile_time = _FirstCompiled(compiles)
         self._began = cpu_time()
 
     @property

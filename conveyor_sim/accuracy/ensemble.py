@@ -70,6 +70,8 @@ class Ensemble(AbstractContextManager["Ensemble"]):
         self._scene = scene
         self._file = SampleFile(folder, scene)
         self._samples = {(sample.setting, sample.seed): sample for sample in self._file.found}
+        self.spent = 0.0
+        """s of processor time of all runs that were asked for, those that were there already included."""
         self._pool: ProcessPoolExecutor | None = None
         self._lifeline: tuple[Connection, Connection] | None = None
 
@@ -136,6 +138,7 @@ class Ensemble(AbstractContextManager["Ensemble"]):
 
     def _tell(self, wanted: Sequence[Run], progress: Progress) -> None:
         finished = [self._samples[run] for run in wanted if run in self._samples]
+        self.spent = sum(sample.cpu for sample in finished)
         per_step = [sample.cpu / sample.setting.per_tick for sample in finished]
         costs: dict[Setting, list[float]] = {}
         for sample in finished:

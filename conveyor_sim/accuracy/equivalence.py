@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from conveyor_sim.accuracy.effort import PROCESSORS
 from conveyor_sim.accuracy.ensemble import Ensemble, Progress, Run
 from conveyor_sim.accuracy.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Comparison, Sample
@@ -129,13 +130,23 @@ def run_until_decided(
             seeds += more
             made = {(sample.setting, sample.seed) for sample in samples}
             new: list[Run] = [(setting, seed) for seed in range(seeds) for setting in active]
-            samples += _added(ensemble.run(new, progress), made)
+            samples += _added(ensemble.run(new, _with_left(progress, ensemble, budget)), made)
             comparisons = decide(samples, candidates, reference, tolerance)
             undecided = {row.setting for row in comparisons if row.verdict == "undecided"}
             active = [reference, *(setting for setting in candidates if setting in undecided)] if undecided else []
             if seeds < look:
                 break
     return samples, comparisons
+
+
+def _with_left(progress: Progress, ensemble: Ensemble, budget: float) -> Progress:
+    """Progress that has the time left (s) of all looks: for the runs wanted, or the rest of the budget."""
+
+    def reported(done: int, whole: int, left: float | None) -> None:
+        rest = (budget - ensemble.spent) / PROCESSORS
+        progress(done, whole, None if left is None else max(left, rest))
+
+    return reported
 
 
 def _added(samples: Sequence[Sample], made: set[Run]) -> list[Sample]:

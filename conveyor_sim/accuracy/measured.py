@@ -3,25 +3,34 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from conveyor_sim.accuracy import closed_forms
 from conveyor_sim.accuracy.bars import Bars
-from conveyor_sim.accuracy.candidates import candidates, compared, forbidden
-from conveyor_sim.accuracy.closed_forms import orders
+from conveyor_sim.accuracy.candidates import candidates, compared, forbidden, own_setting, preset_setting
 from conveyor_sim.accuracy.cpu import Meter
+from conveyor_sim.accuracy.effort import PROCESSORS, Effort, bars_with_left
+from conveyor_sim.accuracy.forecast import forecast, foretold
+from conveyor_sim.accuracy.no_contact import NoContact
 from conveyor_sim.accuracy.plain import Unlike, plain, typed
-from conveyor_sim.accuracy.precision import WorkPrecision
+from conveyor_sim.accuracy.precision import COST_BUDGET, FIRST_COST_BUDGET, WorkPrecision
 from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.sample_file import check_origin
-from conveyor_sim.accuracy.setting import with_setting
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.accuracy.words import setting_name
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.model import build_model
+from conveyor_sim.model.remedies import STEP_COST
 from conveyor_sim.scene import Scene
 from conveyor_sim.support.machine import machine
+from conveyor_sim.timestep.presets import PRESETS
 
 MEASURED = "measured.json"
+
+BUDGET_SPENT = {"closed forms": "not run within the budget (--thorough does)"}
 
 
 @dataclass(frozen=True)
@@ -34,25 +43,41 @@ class Measured:
     reference: Reference
     points: tuple[Point, ...]
     skipped: tuple[str, ...]
-    rest: Rest
+    rest: Rest | None
+    """None as long as resting load was not looked at."""
     moving: str
     cpu: float
     """s of processor time that all this took, compiling left out."""
     compiling: float
     """s of processor time that compiling took."""
+    left_out: bool = False
+    """Whether the budget left anything out that a larger one would measure."""
 
 
-def measured_once(scene: Scene, folder: Path, bars: Bars) -> Measured:
-    """What the folder holds of this scene; measured and kept there if it holds nothing.
+def measured_once(
+    scene: Scene,
+    folder: Path,
+    tolerance: float,
+    effort: Effort,
+    bars: Bars,
+    preliminary: Callable[[Measured], None],
+    compiles: Callable[[], None],
+) -> Measured:
+    """What the folder holds of this scene; measured and kept there if it holds nothing, or less than the effort allows.
 
-    Raises ConveyorError if the folder has a study of another scene or version, or can't be written or read.
+    tolerance: relative error that decides which settings are measured first; `preliminary` is called with what came of
+    them, `compiles` as soon as something has to be compiled. Raises ConveyorError if the folder has a study of another
+    scene or version, or can't be written or read; NoContact if nothing touches anything in the scene.
     """
     check_origin(folder, scene)
     file = folder / MEASURED
     if file.exists():
-        return _read(file)
-    with Meter() as meter:
-        measured = _measure(scene, bars)
+        kept = _read(file)
+        if not kept.left_out or math.isfinite(effort.measuring):
+            return kept
+    with Meter(compiles) as meter:
+        left = bars_with_left(bars, lambda: max(0.0, effort.budget / PROCESSORS - meter.cpu))
+        measured = _measure(scene, tolerance, effort, left, meter, preliminary)
     measured = replace(measured, cpu=meter.cpu, compiling=meter.compiling)
     part = file.with_suffix(".part")
     try:
@@ -63,53 +88,91 @@ def measured_once(scene: Scene, folder: Path, bars: Bars) -> Measured:
     return measured
 
 
-def _measure(scene: Scene, bars: Bars) -> Measured:
+def _measure(
+    scene: Scene,
+    tolerance: float,
+    effort: Effort,
+    bars: Bars,
+    meter: Meter,
+    preliminary: Callable[[Measured], None],
+) -> Measured:
+    """What decides the answer first: impacts of a few settings, resting load, the other settings, closed forms."""
     banned = forbidden(scene)
-    integrators = compared(scene)
-    with bars(f"{scene.name}: closed forms", "cases") as bar:
-        found, without = orders(scene, integrators, bar.update)
     precision = WorkPrecision(scene)
     with bars(f"{scene.name}: states to start from", "s") as bar:
         precision.find_starts(bar.update)
+    if precision.untouched is not None:
+        raise NoContact(precision.untouched)
     with bars(f"{scene.name}: horizons", "starts") as bar:
         precision.find_horizons(bar.update)
     with bars(f"{scene.name}: reference", "runs") as bar:
         reference = precision.make_reference(bar.update)
-    with bars(f"{scene.name}: resting load", "s") as bar:
-        precision.find_rest(bar.update)
-    with bars(f"{scene.name}: resting load, reference", "runs") as bar:
-        rest = precision.make_resting_reference(bar.update)
-    with bars(f"{scene.name}: settings", "runs") as bar:
-        points = precision.measure(candidates(scene), bar.update)
-    skipped = [f"{name}: {reason}" for name, reason in {**without, **banned}.items()]
-    return Measured(
+    found = Measured(
         machine=machine(),
-        orders=tuple(found),
+        orders=(),
         horizons=tuple(precision.horizons),
         reference=reference,
-        points=tuple(foretold(scene, point) for point in points),
-        skipped=tuple(skipped),
-        rest=rest,
+        points=(),
+        skipped=(),
+        rest=None,
         moving=precision.moving,
         cpu=0.0,
         compiling=0.0,
     )
-
-
-def foretold(scene: Scene, point: Point) -> Point:
-    """The point with what is known without measuring: predicted errors, and how far its step is from stability.
-
-    Predictions know no other stiffness to compare with.
-    """
-    model = build_model(with_setting(scene, point.setting))
-    bounds = [bound.dt for bound in model.bounds if bound.stability]
-    own = point.setting.stiffness == 1.0
+    wanted = candidates(scene)
+    with bars(f"{scene.name}: first settings", "runs") as bar:
+        first = first_settings(scene, tolerance)
+        precision.try_out(first, bar.update)
+    with bars(f"{scene.name}: their cost", "runs") as bar:
+        points = precision.points(first, FIRST_COST_BUDGET, bar.update)
+    preliminary(replace(found, points=tuple(foretold(scene, point) for point in points)))
+    rest = _rest(scene, precision, bars)
+    with bars(f"{scene.name}: settings", "runs") as bar:
+        left_out = precision.try_out(
+            list(dict.fromkeys([*first, *cheapest_first(wanted)])), bar.update, lambda: meter.cpu > effort.measuring
+        )
+    with bars(f"{scene.name}: costs", "runs") as bar:
+        points = precision.points(wanted, COST_BUDGET, bar.update)
+    skipped = [f"{name}: {reason}" for name, reason in banned.items()]
+    spent = meter.cpu > effort.measuring
+    orders, without = ((), BUDGET_SPENT) if spent else _closed_forms(scene, bars)
+    skipped += [f"{name}: {reason}" for name, reason in without.items()]
+    if left_out:
+        names = "; ".join(setting_name(setting, scene.tick) for setting in left_out)
+        skipped.append(f"Not measured within the budget (--thorough does): {names}")
     return replace(
-        point,
-        predicted=model.prediction.value if own else None,
-        predicted_resting=model.prediction.resting if own else None,
-        beyond=model.dt / min(bounds) if bounds else None,
+        found,
+        orders=orders,
+        points=tuple(foretold(scene, point) for point in points),
+        skipped=tuple(skipped),
+        rest=rest,
+        left_out=spent,
     )
+
+
+def first_settings(scene: Scene, tolerance: float) -> list[Setting]:
+    """What a preliminary answer is made of: the setting predicted to do, the scene's own, and the presets."""
+    predicted = forecast(scene, tolerance).point
+    found = [] if predicted is None else [predicted.setting]
+    return list(dict.fromkeys([*found, own_setting(scene), *(preset_setting(scene, preset) for preset in PRESETS)]))
+
+
+def cheapest_first(settings: Sequence[Setting]) -> list[Setting]:
+    """In the order of the work that a second takes, softer contacts last: they decide no answer."""
+    return sorted(settings, key=lambda one: (one.stiffness != 1.0, one.per_tick * STEP_COST[one.integrator], one.key))
+
+
+def _rest(scene: Scene, precision: WorkPrecision, bars: Bars) -> Rest:
+    with bars(f"{scene.name}: resting load", "s") as bar:
+        precision.find_rest(bar.update)
+    with bars(f"{scene.name}: resting load, reference", "runs") as bar:
+        return precision.make_resting_reference(bar.update)
+
+
+def _closed_forms(scene: Scene, bars: Bars) -> tuple[tuple[Order, ...], dict[str, str]]:
+    with bars(f"{scene.name}: closed forms", "cases") as bar:
+        found, without = closed_forms.orders(scene, compared(scene), bar.update)
+    return tuple(found), without
 
 
 def _read(file: Path) -> Measured:

@@ -1,7 +1,7 @@
 """Work-precision on a scene: errors and cost of settings over a horizon in which trajectories can be compared."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from conveyor_sim.accuracy.chatter import ChatterProbe
 from conveyor_sim.accuracy.deviation import errors_of
@@ -27,16 +27,32 @@ MOST_WORK = 5e6
 COST_BUDGET = 20.0
 """s that measuring costs may take."""
 
+FIRST_COST_BUDGET = 2.0
+"""The same, of the first settings, which are measured again with the others."""
+
 Progress = Callable[[float, float], None]
 """Called with what is done so far and the whole."""
+
+
+@dataclass
+class _Trial:
+    """What came of a setting's runs."""
+
+    failure: str
+    errors: Errors | None = None
+    simulation: Simulation | None = None
+    rested: bool = False
+    """Whether resting load was looked at."""
+    resting: float | None = None
 
 
 class WorkPrecision:
     """Compares settings on a scene, which must run at the preset `standard`.
 
-    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, then `measure`, as often as there are
-    settings, and before it `find_rest` and `make_resting_reference` if resting load is to be looked at; each reports
-    its progress. SceneError or SimulationError if the scene does not run.
+    To be called in this order: `find_starts`, `find_horizons`, `make_reference`, then `try_out` and `points`, or both
+    as `measure`, as often as there are settings; `find_rest` and `make_resting_reference` come before the settings of
+    which resting load is to be looked at. Each reports its progress. SceneError or SimulationError if the scene does
+    not run.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -44,15 +60,19 @@ class WorkPrecision:
         self.starts: list[Start] = []
         self.moving = ""
         """A sentence on what moving rails did; empty where there are none."""
+        self.untouched: float | None = None
+        """s, simulated, in which nothing touched anything; None if something did."""
         self.resting = RestingLoad(scene)
         self.horizons: list[Horizon] = []
         self.reference: Reference | None = None
         self._true: list[Trajectory] = []
+        self._trials: dict[Setting, _Trial] = {}
 
     def find_starts(self, progress: Progress) -> None:
         """Run the scene and keep states of it."""
         found = find_starts(self.scene, progress)
         self.starts, self.moving = found.starts, found.moving
+        self.untouched = None if found.touched else found.looked
 
     def find_rest(self, progress: Progress) -> None:
         """Look for a settled state, from which errors in resting load are measured; progress in simulated s."""
@@ -113,42 +133,56 @@ class WorkPrecision:
         A setting of another stiffness is compared from the start before the first contact alone: the others are no
         states of its.
         """
-        errors: dict[Setting, Errors] = {}
-        failures: dict[Setting, str] = {}
-        running: dict[Setting, Simulation] = {}
-        resting: dict[Setting, float | None] = {}
+        whole = 2 * len(settings)
+        self.try_out(settings, lambda done, _: progress(done, whole))
+        return self.points(settings, COST_BUDGET, lambda done, of: progress(len(settings) * (1.0 + done / of), whole))
+
+    def try_out(
+        self, settings: Sequence[Setting], progress: Progress, enough: Callable[[], bool] = lambda: False
+    ) -> list[Setting]:
+        """Run settings, but for what was run before; progress in settings. Returns those left out once it is enough."""
         for done, setting in enumerate(settings):
-            progress(done, 2 * len(settings))
-            simulation = variant(self.scene, setting)
-            runs, failure = self._runs(simulation, setting)
-            if failure:
-                failures[setting] = failure
-                continue
-            try:
-                resting[setting] = self._resting(simulation, setting)
-            except SimulationError as error:
-                failures[setting] = f"{error.kind}: {error}"
-            else:
-                errors[setting], running[setting] = errors_of(runs), simulation
-        costs = costs_of(
-            running,
-            self.starts[-1].simulation,
-            COST_BUDGET,
-            lambda done, whole: progress(len(settings) * (1.0 + done / whole), 2 * len(settings)),
-        )
-        progress(2 * len(settings), 2 * len(settings))
+            progress(done, len(settings))
+            if enough():
+                return [left for left in settings[done:] if left not in self._trials]
+            trial = self._trials.get(setting) or self._run(setting)
+            self._trials[setting] = trial
+            self._look_at_rest(trial, setting)
+        progress(len(settings), len(settings))
+        return []
+
+    def points(self, settings: Sequence[Setting], budget: float, progress: Progress) -> list[Point]:
+        """What came of settings that were tried out; their costs are measured in turns within a budget (s)."""
+        trials = {setting: self._trials[setting] for setting in settings if setting in self._trials}
+        running = {setting: trial.simulation for setting, trial in trials.items() if trial.simulation is not None}
+        costs = costs_of(running, self.starts[-1].simulation, budget, progress)
         return [
             Point(
                 setting=setting,
                 dt=setting.dt(self.scene),
                 predicted=None,
-                errors=errors.get(setting),
+                errors=trial.errors,
                 cost=costs.get(setting),
-                failure=failures.get(setting, ""),
-                resting=resting.get(setting),
+                failure=trial.failure,
+                resting=trial.resting,
             )
-            for setting in settings
+            for setting, trial in trials.items()
         ]
+
+    def _run(self, setting: Setting) -> _Trial:
+        simulation = variant(self.scene, setting)
+        runs, failure = self._runs(simulation, setting)
+        return _Trial(failure) if failure else _Trial("", errors_of(runs), simulation)
+
+    def _look_at_rest(self, trial: _Trial, setting: Setting) -> None:
+        """Once there is a reference; a setting that stops the run then has failed."""
+        if trial.simulation is None or trial.rested or self.resting.reference is None:
+            return
+        trial.rested = True
+        try:
+            trial.resting = self._resting(trial.simulation, setting)
+        except SimulationError as error:
+            trial.failure, trial.errors, trial.simulation = f"{error.kind}: {error}", None, None
 
     def _follow(self, simulation: Simulation, index: int, start: Start) -> Trajectory:
         """From a start over its horizon and a tick, which `errors_of` wants besides."""

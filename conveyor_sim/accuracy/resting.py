@@ -36,6 +36,12 @@ SETTLED = 0.01
 IN_A_ROW = 2
 """Windows that must change so little: of two contacts that happen to last, one may agree by chance."""
 
+TICK_WORK = 4e3
+"""Bottle steps that cost as much as a tick beside its steps, in round numbers."""
+
+CONTACT_WORK = 50.0
+"""Bottle steps that cost as much as to take down a contact's force at a tick."""
+
 LONGER = 2.0
 """Times the scene's duration that it may take to settle: its infeeds and outfeeds go on as in the scene."""
 
@@ -94,7 +100,8 @@ class RestingLoad:
         while fine.time + WINDOW <= limit + 0.5 * self.scene.tick and work < MOST_WORK:
             progress(fine.time, limit)
             now = mean_loads(fine)
-            work += max(1, fine.counts.present) * fine.model.steps_per_tick * WINDOW / self.scene.tick
+            steps = max(1, fine.counts.present) * fine.model.steps_per_tick
+            work += (steps + TICK_WORK + CONTACT_WORK * now.force.size) * WINDOW / self.scene.tick
             change = None if before is None else difference(now, before)
             rested = rested or now.force.size > 0
             steady = steady + 1 if change is not None and change <= SETTLED else 0

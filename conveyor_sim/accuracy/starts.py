@@ -23,6 +23,12 @@ PARTS = 3
 MOST_WORK = 4e8
 """Bottle steps of the run in which starts are looked for, some ten seconds: what is longer is looked at in part."""
 
+UNTOUCHED_WORK = 1.2e9
+"""The same as long as nothing has touched anything: bottles that only ride cost less, and no second run follows."""
+
+TICK_WORK = 4e3
+"""Bottle steps that cost as much as the rest of a tick, in round numbers."""
+
 STROKED = (
     "Moving rails were sent to and fro where impacts are compared; in resting load and long runs they stood still."
 )
@@ -50,29 +56,36 @@ class Found:
     """In order of time."""
     moving: str
     """A sentence on what moving rails did; empty where there are none."""
+    looked: float
+    """s, simulated, of the run that was looked at."""
+    touched: bool
+    """Whether any contact closed in that time."""
 
 
 def find_starts(scene: Scene, progress: Progress) -> Found:
-    """One start before the first contact of the run, and one before the strongest of each part.
+    """One start before the first contact of the run, one before the strongest of each part; its end without contacts.
 
     The scene runs at the preset `standard`, its moving rails to and fro (`Exercise`); where they stop the run, they
     stand still instead, which is said. Tangential springs start anew at a start. SimulationError if it fails.
     Progress in simulated seconds; the scene runs twice.
     """
     if not Exercise(scene):
-        return Found(_find(scene, None, progress), "")
+        return _find(scene, None, "", progress)
     try:
-        return Found(_find(scene, Exercise(scene), progress), STROKED)
+        return _find(scene, Exercise(scene), STROKED, progress)
     except SimulationError as error:
-        return Found(_find(scene, None, progress), f"{STILL} (sent to and fro, they stop the run: {error}).")
+        return _find(scene, None, f"{STILL} (sent to and fro, they stop the run: {error}).", progress)
 
 
-def _find(scene: Scene, exercise: Exercise | None, progress: Progress) -> list[Start]:
+def _find(scene: Scene, exercise: Exercise | None, moving: str, progress: Progress) -> Found:
     setting = Setting("leapfrog", standard_steps(scene))
     whole = 2.0 * scene.duration
-    strongest = _strongest(scene, setting, exercise, lambda share: progress(share * scene.duration, whole))
+    looked, strongest = _strongest(scene, setting, exercise, lambda share: progress(share * scene.duration, whole))
     touched = np.flatnonzero(strongest)
-    first = int(touched[0]) if touched.size else strongest.size // 2
+    if not touched.size:
+        progress(whole, whole)
+        return Found([_start(scene, setting, looked, True)], moving, looked.time, False)
+    first = int(touched[0])
     chosen = {first}
     for part in np.array_split(np.arange(strongest.size), PARTS):
         if part.size and strongest[part].max() > 0.0:
@@ -84,11 +97,16 @@ def _find(scene: Scene, exercise: Exercise | None, progress: Progress) -> list[S
         while again.tick < tick:
             _advance(again, exercise)
             progress((1.0 + again.tick / ticks[-1]) * scene.duration, whole)
-        state = variant(scene, setting)
-        state.restore_from(again)
-        starts.append(Start(state, untouched=tick == first))
+        starts.append(_start(scene, setting, again, tick == first))
     progress(whole, whole)
-    return starts
+    return Found(starts, moving, looked.time, True)
+
+
+def _start(scene: Scene, setting: Setting, at: Simulation, untouched: bool) -> Start:
+    """At the state of a run that goes on."""
+    state = variant(scene, setting)
+    state.restore_from(at)
+    return Start(state, untouched)
 
 
 def _advance(simulation: Simulation, exercise: Exercise | None) -> None:
@@ -97,18 +115,25 @@ def _advance(simulation: Simulation, exercise: Exercise | None) -> None:
     simulation.advance()
 
 
-def _strongest(scene: Scene, setting: Setting, exercise: Exercise | None, progress: Callable[[float], None]) -> F8:
-    """The largest contact force (N) in each tick of the run, (ticks,); progress as a share of what is looked at."""
+def _strongest(
+    scene: Scene, setting: Setting, exercise: Exercise | None, progress: Callable[[float], None]
+) -> tuple[Simulation, F8]:
+    """The run as far as it is looked at, and the largest contact force (N) in each of its ticks, (ticks,).
+
+    Progress as a share of that.
+    """
     simulation = variant(scene, setting, outputs={"bottles": 1e9 / scene.tick_ns})
     forces: list[float] = []
-    work = 0
-    while len(forces) < scene.duration_ticks and work < MOST_WORK:
+    work, most = 0.0, UNTOUCHED_WORK
+    while len(forces) < scene.duration_ticks and work < most:
         _advance(simulation, exercise)
         bottles = simulation.bottles()
         forces.append(float(bottles.peak_force.max(initial=0.0)))
-        work += bottles.id.size * simulation.model.steps_per_tick
-        progress(max(len(forces) / scene.duration_ticks, work / MOST_WORK))
-    return np.array(forces)
+        if forces[-1] > 0.0:
+            most = MOST_WORK
+        work += TICK_WORK + bottles.id.size * simulation.model.steps_per_tick
+        progress(min(1.0, max(len(forces) / scene.duration_ticks, work / most)))
+    return simulation, np.array(forces)
 
 
 def _lead(scene: Scene) -> int:

@@ -1,21 +1,24 @@
-"""A study from its closed forms to its answer: stage after stage, each with its progress."""
+"""A study from the first settings that are measured to its answer: stage after stage, each with its progress."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from statistics import fmean, stdev
 
 from conveyor_sim.accuracy.answer import eligible, find_answer, largest_error
 from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import own_setting, softer
-from conveyor_sim.accuracy.equivalence import run_until_decided
+from conveyor_sim.accuracy.effort import Effort
+from conveyor_sim.accuracy.equivalence import decide, run_until_decided
 from conveyor_sim.accuracy.files import write_study
+from conveyor_sim.accuracy.interim import Interim, after_measuring, preliminary, unfinished
 from conveyor_sim.accuracy.measured import Measured, measured_once
 from conveyor_sim.accuracy.results import Answer, Comparison, Point, Sample, StiffnessRow, Study
-from conveyor_sim.accuracy.sample_file import fingerprint
+from conveyor_sim.accuracy.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
 
 EXACT = 0.1
@@ -25,17 +28,8 @@ OTHERS_SHARE = 0.2
 """Of the budget for long runs: for those of the scene's own setting and of softer contacts, which decide no answer."""
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How much a study does."""
-
-    budget: float
-    """s of processor time in all, compiling left out: what is measured first takes its part, long runs get the rest."""
-
-
-DEFAULT = Effort(budget=480.0)
-"""Less than the 600 s that are promised: a run that has begun is finished, and the first of each setting is made."""
-THOROUGH = Effort(budget=6000.0)
+FIRST_RUNS = 20.0
+"""s of processor time that the first run of each setting may take in any case, however small the budget."""
 
 
 def study_folder(scene: Scene, root: Path = Path("runs")) -> Path:
@@ -43,16 +37,50 @@ def study_folder(scene: Scene, root: Path = Path("runs")) -> Path:
     return root / f"accuracy_{scene.name}_{fingerprint(scene)}"
 
 
-def run_study(scene: Scene, folder: Path, tolerance: float, effort: Effort, bars: Bars) -> Study:
+def run_study(
+    scene: Scene,
+    folder: Path,
+    tolerance: float,
+    effort: Effort,
+    bars: Bars,
+    report: Callable[[Interim], None] = lambda _: None,
+    compiles: Callable[[], None] = lambda: None,
+) -> Study:
     """Make a study, or go on with one that was interrupted: what is finished is in the folder and stays.
 
-    tolerance: relative error in impacts, in resting load, and in what long runs are judged by. Writes study.json and
-    CSV files. Raises ConveyorError if the folder has a study of another scene or version, SimulationError if the scene
-    does not run at the preset `standard`.
+    tolerance: relative error in impacts, in resting load, and in what long runs are judged by. `report` gets each
+    answer on the way: a preliminary one of the first settings, then one without long runs; where a KeyboardInterrupt
+    comes in the midst of long runs, one with those made so far. `compiles` is called as soon as something has to be
+    compiled. Writes study.json and CSV files.
+
+    Raises ConveyorError if the folder has a study of another scene or version, SimulationError if the scene does not
+    run at the preset `standard`, NoContact if nothing touches anything in it.
     """
-    measured = measured_once(scene, folder, bars)
-    samples, comparisons, reference = _long_runs(scene, measured, folder, tolerance, effort, bars)
-    study = Study(
+
+    def of_first(found: Measured) -> None:
+        report(preliminary(_study(scene, found, tolerance)))
+
+    found = measured_once(scene, folder, tolerance, effort, bars, of_first, compiles)
+    report(after_measuring(_study(scene, found, tolerance)))
+    try:
+        samples, comparisons, reference = _long_runs(scene, found, folder, tolerance, effort, bars)
+    except KeyboardInterrupt:
+        report(unfinished(_study(scene, found, tolerance, *_made_so_far(scene, found, folder, tolerance))))
+        raise
+    study = _study(scene, found, tolerance, samples, comparisons, reference)
+    write_study(study, folder)
+    return study
+
+
+def _study(
+    scene: Scene,
+    measured: Measured,
+    tolerance: float,
+    samples: Sequence[Sample] = (),
+    comparisons: Sequence[Comparison] = (),
+    reference: Setting | None = None,
+) -> Study:
+    return Study(
         scene=scene.name,
         source=scene.source_name,
         machine=measured.machine,
@@ -74,8 +102,6 @@ def run_study(scene: Scene, folder: Path, tolerance: float, effort: Effort, bars
         cpu=measured.cpu + sum(sample.cpu for sample in samples),
         compiling=measured.compiling,
     )
-    write_study(study, folder)
-    return study
 
 
 def _answer(measured: Measured, comparisons: Sequence[Comparison], tolerance: float) -> Answer | None:
@@ -88,18 +114,26 @@ def _long_runs(
     """Runs over seeds of what may be the answer, of the scene's own setting and of softer contacts; and of a reference.
 
     Where they find the answer different from the reference, the next dearer setting is tried. The budget goes to what
-    is undecided of the answer, but for a share of the others.
+    is undecided of the answer, but for a share of the others. What would not get through a single run within the
+    budget, by what it cost when it was measured, is not begun.
     """
     failed = {point.setting for point in measured.points if point.failure}
     found = _answer(measured, [], tolerance)
     reference = None if found is None else _long_reference(measured.points, found)
     if found is None or reference is None:
         return [], [], None
-    budget = max(0.0, effort.budget - measured.cpu)
+    expected = _expected(scene, measured.points)
+    # The last runs may leave all processors but one idle.
+    longest = expected.get(reference, 0.0)
+    budget = max(0.0, effort.long_runs(measured.cpu) - longest)
+    if len(affordable([reference, found.setting], expected, budget)) < 2:
+        return [], [], None
     tried: list[Setting] = []
     samples: list[Sample] = []
     comparisons: list[Comparison] = []
     while found is not None and found.setting not in (*tried, reference):
+        if tried and sum(sample.cpu for sample in samples) >= budget:
+            break
         tried.append(found.setting)
         with bars(f"{scene.name}: long runs", "runs") as bar:
             samples, comparisons = run_until_decided(
@@ -107,6 +141,7 @@ def _long_runs(
             )
         found = _answer(measured, comparisons, tolerance)
     others = [setting for setting in (own_setting(scene), *softer(scene)) if setting not in failed]
+    others = affordable(others, expected, OTHERS_SHARE * budget)
     known_cost = sum(sample.cpu for sample in samples if sample.setting == reference)
     with bars(f"{scene.name}: long runs, the scene's own setting and softer contacts", "runs") as bar:
         more, of_others = run_until_decided(
@@ -116,6 +151,41 @@ def _long_runs(
     known = {row.setting for row in comparisons}
     comparisons += [row for row in of_others if row.setting not in known]
     return list(made.values()), comparisons, reference
+
+
+def affordable(settings: Sequence[Setting], expected: Mapping[Setting, float], budget: float) -> list[Setting]:
+    """Settings, in their order, of which one run each fits a budget (s of processor time), or at least FIRST_RUNS.
+
+    Empty if the first does not fit; what a run is expected to take (s) is 0 where it is not known.
+    """
+    kept, spent = [], 0.0
+    for setting in settings:
+        spent += expected.get(setting, 0.0)
+        if spent > max(budget, FIRST_RUNS):
+            break
+        kept.append(setting)
+    return kept
+
+
+def _expected(scene: Scene, points: Sequence[Point]) -> dict[Setting, float]:
+    """s of processor time of a long run, by what settings cost when they were measured."""
+    return {point.setting: point.cost.median * scene.duration for point in points if point.cost is not None}
+
+
+def _made_so_far(
+    scene: Scene, measured: Measured, folder: Path, tolerance: float
+) -> tuple[list[Sample], list[Comparison], Setting | None]:
+    """Finished long runs of the answer and its reference, and what they amount to."""
+    found = _answer(measured, [], tolerance)
+    reference = None if found is None else _long_reference(measured.points, found)
+    if found is None or reference is None:
+        return [], [], None
+    file = SampleFile(folder, scene)
+    file.close()
+    comparisons: list[Comparison] = []
+    with suppress(ConveyorError):  # the reference failed with a seed
+        comparisons = decide(file.found, [found.setting], reference, tolerance)
+    return file.found, comparisons, reference
 
 
 def _long_reference(points: Sequence[Point], found: Answer) -> Setting | None:

@@ -1,6 +1,6 @@
 """The numbers behind docs/accuracy.md: runs the real command on the scenes below and renews the page's tables.
 
-    make accuracy                                   # all scenes, up to 10 min of two processors each
+    make accuracy                                   # all scenes, up to 5 min of two processors each
     make accuracy ARGS="funnel two_bottles"         # some of them
     make accuracy ARGS=--tables                     # measures nothing: tables and pictures anew, from docs/accuracy/
 
@@ -24,8 +24,8 @@ with while_importing():
     from conveyor_sim.accuracy.answer import find_answer
     from conveyor_sim.accuracy.apply import line
     from conveyor_sim.accuracy.files import STUDY, read_study
+    from conveyor_sim.accuracy.forecast import foretold
     from conveyor_sim.accuracy.lines import three_lines
-    from conveyor_sim.accuracy.measured import foretold
     from conveyor_sim.accuracy.results import Study
     from conveyor_sim.accuracy.tables import markdown
     from conveyor_sim.plot import plot_accuracy

@@ -25,7 +25,7 @@ with while_importing():
 
     from conveyor_sim.accuracy.candidates import compared
     from conveyor_sim.accuracy.cpu import Meter
-    from conveyor_sim.accuracy.measured import foretold
+    from conveyor_sim.accuracy.forecast import foretold
     from conveyor_sim.accuracy.precision import WorkPrecision
     from conveyor_sim.accuracy.results import Point
     from conveyor_sim.accuracy.setting import Setting

@@ -13,12 +13,14 @@ from pathlib import Path
 
 import pytest
 
+from conveyor_sim.accuracy.effort import Effort
 from conveyor_sim.accuracy.files import read_study
-from conveyor_sim.accuracy.measured import MEASURED
+from conveyor_sim.accuracy.forecast import forecast
+from conveyor_sim.accuracy.measured import MEASURED, first_settings
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.sample_file import SAMPLES
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.study import Effort, run_study, study_folder
+from conveyor_sim.accuracy.study import FIRST_RUNS, affordable, run_study, study_folder
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import load_scene
 
@@ -36,7 +38,10 @@ bottles:
 """
 
 ONE_RUN = Effort(budget=0.0)
-"""One long run of each setting: those are made in any case."""
+"""One long run of each setting: where they are as short as here, those are made in any case."""
+
+NO_TIME = Effort(budget=0.0, measuring=0.0)
+"""Spent before the first setting is measured."""
 
 
 class Silent:
@@ -101,6 +106,39 @@ def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Path) -> None:
     # Impact peaks go as the root of the stiffness.
     ratio = soft.observables["peak force, 99th percentile"][0] / stiff.observables["peak force, 99th percentile"][0]
     assert ratio == pytest.approx(0.5, rel=0.1)
+
+
+def test_a_budget_that_is_spent_leaves_settings_out_and_names_them(interrupted: Path, tmp_path: Path) -> None:
+    """The first settings are measured in any case; a larger budget measures the others, a small one keeps them."""
+    scene = load_scene(interrupted.parent / "scene.yaml")
+    short = run_study(scene, tmp_path, 0.01, NO_TIME, silent)
+    predicted = forecast(scene, 0.01).point
+    assert predicted is not None
+    first = first_settings(scene, 0.01)
+    assert first[0] == predicted.setting
+    assert {point.setting for point in short.points} == set(first)
+    assert short.answer is not None
+    assert short.orders == ()
+    assert any("not run within the budget (--thorough does)" in sentence for sentence in short.skipped)
+    (left_out,) = [sentence for sentence in short.skipped if sentence.startswith("Not measured within the budget")]
+    assert "rk4" in left_out
+    again = run_study(scene, tmp_path, 0.01, NO_TIME, silent)
+    assert again.points == short.points
+    whole = run_study(scene, tmp_path, 0.01, ONE_RUN, silent)
+    assert len(whole.points) > len(short.points)
+    assert whole.orders
+    assert not any("within the budget" in sentence for sentence in whole.skipped)
+
+
+def test_runs_that_do_not_fit_the_budget_are_not_begun() -> None:
+    """One run each, in order, up to the budget or a few seconds; what is not known costs nothing."""
+    one, two, three, unknown = (Setting("leapfrog", steps) for steps in (1, 2, 3, 4))
+    expected = {one: 30.0, two: 40.0, three: 50.0}
+    assert affordable([one, two, three], expected, 75.0) == [one, two]
+    assert affordable([two, one, unknown], expected, 70.0) == [two, one, unknown]
+    assert affordable([one, two], expected, 29.0) == []
+    assert affordable([one], {one: FIRST_RUNS}, 0.0) == [one]
+    assert affordable([one], {one: 1.01 * FIRST_RUNS}, 0.0) == []
 
 
 def test_a_folder_of_another_scene_is_refused(interrupted: Path, tmp_path: Path) -> None:

@@ -1,0 +1,53 @@
+"""How long a study may take, in processor time, and what is left of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from conveyor_sim.accuracy.bars import Bar, Bars
+
+PROCESSORS = 2
+"""Free ones that a study counts on: while one process measures, the other processor is idle."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much a study does."""
+
+    budget: float
+    """s of processor time on PROCESSORS processors together, idle ones included and compiling left out."""
+    measuring: float = math.inf
+    """s of processor time after which no further setting is measured; long runs get what is left."""
+
+    def long_runs(self, measured: float) -> float:
+        """s of processor time for long runs, when measuring took so many on one processor."""
+        return max(0.0, self.budget - PROCESSORS * measured)
+
+
+DEFAULT = Effort(budget=PROCESSORS * 260.0, measuring=120.0)
+"""Less than the 300 s that are promised of two free processors: starting, loading kernels and drawing come on top."""
+THOROUGH = Effort(budget=6000.0)
+
+
+def bars_with_left(bars: Bars, left: Callable[[], float]) -> Bars:
+    """Bars that show the time left (s) of the whole study with each update."""
+
+    @contextmanager
+    def opened(what: str, counted: str) -> Iterator[Bar]:
+        with bars(what, counted) as bar:
+            yield _BarWithLeft(bar, left)
+
+    return opened
+
+
+class _BarWithLeft:
+    def __init__(self, bar: Bar, left: Callable[[], float]) -> None:
+        self._bar = bar
+        self._left = left
+
+    def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
+        known = self._left()
+        self._bar.update(done, total, known if math.isfinite(known) else left)

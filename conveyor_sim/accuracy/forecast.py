@@ -1,0 +1,111 @@
+"""What is known before anything runs: predicted errors and cost of settings, and the cheapest that is predicted to do.
+
+Closed forms and bounds alone (timestep/): no kernel is compiled or loaded, and it takes a second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from conveyor_sim.accuracy.candidates import candidates
+from conveyor_sim.accuracy.results import Point
+from conveyor_sim.accuracy.setting import Setting, with_setting
+from conveyor_sim.effects import most_bottles
+from conveyor_sim.model import build_model
+from conveyor_sim.model.remedies import BESIDE, BOTTLE_STEP, STEP_COST
+from conveyor_sim.scene import Scene
+
+TRUSTED = ("leapfrog", "velocity_verlet")
+"""Integrators whose predictions were held against measurements on scenes that nothing was fitted to."""
+
+MANY = 100
+"""Bottles taken for the cost of a line without an end of them."""
+
+TICK = 1e-5
+"""s of a processor that a tick takes beside its steps, in round numbers."""
+
+BETTER = 10.0
+"""How many times more exact the setting is whose cost stands beside."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """The cheapest setting that is predicted to keep a tolerance."""
+
+    tolerance: float
+    """Relative, asked for."""
+    point: Point | None
+    """With predictions alone; None: nothing tried is predicted to keep the tolerance."""
+    best: float
+    """Least predicted error of what is within every bound of stability, inf if nothing is."""
+    touches: bool
+    """False: nothing in the scene can make a contact force."""
+    seconds: float
+    """s of one processor for a simulated second, by a rule of thumb; 0 without a setting."""
+    bottles: int
+    """That the cost is for."""
+    better: float | None
+    """Cost of a setting that is BETTER times as exact over that of this one; None if nothing tried is."""
+
+
+def forecast(scene: Scene, tolerance: float) -> Forecast:
+    """Predict what settings do on a scene; the cheapest one of at most a tolerance (relative) is chosen."""
+    points = [_unmeasured(scene, one) for one in candidates(scene) if one.integrator in TRUSTED and one.stiffness == 1]
+    kept = [point for point in points if point.beyond is None or point.beyond <= 1.0 + 1e-12]
+    bottles = most_bottles(scene)
+    many = MANY if bottles is None else max(1, bottles)
+    point = _cheapest(kept, tolerance)
+    better = None if point is None else _cheapest(kept, predicted_error(point) / BETTER)
+    return Forecast(
+        tolerance=tolerance,
+        point=point,
+        best=min((predicted_error(one) for one in kept), default=math.inf),
+        touches=any(one.predicted is not None for one in points),
+        seconds=0.0 if point is None else seconds(scene, point.setting, many),
+        bottles=many,
+        better=None
+        if point is None or better is None
+        else seconds(scene, better.setting, many) / seconds(scene, point.setting, many),
+    )
+
+
+def foretold(scene: Scene, point: Point) -> Point:
+    """The point with what is known without measuring: predicted errors, and how far its step is from stability.
+
+    Predictions know no other stiffness to compare with.
+    """
+    model = build_model(with_setting(scene, point.setting))
+    bounds = [bound.dt for bound in model.bounds if bound.stability]
+    own = point.setting.stiffness == 1.0
+    return replace(
+        point,
+        predicted=model.prediction.value if own else None,
+        predicted_resting=model.prediction.resting if own else None,
+        beyond=model.dt / min(bounds) if bounds else None,
+    )
+
+
+def predicted_error(point: Point) -> float:
+    """The larger of what is predicted in impacts and in resting load; 0 where nothing touches."""
+    return max(point.predicted or 0.0, point.predicted_resting or 0.0)
+
+
+def seconds(scene: Scene, setting: Setting, bottles: int) -> float:
+    """s of one processor that a simulated second takes, by a rule of thumb."""
+    evaluations = setting.per_tick / scene.tick * STEP_COST[setting.integrator]
+    return evaluations * (bottles + BESIDE) * BOTTLE_STEP + TICK / scene.tick
+
+
+def _cheapest(points: Iterable[Point], tolerance: float) -> Point | None:
+    """Of at most a predicted error."""
+    return min((point for point in points if predicted_error(point) <= tolerance), key=_work, default=None)
+
+
+def _work(point: Point) -> int:
+    return point.setting.per_tick * STEP_COST[point.setting.integrator]
+
+
+def _unmeasured(scene: Scene, setting: Setting) -> Point:
+    return foretold(scene, Point(setting, setting.dt(scene), None, None, None, ""))

@@ -1,0 +1,93 @@
+"""Answers on the way to the answer: what is known so far, marked as such, and what is not yet known of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from conveyor_sim.accuracy.apply import line
+from conveyor_sim.accuracy.forecast import Forecast
+from conveyor_sim.accuracy.lines import three_lines
+from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.words import digits, percent
+
+PREDICTED = "Predicted, not measured:"
+PRELIMINARY = "Preliminary, measured in part:"
+MEASURED = "Measured, without long runs:"
+UNFINISHED = "Measured, with the long runs made so far:"
+
+
+@dataclass(frozen=True)
+class Interim:
+    """An answer that may still change."""
+
+    title: str
+    """How it is known, one of those above."""
+    lines: tuple[str, ...]
+
+
+def predicted(known: Forecast) -> Interim:
+    """Forces, throughput, cost and the setting as predicted."""
+    asked = percent(known.tolerance)
+    if known.point is None:
+        return Interim(
+            PREDICTED,
+            (
+                f"Forces: nothing tried is predicted to be good to {asked}; the best to {percent(known.best)}.",
+                "Throughput: not known, nothing has run.",
+                "Cost: not known.",
+            ),
+        )
+    point = known.point
+    resting = (
+        f", and to {percent(point.predicted_resting)} where they press for long" if point.predicted_resting else ""
+    )
+    impacts = "there are none to be wrong: nothing in the scene can touch"
+    if point.predicted is not None:
+        impacts = f"should be good to {percent(point.predicted)} when bottles hit something{resting} (asked: {asked})"
+    better = "nothing tried should be ten times better"
+    if known.better is not None:
+        better = f"ten times better should take {digits(known.better)} times as long"
+    return Interim(
+        PREDICTED,
+        (
+            f"Forces: {impacts}.",
+            "Throughput: not known, nothing has run.",
+            f"Cost: a second of the line should take about {digits(known.seconds)} s of one processor with "
+            f"{known.bottles} bottles, by a rule of thumb; {better}.",
+            f"Setting: {line(point.setting)} (don't rely on it before it is measured)",
+        ),
+    )
+
+
+def preliminary(study: Study) -> Interim:
+    """Of the first settings that were measured, in impacts alone."""
+    return Interim(
+        PRELIMINARY,
+        (
+            *_without_throughput(study),
+            "Not known yet: what presses for long was not measured, nor was throughput, and a cheaper setting may do; "
+            f"{len(study.points)} settings were measured.",
+        ),
+    )
+
+
+def after_measuring(study: Study) -> Interim:
+    """Of all settings; long runs are still to come."""
+    lines = (*_without_throughput(study), "Not known yet: throughput, and whether long runs agree with it.")
+    return Interim(MEASURED, lines)
+
+
+def unfinished(study: Study) -> Interim:
+    """With some of the long runs."""
+    runs = sum(not sample.failure for sample in study.samples)
+    more = f"Not known yet: whether more long runs agree; {runs} were finished, the same command makes the others."
+    return Interim(UNFINISHED, (*three_lines(study), *_setting(study), more))
+
+
+def _without_throughput(study: Study) -> tuple[str, ...]:
+    forces, _, cost = three_lines(study)
+    return forces, "Throughput: not known, no long run was made.", cost, *_setting(study)
+
+
+def _setting(study: Study) -> list[str]:
+    return [] if study.answer is None else [f"Setting: {line(study.answer.setting)}"]

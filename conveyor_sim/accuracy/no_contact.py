@@ -1,0 +1,59 @@
+"""The answer on a line on which bottles only ride: there is no error in contact force, and none is looked for."""
+
+from __future__ import annotations
+
+from conveyor_sim.accuracy.apply import line
+from conveyor_sim.accuracy.candidates import own_setting, preset_setting
+from conveyor_sim.accuracy.forecast import Forecast, seconds
+from conveyor_sim.accuracy.setting import Setting, with_setting
+from conveyor_sim.accuracy.words import digits, percent
+from conveyor_sim.model import build_model
+from conveyor_sim.scene import Scene
+
+
+class NoContact(Exception):
+    """No bottle touched another one or a rail in a run of the scene: a study has nothing to compare."""
+
+    def __init__(self, looked: float) -> None:
+        """looked: s, simulated, that were looked at."""
+        super().__init__(f"nothing touched anything in {looked:g} s")
+        self.looked = looked
+
+
+def without_contact(scene: Scene, known: Forecast, looked: float | None) -> tuple[Setting, list[str]]:
+    """The setting to use, and the lines of the answer: forces, throughput, cost, the setting, what it does not cover.
+
+    looked: s, simulated, in which nothing touched anything; None: nothing in the scene can.
+    """
+    setting = preset_setting(scene, "draft")
+    prediction = build_model(with_setting(scene, setting)).prediction
+    terms = [f"{percent(term.value)} in {term.quantity}" for term in prediction.terms]
+    friction = f" (predicted: off by {', '.join(terms)})" if terms else ""
+    lines = [
+        f"Forces: there are none to be wrong: {_why(scene, looked)}.",
+        f"Throughput: bottles only ride, so the friction of belts alone decides it{friction}.",
+        f"Cost: about {digits(seconds(scene, setting, known.bottles))} s of one processor for a second of the line "
+        f"with {known.bottles} bottles, by a rule of thumb; a dearer setting gains nothing here.",
+        f"Setting: {line(setting)}, the preset draft: the cheapest within every bound of stability"
+        + (" (the scene has it already)." if own_setting(scene) == setting else "."),
+    ]
+    if known.touches:
+        lines.append(_otherwise(known, prediction.value))
+    return setting, lines
+
+
+def _why(scene: Scene, looked: float | None) -> str:
+    if looked is None:
+        return "nothing in the scene can touch"
+    whole = looked >= scene.duration - 0.5 * scene.tick
+    span = f"the {looked:g} s of the scene" if whole else f"the first {looked:g} s of {scene.duration:g} s"
+    return f"no bottle touched another one or a rail in {span}"
+
+
+def _otherwise(known: Forecast, draft: float | None) -> str:
+    """For the day on which bottles do meet there."""
+    impacts = "" if draft is None else f" draft is predicted to be good to {percent(draft)} in impacts;"
+    text = f"If they do touch one day (a stop, a jam, other commands),{impacts}"
+    if known.point is None:
+        return f"{text} nothing tried is predicted to be good to {percent(known.tolerance)}."
+    return f"{text} predicted to be good to {percent(known.tolerance)}: {line(known.point.setting)}."

@@ -1,0 +1,50 @@
+"""What a study may take, and what is left of it: processor time alone, so a busy machine changes neither."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from conveyor_sim.accuracy.effort import DEFAULT, PROCESSORS, THOROUGH, Effort, bars_with_left
+
+
+def test_what_one_process_measures_costs_the_other_processor_too() -> None:
+    """200 s on two processors: 40 s of measuring leave 160 s of both, 120 s of one."""
+    effort = Effort(budget=400.0)
+    assert effort.long_runs(0.0) == 400.0
+    assert effort.long_runs(40.0) == 320.0
+    assert effort.long_runs(300.0) == 0.0
+
+
+def test_five_minutes_of_two_processors_and_a_hundred_of_one() -> None:
+    """A default study ends within 300 s of wall time on two free processors, with time left to start and to draw."""
+    assert DEFAULT.budget / PROCESSORS <= 270.0
+    assert DEFAULT.measuring < DEFAULT.budget / PROCESSORS
+    for measured in (0.0, 30.0, DEFAULT.measuring):
+        assert measured + DEFAULT.long_runs(measured) / PROCESSORS == DEFAULT.budget / PROCESSORS
+    assert (THOROUGH.budget, THOROUGH.measuring) == (6000.0, math.inf)
+
+
+class Shown:
+    def __init__(self) -> None:
+        self.updates: list[tuple[float, float | None, float | None]] = []
+
+    def update(self, done: float, total: float | None = None, left: float | None = None) -> None:
+        self.updates.append((done, total, left))
+
+
+@pytest.mark.parametrize(("left", "shown"), [(120.0, 120.0), (math.inf, 7.0)])
+def test_each_update_has_what_is_left_of_the_study(left: float, shown: float) -> None:
+    """Not of the stage; where that is not known, what the stage says."""
+    bar = Shown()
+
+    @contextmanager
+    def bars(_what: str, _counted: str) -> Iterator[Shown]:
+        yield bar
+
+    with bars_with_left(bars, lambda: left)("settings", "runs") as opened:
+        opened.update(3.0, 10.0, 7.0)
+    assert bar.updates == [(3.0, 10.0, shown)]

@@ -1,0 +1,75 @@
+"""What is predicted of settings before anything runs."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment
+
+from conveyor_sim.accuracy.candidates import candidates
+from conveyor_sim.accuracy.forecast import TICK, TRUSTED, forecast, foretold, predicted_error, seconds
+from conveyor_sim.accuracy.interim import PREDICTED, predicted
+from conveyor_sim.accuracy.results import Point
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.model.remedies import BESIDE, BOTTLE_STEP
+from conveyor_sim.scene import Scene
+
+
+def line() -> Scene:
+    """Two bottles on a belt, and a rail across its end."""
+    return scene(
+        tick=0.01,
+        contacts=[contact(5e4), contact(5e4, "steel")],
+        base=base(0.3),
+        belts={"belt": belt(0.5)},
+        rails={"stop": segment((2.0, -1.0), (2.0, 1.0))},
+        bottles=[bottle(0.0, 0.0), bottle(0.5, 0.0)],
+    )
+
+
+@pytest.mark.parametrize("tolerance", [0.03, 0.01, 0.001])
+def test_the_least_work_that_is_predicted_to_do_within_stability(tolerance: float) -> None:
+    it = line()
+    chosen = forecast(it, tolerance).point
+    assert chosen is not None
+    assert predicted_error(chosen) <= tolerance
+    assert chosen.beyond is not None and chosen.beyond <= 1.0 + 1e-12
+    assert (chosen.errors, chosen.cost) == (None, None)
+    for setting in candidates(it):
+        if setting.stiffness == 1.0 and setting.integrator in TRUSTED and setting.per_tick < chosen.setting.per_tick:
+            other = foretold(it, Point(setting, setting.dt(it), None, None, None, ""))
+            assert predicted_error(other) > tolerance or (other.beyond or 0.0) > 1.0
+
+
+def test_where_nothing_is_predicted_to_do_the_best_is_named() -> None:
+    known = forecast(line(), 1e-9)
+    assert known.point is None
+    assert 1e-9 < known.best < 0.01
+    answer = predicted(known)
+    assert answer.title == PREDICTED
+    assert answer.lines[0].startswith("Forces: nothing tried is predicted to be good to 1e-7 %; the best to 0.")
+
+
+def test_each_line_says_that_nothing_has_run() -> None:
+    forces, throughput, cost, setting = predicted(forecast(line(), 0.01)).lines
+    assert forces.startswith("Forces: should be good to 0.") and forces.endswith("(asked: 1 %).")
+    assert throughput == "Throughput: not known, nothing has run."
+    assert "should take about" in cost and "with 2 bottles, by a rule of thumb" in cost
+    assert setting.startswith("Setting: accuracy: {integrator: ")
+    assert setting.endswith("(don't rely on it before it is measured)")
+
+
+def test_cost_goes_as_the_steps_with_a_part_that_ticks_take() -> None:
+    it = line()
+    one, two = (seconds(it, Setting("leapfrog", steps), 40) for steps in (100, 200))
+    assert one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP + TICK / 0.01)
+    assert two - one == pytest.approx(100 / 0.01 * (40 + BESIDE) * BOTTLE_STEP)
+    assert seconds(it, Setting("rk4", 100), 40) > one
+
+
+def test_one_bottle_and_no_rail_touch_nothing() -> None:
+    known = forecast(scene(contacts=[contact(5e4)], bottles=[bottle(0.0, 0.0, 0.5)], **NO_FLOOR), 0.01)
+    assert not known.touches
+    assert forecast(line(), 0.01).touches
+    assert math.isfinite(known.best)

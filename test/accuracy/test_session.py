@@ -1,0 +1,192 @@
+"""What somebody who waits sees, in order, and what Ctrl-C answers at any moment."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from accuracy.test_study import ONE_RUN, SCENE, silent
+from click.testing import CliRunner
+
+from conveyor_sim.accuracy.candidates import own_setting, preset_setting
+from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH, Effort
+from conveyor_sim.accuracy.files import read_study
+from conveyor_sim.accuracy.interim import MEASURED, PREDICTED, PRELIMINARY, UNFINISHED
+from conveyor_sim.accuracy.lines import summary
+from conveyor_sim.accuracy.results import Study
+from conveyor_sim.accuracy.sample_file import SAMPLES
+from conveyor_sim.accuracy.session import ANSWER, Session
+from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.cli import main
+from conveyor_sim.scene import Scene, load_scene, parse_scene
+
+APART = SCENE.replace("[0.13, 0.01]", "[5.0, 0.0]").replace("[0.26, -0.01]", "[9.0, 0.0]")
+"""The same three, none of which reaches another."""
+
+PATIENCE = 600.0
+"""s of wall time; kernels may have to be compiled."""
+
+
+def scene_of(text: str) -> Scene:
+    return parse_scene(text, "three.yaml")
+
+
+def session(text: str) -> tuple[Session, list[str]]:
+    answers: list[str] = []
+    return Session(scene_of(text), 0.01, answers.append, lambda sentence: None), answers
+
+
+@dataclass(frozen=True)
+class Made:
+    """A study from its prediction to its end."""
+
+    setting: Setting | None
+    folder: Path
+    predicted: list[str]
+    """Answers before anything ran."""
+    answers: list[str]
+    study: Study
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """Its kernels are compiled: a child that loads them is interrupted in what it does, not in compiling."""
+    it, answers = session(SCENE)
+    folder = tmp_path_factory.mktemp("made")
+    it.predict(folder, ONE_RUN)
+    predicted = list(answers)
+    assert not list(folder.iterdir())
+    study = it.run(folder, ONE_RUN, silent)
+    assert study is not None
+    return Made(it.setting, folder, predicted, answers, study)
+
+
+def test_predicted_first_then_preliminary_then_the_answer(made: Made) -> None:
+    answers, study = made.answers, made.study
+    assert made.predicted[0] == PREDICTED
+    titles = [line for line in answers if line in (PREDICTED, PRELIMINARY, MEASURED, UNFINISHED, ANSWER)]
+    assert titles == [PREDICTED, PRELIMINARY, ANSWER]
+    assert answers[answers.index(ANSWER) + 1 :] == summary(study)
+    assert study == read_study(made.folder / "study.json")
+    assert study.answer is not None
+    assert made.setting == study.answer.setting
+    early = answers[answers.index(PRELIMINARY) + 1 : answers.index(ANSWER)]
+    assert early[0].startswith("Forces: good to 0.")
+    assert early[1] == "Throughput: not known, no long run was made."
+    assert early[-1].startswith("Not known yet: ")
+
+
+def test_a_line_on_which_nothing_touches_is_not_searched(tmp_path: Path) -> None:
+    it, answers = session(APART)
+    it.predict(tmp_path, ONE_RUN)
+    assert it.run(tmp_path, ONE_RUN, silent) is None
+    forces, throughput, cost, setting, otherwise = answers[answers.index(ANSWER) + 1 :]
+    assert PRELIMINARY not in answers
+    assert forces == (
+        "Forces: there are none to be wrong: no bottle touched another one or a rail in the 0.3 s of the scene."
+    )
+    assert throughput.startswith("Throughput: bottles only ride, so the friction of belts alone decides it")
+    assert "by a rule of thumb" in cost
+    assert "the preset draft: the cheapest within every bound of stability" in setting
+    assert otherwise.startswith("If they do touch one day (a stop, a jam, other commands), draft is predicted")
+    assert it.setting is not None
+    assert not (tmp_path / "measured.json").exists()
+
+
+def test_where_nothing_can_touch_nothing_runs(tmp_path: Path) -> None:
+    alone = "\n".join(SCENE.splitlines()[:-2]) + "\n"
+    it, answers = session(alone)
+    it.predict(tmp_path, ONE_RUN)
+    assert it.run(tmp_path / "none", ONE_RUN, silent) is None
+    assert answers[:2] == [ANSWER, "Forces: there are none to be wrong: nothing in the scene can touch."]
+    assert not any(line.startswith("If they do touch") for line in answers)
+    assert not (tmp_path / "none").exists()
+
+
+def test_the_command_answers_on_such_a_line_and_applies_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("alone.yaml").write_text("\n".join(SCENE.splitlines()[:-2]) + "\n")
+    result = CliRunner().invoke(main, ["accuracy", "alone.yaml", "--out", "out", "--apply"])
+    assert result.exit_code == 0, result.output
+    assert "Forces: there are none to be wrong" in result.output
+    assert result.output.splitlines()[-1] == "scene with the setting: out/alone.yaml"
+    draft = preset_setting(load_scene(Path("alone.yaml")), "draft")
+    assert own_setting(load_scene(Path("out/alone.yaml"))) == draft
+
+
+@pytest.mark.parametrize(("effort", "minutes"), [(DEFAULT, 5), (THOROUGH, 50)])
+def test_how_long_it_takes_is_said_at_first(effort: Effort, minutes: int, tmp_path: Path) -> None:
+    said: list[str] = []
+    Session(scene_of(SCENE), 0.01, lambda line: None, said.append).predict(tmp_path, effort)
+    assert len(said) == 1
+    assert "a preliminary answer within a minute" in said[0]
+    assert f"the answer within {minutes}, compiling left out" in said[0]
+
+
+def interrupted(folder: Path, ready: Callable[[str], bool]) -> tuple[int, list[str], str]:
+    """Exit status, lines of answers and errors of the command, sent SIGINT once `ready` likes its answers so far."""
+    file = folder / "three.yaml"
+    file.write_text(SCENE)
+    answers = folder / "answers.txt"
+    code = "from conveyor_sim.cli import main; main()"
+    command = [sys.executable, "-c", code, "accuracy", str(file), "--out", str(folder / "out"), "--thorough"]
+    with (
+        open(answers, "w") as out,
+        # A shell that starts tests in the background has interrupts ignored, by what it starts, too.
+        subprocess.Popen(
+            command,
+            stdout=out,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "COLUMNS": "200"},
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        ) as process,
+    ):
+        end = time.monotonic() + PATIENCE
+        while not ready(answers.read_text()):
+            assert process.poll() is None and time.monotonic() < end, answers.read_text()
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate(timeout=PATIENCE)[1].decode()
+        return process.returncode, answers.read_text().splitlines(), errors
+
+
+def test_ctrl_c_before_anything_is_measured_answers_what_is_predicted(tmp_path: Path, made: Made) -> None:
+    status, answers, errors = interrupted(tmp_path, lambda said: PREDICTED in said)
+    assert (status, errors.splitlines()[-1]) == (130, "interrupted")
+    assert "the answer within 50, compiling left out" in errors  # --thorough
+    assert PRELIMINARY not in answers
+    assert answers[0] == PREDICTED
+    assert [line.partition(":")[0] for line in answers[-4:]] == ["Forces", "Throughput", "Cost", "Setting"]
+    assert "should be good to" in answers[-4]
+
+
+def test_ctrl_c_after_the_first_settings_answers_what_was_measured(tmp_path: Path, made: Made) -> None:
+    status, answers, errors = interrupted(tmp_path, lambda said: "Not known yet" in said)
+    assert (status, errors.splitlines()[-1]) == (130, "interrupted")
+    assert answers.count(PRELIMINARY) == 1
+    again = answers.index(f"Interrupted; the best answer so far. {PRELIMINARY}")
+    first = answers.index(PRELIMINARY)
+    assert answers[again + 1 :] == answers[first + 1 : again]
+    assert answers[again + 1].startswith("Forces: good to ")
+    assert not (tmp_path / "out" / "study.json").exists()
+
+
+def test_ctrl_c_in_long_runs_answers_with_those_made(tmp_path: Path, made: Made) -> None:
+    samples = tmp_path / "out" / SAMPLES
+
+    def some(_said: str) -> bool:
+        return samples.exists() and samples.read_bytes().count(b"\n") > 4
+
+    status, answers, errors = interrupted(tmp_path, some)
+    assert (status, errors.splitlines()[-1]) == (130, "interrupted")
+    best = answers[answers.index(f"Interrupted; the best answer so far. {UNFINISHED}") + 1 :]
+    assert [line.partition(":")[0] for line in best] == ["Forces", "Throughput", "Cost", "Setting", "Not known yet"]
+    assert "were finished, the same command makes the others" in best[-1]
+    assert ANSWER not in answers
