@@ -14,6 +14,7 @@ from conveyor_sim.accuracy.effort import Effort
 from conveyor_sim.accuracy.equivalence import decide, run_until_decided
 from conveyor_sim.accuracy.files import write_study
 from conveyor_sim.accuracy.interim import Interim, after_measuring, preliminary, unfinished
+from conveyor_sim.accuracy.lines import FEW
 from conveyor_sim.accuracy.measured import Measured, measured_once
 from conveyor_sim.accuracy.results import Answer, Comparison, Point, Sample, StiffnessRow, Study
 from conveyor_sim.accuracy.sample_file import SampleFile, fingerprint
@@ -114,8 +115,8 @@ def _long_runs(
     """Runs over seeds of what may be the answer, of the scene's own setting and of softer contacts; and of a reference.
 
     Where they find the answer different from the reference, the next dearer setting is tried. The budget goes to what
-    is undecided of the answer, but for a share of the others. What would not get through a single run within the
-    budget, by what it cost when it was measured, is not begun.
+    is undecided of the answer, but for a share of the others. Where it would not do for a comparison, by what settings
+    cost when they were measured, no run is begun.
     """
     failed = {point.setting for point in measured.points if point.failure}
     found = _answer(measured, [], tolerance)
@@ -126,7 +127,7 @@ def _long_runs(
     # The last runs may leave all processors but one idle.
     longest = expected.get(reference, 0.0)
     budget = max(0.0, effort.long_runs(measured.cpu) - longest)
-    if len(affordable([reference, found.setting], expected, budget)) < 2:
+    if len(affordable([reference, found.setting], expected, budget, FEW)) < 2:
         return [], [], None
     tried: list[Setting] = []
     samples: list[Sample] = []
@@ -153,14 +154,16 @@ def _long_runs(
     return list(made.values()), comparisons, reference
 
 
-def affordable(settings: Sequence[Setting], expected: Mapping[Setting, float], budget: float) -> list[Setting]:
-    """Settings, in their order, of which one run each fits a budget (s of processor time), or at least FIRST_RUNS.
+def affordable(
+    settings: Sequence[Setting], expected: Mapping[Setting, float], budget: float, runs: int = 1
+) -> list[Setting]:
+    """Settings, in their order, of which so many runs each fit a budget (s of processor time), or at least FIRST_RUNS.
 
     Empty if the first does not fit; what a run is expected to take (s) is 0 where it is not known.
     """
     kept, spent = [], 0.0
     for setting in settings:
-        spent += expected.get(setting, 0.0)
+        spent += runs * expected.get(setting, 0.0)
         if spent > max(budget, FIRST_RUNS):
             break
         kept.append(setting)

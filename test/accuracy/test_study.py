@@ -137,6 +137,8 @@ def test_runs_that_do_not_fit_the_budget_are_not_begun() -> None:
     assert affordable([one, two, three], expected, 75.0) == [one, two]
     assert affordable([two, one, unknown], expected, 70.0) == [two, one, unknown]
     assert affordable([one, two], expected, 29.0) == []
+    assert affordable([one, two], expected, 139.0, runs=2) == [one]
+    assert affordable([one, two], expected, 140.0, runs=2) == [one, two]
     assert affordable([one], {one: FIRST_RUNS}, 0.0) == [one]
     assert affordable([one], {one: 1.01 * FIRST_RUNS}, 0.0) == []
 
