@@ -17,7 +17,7 @@ from conveyor_sim.accuracy.effort import PROCESSORS, Effort, bars_with_left
 from conveyor_sim.accuracy.forecast import forecast, foretold
 from conveyor_sim.accuracy.no_contact import NoContact
 from conveyor_sim.accuracy.plain import Unlike, plain, typed
-from conveyor_sim.accuracy.precision import COST_BUDGET, FIRST_COST_BUDGET, WorkPrecision
+from conveyor_sim.accuracy.precision import COST_BUDGET, FIRST_COST_BUDGET, FIRST_WORK, MOST_WORK, WorkPrecision
 from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.sample_file import check_origin
 from conveyor_sim.accuracy.setting import Setting
@@ -103,10 +103,7 @@ def _measure(
         precision.find_starts(bar.update)
     if precision.untouched is not None:
         raise NoContact(precision.untouched)
-    with bars(f"{scene.name}: horizons", "starts") as bar:
-        precision.find_horizons(bar.update)
-    with bars(f"{scene.name}: reference", "runs") as bar:
-        reference = precision.make_reference(bar.update)
+    reference = _reference(scene, precision, FIRST_WORK, bars)
     found = Measured(
         machine=machine(),
         orders=(),
@@ -126,6 +123,8 @@ def _measure(
     with bars(f"{scene.name}: their cost", "runs") as bar:
         points = precision.points(first, FIRST_COST_BUDGET, bar.update)
     preliminary(replace(found, points=tuple(foretold(scene, point) for point in points)))
+    if precision.cut_short:
+        reference = _reference(scene, precision, MOST_WORK, bars)
     rest = _rest(scene, precision, bars)
     with bars(f"{scene.name}: settings", "runs") as bar:
         left_out = precision.try_out(
@@ -142,6 +141,8 @@ def _measure(
         skipped.append(f"Not measured within the budget (--thorough does): {names}")
     return replace(
         found,
+        horizons=tuple(precision.horizons),
+        reference=reference,
         orders=orders,
         points=tuple(foretold(scene, point) for point in points),
         skipped=tuple(skipped),
@@ -160,6 +161,14 @@ def first_settings(scene: Scene, tolerance: float) -> list[Setting]:
 def cheapest_first(settings: Sequence[Setting]) -> list[Setting]:
     """In the order of the work that a second takes, softer contacts last: they decide no answer."""
     return sorted(settings, key=lambda one: (one.stiffness != 1.0, one.per_tick * STEP_COST[one.integrator], one.key))
+
+
+def _reference(scene: Scene, precision: WorkPrecision, work: float, bars: Bars) -> Reference:
+    """What errors in impacts are measured against, over horizons of so much work (bottle steps)."""
+    with bars(f"{scene.name}: horizons", "starts") as bar:
+        precision.find_horizons(bar.update, work)
+    with bars(f"{scene.name}: reference", "runs") as bar:
+        return precision.make_reference(bar.update)
 
 
 def _rest(scene: Scene, precision: WorkPrecision, bars: Bars) -> Rest:

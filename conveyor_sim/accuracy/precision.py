@@ -24,6 +24,9 @@ LONGEST = 0.5
 MOST_WORK = 5e6
 """Bottle steps of all horizons at the preset `standard`; candidates and reference take some two hundred times that."""
 
+FIRST_WORK = 1e6
+"""The same for the first settings: a crowd is compared over shorter horizons at first, so that an answer comes soon."""
+
 COST_BUDGET = 20.0
 """s that measuring costs may take."""
 
@@ -64,6 +67,8 @@ class WorkPrecision:
         """s, simulated, in which nothing touched anything; None if something did."""
         self.resting = RestingLoad(scene)
         self.horizons: list[Horizon] = []
+        self.cut_short = False
+        """Whether a horizon would be longer if more work were allowed."""
         self.reference: Reference | None = None
         self._true: list[Trajectory] = []
         self._trials: dict[Setting, _Trial] = {}
@@ -94,17 +99,22 @@ class WorkPrecision:
             resting.reference.rms,
         )
 
-    def find_horizons(self, progress: Progress) -> None:
-        """How far trajectories from each start can be compared; progress in starts."""
+    def find_horizons(self, progress: Progress, work: float = MOST_WORK) -> None:
+        """How far trajectories from each start can be compared; progress in starts.
+
+        work: bottle steps of all horizons at the preset `standard`. What was tried out before is forgotten.
+        """
         finder = HorizonFinder.of(self.scene)
         bottles = sum(max(1, start.simulation.counts.present) for start in self.starts)
-        work = bottles * finder.coarse.model.steps_per_tick
-        most = max(1, round(min(LONGEST / self.scene.tick, MOST_WORK / work)))
-        self.horizons = []
+        longest = round(LONGEST / self.scene.tick)
+        most = max(1, min(longest, round(work / (bottles * finder.coarse.model.steps_per_tick))))
+        self.horizons, self._trials = [], {}
         for start in self.starts:
             progress(len(self.horizons), len(self.starts))
             self.horizons.append(finder.find(start, most))
         progress(len(self.starts), len(self.starts))
+        ends = most * self.scene.tick
+        self.cut_short = most < longest and any(horizon.length >= ends for horizon in self.horizons)
 
     def make_reference(self, progress: Progress) -> Reference:
         """The trajectories that errors are measured against, and their doubt; progress in runs."""

@@ -80,6 +80,19 @@ def test_starts_of_a_line_that_goes_on() -> None:
     assert ticks[-1] >= 400
 
 
+def test_little_work_shortens_the_horizons(study: WorkPrecision) -> None:
+    """Two bottles, 10 ticks' worth of steps; whoever asks again with more gets the whole, and says so."""
+    brief = WorkPrecision(head_on())
+    brief.find_starts(silent)
+    steps = standard_steps(head_on())
+    brief.find_horizons(silent, work=10 * 2 * steps)
+    assert [horizon.length for horizon in brief.horizons] == [pytest.approx(0.01)]
+    assert brief.cut_short
+    brief.find_horizons(silent)
+    assert brief.horizons == study.horizons
+    assert not brief.cut_short
+
+
 def test_the_reference_has_the_closed_forms(study: WorkPrecision) -> None:
     """Peak force v sqrt(k m_r) to (pi/n)^2/8 of a sample at 200 steps a contact, impulse m_r 2 v, speeds exchanged."""
     assert study.reference is not None
