@@ -84,6 +84,20 @@ def test_a_member_of_a_member_is_pruned() -> None:
     assert first(Outer(Inner(None, 3.0), OUTER.sums)) == -1.0
 
 
+def test_an_absent_member_among_several_taken_at_once_is_pruned() -> None:
+    """Python puts more than three into a tuple, and takes them out again."""
+
+    @kernel
+    def first(outer: Any) -> float:
+        inner, sums, factor, values = outer.inner, outer.sums, outer.inner.factor, outer.inner.values
+        if values is not None:
+            return values[0]
+        return sums.size * factor + inner.factor
+
+    assert first(OUTER) == 1.0
+    assert first(Outer(Inner(None, 3.0), np.zeros(2))) == 9.0
+
+
 def test_a_group_without_some_members() -> None:
     """What is left out is `None` for whatever takes the view."""
     view = without(Outer, ["inner"])

@@ -34,7 +34,7 @@ class AbsentMembers(FunctionPass):
         changed = False
         for block in state.func_ir.blocks.values():
             for taken in block.find_insts(ir.Assign):
-                if _is_member(taken.value) and _type(state, taken.value) == types.none:
+                if _is(taken.value, "getattr", "static_getitem") and _type(state, taken.value) == types.none:
                     absent = ir.Const(None, taken.loc)
                     definitions = state.func_ir._definitions[taken.target.name]
                     definitions[definitions.index(taken.value)] = absent
@@ -43,8 +43,8 @@ class AbsentMembers(FunctionPass):
         return changed
 
 
-def _is_member(value: Any) -> bool:
-    return isinstance(value, ir.Expr) and value.op == "getattr"
+def _is(value: Any, *ops: str) -> bool:
+    return isinstance(value, ir.Expr) and value.op in ops
 
 
 def _type(state: Any, value: Any) -> Any:
@@ -52,7 +52,14 @@ def _type(state: Any, value: Any) -> Any:
     definition = guard(get_definition, state.func_ir, value) if isinstance(value, ir.Var) else value
     if isinstance(definition, ir.Arg):
         return state.args[definition.index]
-    if _is_member(definition):
+    if isinstance(definition, ir.Const) and definition.value is None:
+        return types.none
+    if _is(definition, "static_getitem"):
+        # One of several that are taken at once: a, b = group.a, group.b
+        several = guard(get_definition, state.func_ir, definition.value)
+        several = guard(get_definition, state.func_ir, several.value) if _is(several, "exhaust_iter") else several
+        return _type(state, several.items[definition.index]) if _is(several, "build_tuple") else None
+    if _is(definition, "getattr"):
         owner = _type(state, definition.value)
         if isinstance(owner, Group) and definition.attr in owner.fields:
             return owner.types[owner.fields.index(definition.attr)]
