@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.sensors.beams import block_beams
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.scene.types import XY
@@ -22,12 +23,14 @@ class Beams(Device):
         start, end = np.array(ends, dtype=np.float64).swapaxes(0, 1)
         length = np.hypot(*(end - start).T)[:, None]
         corners = np.minimum(start, end), np.maximum(start, end)
-        self._beams = np.hstack((start, *corners, (end - start) / length, length))
+        self._beams = LightBeams(
+            line=np.hstack((start, *corners, (end - start) / length, length)),
+            near=np.empty((2, 16), dtype=np.int64),
+            spans=np.empty((len(ends), 16, 2)),
+            used=np.zeros(len(ends), dtype=np.int64),
+            state=np.zeros(len(ends), dtype=np.int64),
+        )
         self._began: F8 | None = None
-        self._near: I8 = np.empty((2, 16), dtype=np.int64)
-        self._spans: F8 = np.empty((len(ends), 16, 2))
-        self._count: I8 = np.zeros(len(ends), dtype=np.int64)
-        self._state: I8 = np.zeros(len(ends), dtype=np.int64)
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
@@ -43,15 +46,14 @@ class Beams(Device):
             vx = vy = np.zeros(bottles.x.size)
             start = np.stack((bottles.x, bottles.y, vx, vy))
         self._began = None
-        while short := block_beams(
-            start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id, now.length,
-            self._beams, self._near, self._spans, self._count, self._state,
-        ):  # fmt: skip
+        ways = Ways(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
+        while short := block_beams(ways, now.length, self._beams):
+            near, spans = self._beams.near, self._beams.spans
             if short == 1:
-                self._near = np.empty((2, 2 * self._near.shape[1]), dtype=np.int64)
+                self._beams = self._beams._replace(near=np.empty((2, 2 * near.shape[1]), dtype=np.int64))
             else:
-                self._spans = np.empty((len(self._states), 2 * self._spans.shape[1], 2))
-        self._states = self._state.tolist()
+                self._beams = self._beams._replace(spans=np.empty((len(spans), 2 * spans.shape[1], 2)))
+        self._states = self._beams.state.tolist()
 
     def state(self, beam: int) -> int:
         """What became of a beam in this tick (engine/sensors/beams.py): FREE, BLOCKED or CHANGES."""
@@ -59,4 +61,4 @@ class Beams(Device):
 
     def spans(self, beam: int) -> list[Span]:
         """When in this tick a beam was blocked, in order, s from its begin on; those that meet are one."""
-        return [(begin, end) for begin, end in self._spans[beam, : self._count[beam]].tolist()]
+        return [(begin, end) for begin, end in self._beams.spans[beam, : self._beams.used[beam]].tolist()]

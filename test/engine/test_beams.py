@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.engine.arrays.beams import LightBeams, Ways
 from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams, cubic, within_reach
 
 F8 = NDArray[np.float64]
@@ -60,15 +61,15 @@ def blocked(start: F8, end: F8, radius: F8, ids: NDArray[np.int64], room: int) -
     """Spans and state of each beam; start, end: x, y, vx, vy by slot."""
     low, high, way = ENDS.min(axis=1), ENDS.max(axis=1), ENDS[:, 1] - ENDS[:, 0]
     length = np.hypot(*way.T)[:, None]
-    beams = np.hstack((ENDS[:, 0], low, high, way / length, length))
+    line = np.hstack((ENDS[:, 0], low, high, way / length, length))
     near, spans = np.empty((2, room), np.int64), np.empty((len(ENDS), room, 2))
-    count, state = np.empty(len(ENDS), np.int64), np.empty(len(ENDS), np.int64)
-    while short := block_beams(start, *end, radius, ids, LENGTH, beams, near, spans, count, state):
+    beams = LightBeams(line, near, spans, np.empty(len(ENDS), np.int64), np.empty(len(ENDS), np.int64))
+    while short := block_beams(Ways(start, *end, radius, ids), LENGTH, beams):
         if short == 1:
-            near = np.empty((2, 2 * near.shape[1]), np.int64)
+            beams = beams._replace(near=np.empty((2, 2 * beams.near.shape[1]), np.int64))
         else:
-            spans = np.empty((len(ENDS), 2 * spans.shape[1], 2))
-    return [spans[beam, : count[beam]] for beam in range(len(ENDS))], state.tolist()
+            beams = beams._replace(spans=np.empty((len(ENDS), 2 * beams.spans.shape[1], 2)))
+    return [beams.spans[beam, : beams.used[beam]] for beam in range(len(ENDS))], beams.state.tolist()
 
 
 def test_a_beam_is_blocked_while_any_way_is_within_reach_of_it() -> None:

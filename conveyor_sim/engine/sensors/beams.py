@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from conveyor_sim.engine.arrays.beams import LightBeams, Ways
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.compile import kernel, part
 
@@ -25,47 +26,31 @@ FREE, BLOCKED, CHANGES = 0, 1, 2
 
 
 @kernel
-def block_beams(
-    start: F8,
-    x: F8,
-    y: F8,
-    vx: F8,
-    vy: F8,
-    radius: F8,
-    ids: I8,
-    length: float,
-    beams: F8,
-    near: I8,
-    spans: F8,
-    count: I8,
-    state: I8,
-) -> int:
-    """When in a tick of `length` s bottles blocked each beam.
+def block_beams(ways: Ways, length: float, beams: LightBeams) -> int:
+    """When in a tick of `length` s bottles blocked each beam: write its spans, their number and its state.
 
-    start: x, y, vx, vy of each slot at the begin of the tick, (4, slots), m and m/s; the others are those at its end.
-    beams: of each its start, lower and upper corner, direction, m, and length, m: (beams, 9). near: scratch, (2, n).
-    Written: spans, (beams, m, 2), s from the begin of the tick, in order, those that meet are one; count of them and
-    state, (beams,). Returns what is too short for that: 0 nothing, 1 near, 2 spans.
+    Returns what is too short for that: 0 nothing, 1 near, 2 spans.
     """
-    pairs = _near(start, x, y, vx, vy, radius, ids, length / 3.0, beams, near)
+    count, state, spans, near = beams.used, beams.state, beams.spans, beams.near
+    pairs = _near(ways, length / 3.0, beams.line, near)
     if pairs < 0:
         return 1
-    for beam in range(beams.shape[0]):
+    for beam in range(count.size):
         count[beam] = 0
         state[beam] = FREE
     for pair in range(pairs):
         beam, i = near[0, pair], near[1, pair]
         # What is within reach of a segment is convex: a way whose hull is in it is in it all the time.
-        if state[beam] != BLOCKED and _throughout(start, x, y, vx, vy, radius[i], length / 3.0, beams, beam, i):
+        if state[beam] != BLOCKED and _throughout(ways, length / 3.0, beams.line, beam, i):
             state[beam] = BLOCKED
             count[beam] = 1
             spans[beam, 0, 0], spans[beam, 0, 1] = 0.0, length
     for pair in range(pairs):
         beam, i = near[0, pair], near[1, pair]
         if state[beam] != BLOCKED:
-            if not _follow(start, x, y, vx, vy, radius[i], length, beams, beam, i, spans, count):
+            if not _follow(ways, length, beams, beam, i):
                 return 2
-    for beam in range(beams.shape[0]):
+    for beam in range(count.size):
         if state[beam] != BLOCKED and count[beam] > 0:
             count[beam] = _join(spans[beam], count[beam])
             first, last = spans[beam, 0, 0], spans[beam, count[beam] - 1, 1]
@@ -75,22 +60,23 @@ def block_beams(
 
 
 @part
-def _near(start: F8, x: F8, y: F8, vx: F8, vy: F8, radius: F8, ids: I8, third: float, beams: F8, near: I8) -> int:
+def _near(ways: Ways, third: float, line: F8, near: I8) -> int:
     """Pairs of a beam and a slot whose way may come within reach; -1 if there are more than `near` has room for."""
+    start, x, y, radius = ways.start, ways.x, ways.y, ways.radius
     pairs = 0
     for i in range(x.size):
-        if ids[i] < 0:
+        if ways.id[i] < 0:
             continue
         # A cubic lies within the hull of its four control points (Bézier).
-        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * vx[i]
+        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * ways.vx[i]
         low_x = min(min(start[0, i], ahead), min(behind, x[i])) - radius[i]
         high_x = max(max(start[0, i], ahead), max(behind, x[i])) + radius[i]
-        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * vy[i]
+        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * ways.vy[i]
         low_y = min(min(start[1, i], ahead), min(behind, y[i])) - radius[i]
         high_y = max(max(start[1, i], ahead), max(behind, y[i])) + radius[i]
-        for beam in range(beams.shape[0]):
-            if high_x >= beams[beam, 2] and low_x <= beams[beam, 4] and high_y >= beams[beam, 3]:
-                if low_y <= beams[beam, 5]:
+        for beam in range(line.shape[0]):
+            if high_x >= line[beam, 2] and low_x <= line[beam, 4] and high_y >= line[beam, 3]:
+                if low_y <= line[beam, 5]:
                     if pairs == near.shape[1]:
                         return -1
                     near[0, pairs], near[1, pairs] = beam, i
@@ -99,60 +85,47 @@ def _near(start: F8, x: F8, y: F8, vx: F8, vy: F8, radius: F8, ids: I8, third: f
 
 
 @part
-def _throughout(
-    start: F8, x: F8, y: F8, vx: F8, vy: F8, radius: float, third: float, beams: F8, beam: int, i: int
-) -> bool:
+def _throughout(ways: Ways, third: float, line: F8, beam: int, i: int) -> bool:
     """Whether the whole way of slot i is within reach of a beam."""
+    start, x, y, radius = ways.start, ways.x[i], ways.y[i], ways.radius[i]
     return (
-        _beside(beams, beam, start[0, i], start[1, i]) <= radius
-        and _beside(beams, beam, start[0, i] + third * start[2, i], start[1, i] + third * start[3, i]) <= radius
-        and _beside(beams, beam, x[i] - third * vx[i], y[i] - third * vy[i]) <= radius
-        and _beside(beams, beam, x[i], y[i]) <= radius
+        _beside(line, beam, start[0, i], start[1, i]) <= radius
+        and _beside(line, beam, start[0, i] + third * start[2, i], start[1, i] + third * start[3, i]) <= radius
+        and _beside(line, beam, x - third * ways.vx[i], y - third * ways.vy[i]) <= radius
+        and _beside(line, beam, x, y) <= radius
     )
 
 
 @part
-def _beside(beams: F8, beam: int, x: float, y: float) -> float:
+def _beside(line: F8, beam: int, x: float, y: float) -> float:
     """From a point to a beam, m."""
-    along, aside = _seen_from(beams, beam, x, y)
-    return math.hypot(along - min(max(along, 0.0), beams[beam, 8]), aside)
+    along, aside = _seen_from(line, beam, x, y)
+    return math.hypot(along - min(max(along, 0.0), line[beam, 8]), aside)
 
 
 @part
-def _seen_from(beams: F8, beam: int, x: float, y: float) -> tuple[float, float]:
+def _seen_from(line: F8, beam: int, x: float, y: float) -> tuple[float, float]:
     """A point as seen from the start of a beam: along it, and to the left of it, m."""
-    x, y = x - beams[beam, 0], y - beams[beam, 1]
-    ahead, across = beams[beam, 6], beams[beam, 7]
+    x, y = x - line[beam, 0], y - line[beam, 1]
+    ahead, across = line[beam, 6], line[beam, 7]
     return x * ahead + y * across, y * ahead - x * across
 
 
 @part
-def _follow(
-    start: F8,
-    x: F8,
-    y: F8,
-    vx: F8,
-    vy: F8,
-    radius: float,
-    length: float,
-    beams: F8,
-    beam: int,
-    i: int,
-    spans: F8,
-    count: I8,
-) -> bool:
+def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> bool:
     """Add the stretches of one way to the spans of a beam, by their begins; whether there was room."""
     third, share = length / 3.0, length / CHORDS
-    x1, x2 = start[0, i] + third * start[2, i], x[i] - third * vx[i]
-    y1, y2 = start[1, i] + third * start[3, i], y[i] - third * vy[i]
-    a, b = _seen_from(beams, beam, start[0, i], start[1, i])
+    start, x, y, line, spans, count = ways.start, ways.x[i], ways.y[i], beams.line, beams.spans, beams.used
+    x1, x2 = start[0, i] + third * start[2, i], x - third * ways.vx[i]
+    y1, y2 = start[1, i] + third * start[3, i], y - third * ways.vy[i]
+    a, b = _seen_from(line, beam, start[0, i], start[1, i])
     for chord in range(CHORDS):
         # Ends are exact, so that ticks join without a gap.
         last = chord == CHORDS - 1
-        end_x = x[i] if last else cubic(start[0, i], x1, x2, x[i], (chord + 1) / CHORDS)
-        end_y = y[i] if last else cubic(start[1, i], y1, y2, y[i], (chord + 1) / CHORDS)
-        next_a, next_b = _seen_from(beams, beam, end_x, end_y)
-        enter, leave = within_reach(a, b, next_a, next_b, beams[beam, 8], radius)
+        end_x = x if last else cubic(start[0, i], x1, x2, x, (chord + 1) / CHORDS)
+        end_y = y if last else cubic(start[1, i], y1, y2, y, (chord + 1) / CHORDS)
+        next_a, next_b = _seen_from(line, beam, end_x, end_y)
+        enter, leave = within_reach(a, b, next_a, next_b, line[beam, 8], ways.radius[i])
         if enter <= leave:
             if count[beam] == spans.shape[1]:
                 return False
