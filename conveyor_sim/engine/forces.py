@@ -46,19 +46,9 @@ def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> Non
     All bottles must be packed. dt: s, of the step, for the implicit solver. spring_dt: s, of slip by which the
     tangential springs are drawn out, or by `World.path` if there is one; 0: what they are then is not kept.
     """
-    _count_closed(world, world.implicit, worker, dt)
-    pair_forces(
-        world.settings,
-        world.bottles,
-        world.spin,
-        world.path,
-        world.pairs,
-        world.curves,
-        world.implicit,
-        worker,
-        spring_dt,
-    )
-    find_pair_parts(world.settings, world.bottles, world.spin, world.pairs, world.ledger, world.curves, worker)
+    _count_closed(world, worker, dt)
+    pair_forces(world, worker, spring_dt)
+    find_pair_parts(world, worker)
     wait_for_all(worker)
 
 
@@ -67,49 +57,13 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
     """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22)."""
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     sum_pair_parts(world.pairs, world.slots, world.ledger, first, end)
-    add_rail_forces(
-        world.settings,
-        world.bottles,
-        world.spin,
-        world.path,
-        world.load,
-        world.segments,
-        world.near_segments,
-        world.arcs,
-        world.near_arcs,
-        world.moving,
-        world.railed,
-        world.rail_law,
-        world.curves,
-        world.implicit,
-        world.ledger,
-        worker.found,
-        first,
-        end,
-        spring_dt,
-    )
+    add_rail_forces(world, worker.found, first, end, spring_dt)
     keep_load(world.load, world.spin, world.ledger, first, end)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(
-        world.settings,
-        world.bottles,
-        world.spin,
-        world.load,
-        world.belts,
-        world.surface,
-        world.footing,
-        world.ring,
-        world.implicit,
-        _belt_power(world.ledger),
-        dt,
-        first,
-        end,
-    )
+    add_base_friction(world, world.spin, world.load, world.implicit, _belt_power(world.ledger), dt, first, end)
     lag = world.settings.lag * dt
     add_static_friction(world.bottles, world.load, world.footing, world.static_friction, lag, True, first, end)
-    find_base_parts(
-        world.bottles, world.spin, world.load, world.belts, world.footing, world.ring, world.ledger, first, end
-    )
+    find_base_parts(world, first, end)
 
 
 @part
@@ -127,30 +81,18 @@ def _moments(spin: Any) -> Any:
 
 
 @part
-def _count_closed(world: World, implicit: Any, worker: Worker, dt: float) -> None:
+def _count_closed(world: World, worker: Worker, dt: float) -> None:
     """Count the closed contacts of every bottle, for the mass splitting of the implicit solver."""
+    bottles, implicit = world.bottles, world.implicit
     if implicit is None:
         return
-    bottles = world.bottles
     find_touching(world.settings, bottles, world.pairs, worker)
     wait_for_all(worker)
     begin, stop = share(worker, bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        sum_slots(world.slots, _touch(world.pairs), first, end, implicit.closed)
-        count_rail_contacts(
-            bottles,
-            world.segments,
-            world.near_segments,
-            world.arcs,
-            world.near_arcs,
-            world.moving,
-            world.railed,
-            worker.found,
-            first,
-            end,
-            implicit.closed,
-        )
+        sum_slots(world.slots, _touch(world), first, end, implicit.closed)
+        count_rail_contacts(world, worker.found, first, end, implicit.closed)
         for i in range(first, end):
             # The base is a contact too.
             implicit.closed[i] += 1.0
@@ -159,7 +101,7 @@ def _count_closed(world: World, implicit: Any, worker: Worker, dt: float) -> Non
 
 
 @part
-def _touch(pairs: Any) -> Any:
-    if pairs is None:
+def _touch(world: World) -> Any:
+    if world.pairs is None:
         return None
-    return pairs.touch
+    return world.pairs.touch

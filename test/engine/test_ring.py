@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import Listed
-from conveyor_sim.engine.arrays.support import Belts, Sectors, Surface
+from conveyor_sim.engine.arrays.support import Belts, Ring, Sectors, Surface
+from conveyor_sim.engine.arrays.world import Settings, World
+from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.support.ring import POINTS, ring_means, ring_share, straddling_ring
 
 LIMIT = 0.01
@@ -17,6 +20,11 @@ FINE = 1 << 16
 
 RADIUS, WEIGHT, MU = 0.03, 2.0, 0.4
 STRAIGHT = {"x": 0.0, "y": 0.0, "ax": 1.0, "ay": 0.0, "length": 2.0, "width": 1.0}
+
+
+@kernel
+def straddled(world: Any, vx: float, vy: float, omega: float, lag: float) -> Any:
+    return straddling_ring(0, world, vx, vy, omega, lag, None)
 
 
 def shares(slide: float, spin: float) -> tuple[float, float]:
@@ -101,8 +109,13 @@ def drag(
     belts: Belts, surface: Surface, x: float, y: float, vx: float, vy: float, omega: float, lag: float = 0.0
 ) -> NDArray[np.float64]:
     """Force over mu m g, and moment over mu m g R_b; lag: s by which velocities are older than positions."""
-    floor = len(surface.ux) - 1
-    force = straddling_ring(0, belts, surface, floor, x, y, vx, vy, omega, RADIUS, WEIGHT, 0, LIMIT, lag, None)
+    absent: Any = dict.fromkeys(World._fields)
+    settings = Settings(**{**dict.fromkeys(Settings._fields), "slip_limit": LIMIT})  # type: ignore[arg-type]
+    columns: Any = dict.fromkeys(Bottles._fields)
+    columns |= {"x": np.array([x]), "y": np.array([y]), "weight": np.array([WEIGHT]), "type": np.zeros(1, np.uint32)}
+    absent |= {"settings": settings, "bottles": Bottles(**columns), "belts": belts, "surface": surface}
+    world = World(**absent | {"ring": Ring(np.array([RADIUS]))})
+    force = straddled(world, vx, vy, omega, lag)
     return np.array(force) / (MU * WEIGHT) / [1.0, 1.0, RADIUS]
 
 

@@ -21,8 +21,8 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
-from conveyor_sim.engine.arrays.world import Settings, Worker
+from conveyor_sim.engine.arrays.contacts import Gathered, Pairs
+from conveyor_sim.engine.arrays.world import Settings, Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
 from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
@@ -50,47 +50,22 @@ def pack_row(packed: Any, i: int, x: float, y: float, vx: float, vy: float) -> N
 
 
 @part
-def pair_forces(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    path: Any,
-    pairs: Any,
-    curves: Any,
-    implicit: Any,
-    worker: Worker,
-    spring_dt: float,
-) -> None:
+def pair_forces(world: World, worker: Worker, spring_dt: float) -> None:
     """Find the forces and moments of this worker's share of the pairs, from `bottles.packed` and `spin.omega`.
 
-    path, spring_dt: how far the tangential springs are taken along (`pair_phase`).
+    spring_dt: s, how far the tangential springs are taken along (`pair_phase`).
     """
+    pairs, gathered = world.pairs, worker.gathered
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])
     for start in range(begin, stop, BLOCK):
         first: Any = uint64(start)
         count: Any = uint64(min(BLOCK, stop - start))
-        _gather(bottles.packed, spin, pairs, pairs.reach, first, count, worker.gathered)
-        _gather_compliance(implicit, pairs, first, count, worker.gathered.compliance)
-        _gather_ways(path, pairs, pairs.reach, first, count, worker.gathered.way)
-        _law(
-            settings,
-            settings.atan,
-            spin,
-            path,
-            pairs,
-            pairs.reach,
-            pairs.moment,
-            pairs.normal,
-            pairs.spring,
-            curves,
-            implicit,
-            worker.gathered,
-            first,
-            count,
-            spring_dt,
-        )
+        _gather(world.bottles.packed, world.spin, pairs, pairs.reach, first, count, gathered)
+        _gather_compliance(world.implicit, pairs, first, count, gathered.compliance)
+        _gather_ways(world.path, pairs, pairs.reach, first, count, gathered.way)
+        _law(world, gathered, first, count, spring_dt)
 
 
 @part
@@ -120,7 +95,7 @@ def _gather_rims(spin: Any, pairs: Pairs, reach: Any, first: int, count: int, ri
         if spin is not None:
             for c in range(count):
                 p = first + c
-                radius = pairs.radius_i[p]  # type: ignore[index]
+                radius = pairs.radius_i[p]
                 rim[c] = radius * spin.omega[pairs.i[p]] + (reach[p] - radius) * spin.omega[pairs.j[p]]
 
 
@@ -147,7 +122,7 @@ def _gather_ways(path: Any, pairs: Pairs, reach: Any, first: int, count: int, wa
 
 @part
 def _rim_way(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
-    radius = pairs.radius_i[p]  # type: ignore[index]
+    radius = pairs.radius_i[p]
     return radius * path.turn[pairs.i[p]] + (reach[p] - radius) * path.turn[pairs.j[p]]
 
 
@@ -161,23 +136,9 @@ def normal_and_overlap(dx: float, dy: float, reach: float) -> tuple[float, float
 
 
 @part
-def _law(
-    settings: Settings,
-    atan: Any,
-    spin: Any,
-    path: Any,
-    pairs: Pairs,
-    reach: Any,
-    moment: Any,
-    normals: Any,
-    springs: Any,
-    curves: Any,
-    implicit: Any,
-    gathered: Any,
-    first: int,
-    count: int,
-    spring_dt: float,
-) -> None:
+def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: float) -> None:
+    settings, path, pairs = world.settings, world.path, world.pairs
+    reach, springs = pairs.reach, pairs.spring
     difference, other = gathered.difference, first + uint64(pairs.i.size)
     half = 0.5 * settings.lever
     for c in range(count):
@@ -185,22 +146,25 @@ def _law(
         dvx, dvy = difference[row + _2], difference[row + _3]
         overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
         closing = -(dvx * nx + dvy * ny)
-        slip = dvx * ny - dvy * nx + _rim_slip(settings, spin, reach, gathered, c, half * overlap)
-        kept, deeper, slipped = elongation(springs, p), closing * spring_dt, slip * spring_dt
-        spring = _drawn_out(settings, pairs.law, path, reach, gathered, c, p, kept, overlap, deeper, slipped, nx, ny)
+        slip = dvx * ny - dvy * nx + _rim_slip(settings, world.spin, reach, gathered, c, half * overlap)
+        spring = elongation(springs, p)
+        if path is None:
+            spring = carried(pairs.law, p, spring, overlap, closing * spring_dt, slip * spring_dt)
+        else:
+            spring = _drawn_out(world, gathered, c, p, overlap, nx, ny)
         slip_time = slip_time_of(path, spring_dt)
         normal, tangential = contact_force(
             pairs.law,
             p,
-            curves,
+            world.curves,
             settings.slip_limit,
-            atan,
+            settings.atan,
             overlap,
             1.0,
             closing,
             slip,
             stretched(spring, slip, slip_time),
-            _compliance(settings, implicit, gathered, c),
+            _compliance(settings, world.implicit, gathered, c),
         )
         fx = -normal * nx - tangential * ny
         fy = tangential * nx - normal * ny
@@ -208,13 +172,13 @@ def _law(
         pairs.fy[p] = fy
         pairs.fx[q] = -fx
         pairs.fy[q] = -fy
-        if moment is not None:
+        if pairs.moment is not None:
             radius_i, radius_j = _radii(settings, pairs, reach, p)
-            moment[p] = (radius_i - half * overlap) * tangential
-            moment[q] = (radius_j - half * overlap) * tangential
-        if normals is not None:
-            normals[p] = normal
-            normals[q] = normal
+            pairs.moment[p] = (radius_i - half * overlap) * tangential
+            pairs.moment[q] = (radius_j - half * overlap) * tangential
+        if pairs.normal is not None:
+            pairs.normal[p] = normal
+            pairs.normal[q] = normal
         if springs is not None:
             after = spring_after(pairs.law, p, spring, overlap, slip, slip_time, normal, 1.0)
             springs.elongation[p] = after if spring_dt > 0.0 else springs.elongation[p]
@@ -231,7 +195,7 @@ def _reach(settings: Settings, reach: Any, p: int) -> float:
 def _radii(settings: Settings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
     if reach is None:
         return 0.5 * settings.reach, 0.5 * settings.reach
-    return pairs.radius_i[p], reach[p] - pairs.radius_i[p]  # type: ignore[index]
+    return pairs.radius_i[p], reach[p] - pairs.radius_i[p]
 
 
 @part
@@ -253,30 +217,12 @@ def elongation(springs: Any, p: int) -> Any:
 
 
 @part
-def _drawn_out(
-    settings: Settings,
-    law: ContactLaw,
-    path: Any,
-    reach: Any,
-    gathered: Any,
-    c: int,
-    p: int,
-    spring: Any,
-    overlap: float,
-    deeper: float,
-    slipped: float,
-    nx: float,
-    ny: float,
-) -> Any:
-    """Elongation (m) of a spring, or None, after what its bottles have gone since it was kept.
-
-    Without a path: of one that is yet to be drawn out by what has slipped (m), at an overlap (m) that is by so much
-    deeper (m).
-    """
-    if spring is None:
+def _drawn_out(world: World, gathered: Gathered, c: int, p: int, overlap: float, nx: float, ny: float) -> Any:
+    """Elongation (m) of a spring, or None, after what its bottles have gone since it was kept."""
+    settings, pairs = world.settings, world.pairs
+    if pairs.spring is None:
         return None
-    if path is None:
-        return carried(law, p, spring, overlap, deeper, slipped)
+    spring, reach = pairs.spring.elongation[p], pairs.reach
     way: Any = gathered.way
     row: Any = c * _4
     approach = -(way[row] * nx + way[row + _1] * ny)
@@ -285,7 +231,7 @@ def _drawn_out(
     along = (way[row] * ny - way[row + _1] * nx) * (distance / (distance + 0.5 * approach))
     shorter = 0.5 * settings.lever * (overlap - 0.5 * approach)
     further = way_in_touch(along + _rims_way(settings, reach, way, row, shorter), approach, overlap)
-    return carried(law, p, spring, overlap, approach, further) + further
+    return carried(pairs.law, p, spring, overlap, approach, further) + further
 
 
 @part

@@ -9,10 +9,9 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.integrators import Stage
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.arrays.world import Worker
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.threads.workers import share
 
@@ -29,16 +28,15 @@ def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
 
 
 @part
-def note_stage(
-    path: Any, bottles: Bottles, spin: Any, slopes: Any, times: F8, ways: F8, s: int, h: float, first: int, end: int
-) -> None:
+def note_stage(world: World, times: F8, ways: F8, s: int, h: float, first: int, end: int) -> None:
     """Bottles first to end are where row s of a tableau has them in a step of h (s); see `runge_kutta.py`."""
+    path, bottles, slopes = world.path, world.bottles, world.slopes
     if path is None:
         return
     for i in range(uint64(first), uint64(end)):
         path.x[i] = bottles.x[i] - slopes.x[i]
         path.y[i] = bottles.y[i] - slopes.y[i]
-    if spin is not None:
+    if world.spin is not None:
         for i in range(uint64(first), uint64(end)):
             path.turn[i] = h * times[s] * slopes.omega[i]
         for stage in range(s):

@@ -141,7 +141,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         stage += 1
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            go_to(bottles, world.spin, slopes, TIMES, WEIGHTS, WAYS, stage, h, first, end)
+            go_to(world, TIMES, WEIGHTS, WAYS, stage, h, first, end)
             if stage == LAST:
                 come_to_rest(bottles, world.spin, first, end)
             pack(bottles, first, end)

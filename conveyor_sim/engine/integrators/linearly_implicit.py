@@ -70,9 +70,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             for first in range(begin, stop, BLOCK):
                 _look_ahead(world, theta * dt, theta, first, min(first + BLOCK, stop))
             wait_for_all(worker)
-            linear_pairs(
-                world.settings, bottles, world.spin, linear, world.pairs, world.curves, worker, dt, theta, again
-            )
+            linear_pairs(world, worker, (dt, theta), again)
             wait_for_all(worker)
             for first in range(begin, stop, BLOCK):
                 _assemble(world, worker, dt, theta, first, min(first + BLOCK, stop))
@@ -140,23 +138,9 @@ def _stiffest(world: World, worker: Worker) -> float:
     linear: Any = world.linear
     begin, stop = share(worker, bottles.x.size)
     wait_for_all(worker)
-    stiffest_pairs(world.settings, bottles, linear, world.pairs, world.curves, worker)
+    stiffest_pairs(world, worker)
     for first in range(begin, stop, BLOCK):
-        stiffest_rails(
-            world.settings,
-            bottles,
-            linear,
-            world.segments,
-            world.near_segments,
-            world.arcs,
-            world.near_arcs,
-            world.railed,
-            world.rail_law,
-            world.curves,
-            worker.found,
-            first,
-            min(first + BLOCK, stop),
-        )
+        stiffest_rails(world, worker.found, first, min(first + BLOCK, stop))
     wait_for_all(worker)
     most = _most_of_pairs(world.pairs)
     for unit in range(linear.most.size):
@@ -188,55 +172,10 @@ def _assemble(world: World, worker: Worker, dt: float, theta: float, first: int,
     own, inverse = linear.own, linear.inverse
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     _inertia(bottles, world.spin, own, first, end)
-    linear_rails(
-        world.settings,
-        bottles,
-        world.spin,
-        world.load,
-        linear,
-        world.segments,
-        world.near_segments,
-        world.arcs,
-        world.near_arcs,
-        world.railed,
-        world.rail_law,
-        world.curves,
-        worker.found,
-        dt,
-        theta,
-        first,
-        end,
-    )
+    linear_rails(world, worker.found, (dt, theta), first, end)
     check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(
-        world.settings,
-        bottles,
-        world.spin,
-        world.load,
-        world.belts,
-        world.surface,
-        world.footing,
-        world.ring,
-        None,
-        None,
-        dt,
-        first,
-        end,
-    )
-    resist_base(
-        world.settings,
-        bottles,
-        world.spin,
-        own,
-        world.belts,
-        world.surface,
-        world.footing,
-        world.ring,
-        dt,
-        theta,
-        first,
-        end,
-    )
+    add_base_friction(world, world.spin, world.load, None, None, dt, first, end)
+    resist_base(world, dt, theta, first, end)
     _copy_blocks(own, inverse, first, end)
     add_pair_blocks(world.pairs, world.slots, inverse, first, end)
     factor(own, inverse, first, end)

@@ -82,8 +82,8 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 keep_state(bottles, world.spin, slopes, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
-            go_to(bottles, world.spin, slopes, TIMES, WEIGHTS, WAYS, stage + 1, dt, first, end)
-            note_stage(world.path, bottles, world.spin, slopes, TIMES, WAYS, stage + 1, dt, first, end)
+            go_to(world, TIMES, WEIGHTS, WAYS, stage + 1, dt, first, end)
+            note_stage(world, TIMES, WAYS, stage + 1, dt, first, end)
             if stage + 1 == STAGES:
                 come_to_rest(bottles, world.spin, first, end)
                 turn(world.spin, slopes, WAYS, dt, first, end)

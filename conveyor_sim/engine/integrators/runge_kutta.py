@@ -13,6 +13,7 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.integrators.motion import settle
 
@@ -59,10 +60,9 @@ def _keep_normals(normals: Any, sums: Any, j: int, first: int, end: int) -> None
 
 
 @part
-def go_to(
-    bottles: Bottles, spin: Any, slopes: Any, times: F8, weights: F8, ways: F8, s: int, h: float, first: int, end: int
-) -> None:
+def go_to(world: World, times: F8, weights: F8, ways: F8, s: int, h: float, first: int, end: int) -> None:
     """Put bottles where row s of a tableau has them in a step of h seconds; angles wait for the step's end."""
+    bottles, spin, slopes = world.bottles, world.spin, world.slopes
     ahead = h * times[s]
     for i in range(uint64(first), uint64(end)):
         bottles.x[i] = slopes.x[i] + ahead * slopes.vx[i]

@@ -12,9 +12,8 @@ In steps longer than a contact, theta > 1/2, three things differ, by `late` = 2 
 - Friction and damping resist by their secant to rest, force over slip, where a step could otherwise turn a slip round.
 """
 
-from typing import Any
-
 from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import contact_force
 
@@ -27,48 +26,45 @@ CONTACTS = 12.0
 
 @part
 def linear_contact(
+    world: World,
     law: ContactLaw,
     e: int,
-    curves: Any,
-    slip_limit: float,
-    atan: Any,
-    before: float,
-    ahead: float,
+    overlaps: tuple[float, float],
     share: float,
-    closing: float,
-    closing_ahead: float,
+    closing: tuple[float, float],
     slip: float,
-    mobility: float,
-    rim_mobility: float,
-    dt: float,
-    theta: float,
+    mobility: tuple[float, float],
+    step: tuple[float, float],
     hold: bool,
 ) -> tuple[float, float, float, float, float]:
     """Return N and T (N) ahead, what resists dv along n and t (kg), and N before the step.
 
-    before, ahead: m, overlaps; 0 or less: apart. share, closing, slip: as in `contact_force`. mobility, rim_mobility:
-    1/kg, what closing speed and slip gain from a unit of impulse. dt: s, of the step.
+    overlaps: m, before the step and ahead; 0 or less: apart. share, closing, slip: as in `contact_force`, closing
+    before and ahead. mobility: 1/kg, what closing speed and slip gain from a unit of impulse. step: dt, s, and theta.
     """
+    curves, slip_limit, atan = world.curves, world.settings.slip_limit, world.settings.atan
+    before, ahead = overlaps
+    dt, theta = step
     late = 2.0 * theta - 1.0
     least = DIFFERENCE * slip_limit
     speed = abs(slip) if abs(slip) > least else least
     faster = speed + least
-    normal, drag = contact_force(law, e, curves, slip_limit, atan, ahead, share, closing_ahead, speed, None, None)
-    _, drag_faster = contact_force(law, e, curves, slip_limit, atan, ahead, share, closing_ahead, faster, None, None)
-    normal_before, old = contact_force(law, e, curves, slip_limit, atan, before, share, closing, speed, None, None)
-    _, old_faster = contact_force(law, e, curves, slip_limit, atan, before, share, closing, faster, None, None)
+    normal, drag = contact_force(law, e, curves, slip_limit, atan, ahead, share, closing[1], speed, None, None)
+    _, drag_faster = contact_force(law, e, curves, slip_limit, atan, ahead, share, closing[1], faster, None, None)
+    normal_before, old = contact_force(law, e, curves, slip_limit, atan, before, share, closing[0], speed, None, None)
+    _, old_faster = contact_force(law, e, curves, slip_limit, atan, before, share, closing[0], faster, None, None)
     held = hold and normal <= 0.0
     depth = ahead
     if held:
         depth = before if before > 1e-9 else 1e-9
-    stiffness, damping, elastic = _slopes(law, e, curves, slip_limit, atan, depth, share)
+    stiffness, damping, elastic = _slopes(world, law, e, depth, share)
     if held:
-        normal = elastic + stiffness * (ahead - depth) + damping * closing_ahead
+        normal = elastic + stiffness * (ahead - depth) + damping * closing[1]
     acts = 1.0 if normal != 0.0 else 0.0
     drag += late * (old - drag)
     drag_faster += late * (old_faster - drag_faster)
-    along = dt * dt * theta * theta * stiffness + resistance(dt * damping, dt * damping, theta, CONTACTS * mobility)
-    across = resistance(dt * (drag - drag_faster) / least, -dt * drag / speed, theta, CONTACTS * rim_mobility)
+    along = dt * dt * theta * theta * stiffness + resistance(dt * damping, dt * damping, theta, CONTACTS * mobility[0])
+    across = resistance(dt * (drag - drag_faster) / least, -dt * drag / speed, theta, CONTACTS * mobility[1])
     return normal, drag * (slip / speed), acts * along, across, normal_before
 
 
@@ -90,21 +86,18 @@ def firmness(turns: float) -> float:
 
 
 @part
-def contact_stiffness(
-    law: ContactLaw, e: int, curves: Any, slip_limit: float, atan: Any, depth: float, share: float
-) -> float:
+def contact_stiffness(world: World, law: ContactLaw, e: int, depth: float, share: float) -> float:
     """Slope of the elastic force over the overlap, N/m, at a depth in m; 0 apart."""
-    stiffness, _, _ = _slopes(law, e, curves, slip_limit, atan, depth, share)
+    stiffness, _, _ = _slopes(world, law, e, depth, share)
     return stiffness
 
 
 @part
-def _slopes(
-    law: ContactLaw, e: int, curves: Any, slip_limit: float, atan: Any, depth: float, share: float
-) -> tuple[float, float, float]:
+def _slopes(world: World, law: ContactLaw, e: int, depth: float, share: float) -> tuple[float, float, float]:
     """Slope of N over overlap at rest (N/m), over closing speed (kg/s), where nothing is clamped, and N at rest (N)."""
     if not depth > 0.0:
         return 0.0, 0.0, 0.0
+    curves, slip_limit, atan = world.curves, world.settings.slip_limit, world.settings.atan
     step = DIFFERENCE * depth
     rest, _ = contact_force(law, e, curves, slip_limit, atan, depth, share, 0.0, 0.0, None, None)
     deeper, _ = contact_force(law, e, curves, slip_limit, atan, depth + step, share, 0.0, 0.0, None, None)

@@ -1,11 +1,8 @@
 """Friction under the bottles for the linearly implicit method: how it resists a change of velocity (`tangent.py`)."""
 
 import math
-from typing import Any
 
-from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.integrators import Blocks
-from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import regularisation
 from conveyor_sim.engine.integrators.tangent import DIFFERENCE, firmness, resistance
@@ -15,56 +12,35 @@ from conveyor_sim.engine.threads.workers import units
 
 
 @part
-def resist_base(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    own: Blocks,
-    belts: Any,
-    surface: Any,
-    footing: Any,
-    ring: Any,
-    dt: float,
-    theta: float,
-    first: int,
-    end: int,
-) -> None:
+def resist_base(world: World, dt: float, theta: float, first: int, end: int) -> None:
     """Add to the blocks of bottles first to end how the base friction resists, kg; `footing` must be that of now."""
-    if footing is None:
+    ring = world.ring
+    if world.footing is None:
         return
     if ring is None:
         for i in range(first, end):
-            _resist_point(settings, settings.atan, bottles, own, footing, footing.turn, dt, theta, i)
+            _resist_point(world, dt, theta, i)
     if ring is not None:
         for i in range(first, end):
             if ring.radius[i] > 0.0:
-                _resist_ring(settings, bottles, spin, own, footing, footing.turn, ring, dt, theta, i)
+                _resist_ring(world, dt, theta, i)
             else:
-                _resist_point(settings, settings.atan, bottles, own, footing, footing.turn, dt, theta, i)
-        _resist_straddling(settings, bottles, spin, own, belts, surface, footing, ring, dt, theta, first, end)
+                _resist_point(world, dt, theta, i)
+        _resist_straddling(world, dt, theta, first, end)
 
 
 @part
-def _resist_point(
-    settings: Settings,
-    atan: Any,
-    bottles: Bottles,
-    own: Blocks,
-    footing: Any,
-    turn: Any,
-    dt: float,
-    theta: float,
-    i: int,
-) -> None:
-    vx, vy = relative_velocity(bottles, footing, turn, 0.0, i)
+def _resist_point(world: World, dt: float, theta: float, i: int) -> None:
+    settings, bottles, footing, own = world.settings, world.bottles, world.footing, world.linear.own
+    vx, vy = relative_velocity(bottles, footing, footing.turn, 0.0, i)
     least = DIFFERENCE * settings.slip_limit
     speed = math.sqrt(vx * vx + vy * vy)
     far = speed if speed > least else least
     faster = far + least
-    quotient = regularisation(far, settings.slip_limit, atan)
+    quotient = regularisation(far, settings.slip_limit, settings.atan)
     limit = dt * footing.friction_limit[i]
     secant = limit * quotient
-    slope = limit * (faster * regularisation(faster, settings.slip_limit, atan) - far * quotient) / least
+    slope = limit * (faster * regularisation(faster, settings.slip_limit, settings.atan) - far * quotient) / least
     along = resistance(slope, secant, theta, 2.0 * bottles.inverse_mass[i])
     across = resistance(secant, secant, theta, 2.0 * bottles.inverse_mass[i])
     nx, ny = (vx / far, vy / far) if speed > least else (1.0, 0.0)
@@ -74,19 +50,11 @@ def _resist_point(
 
 
 @part
-def _resist_ring(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    own: Blocks,
-    footing: Any,
-    turn: Any,
-    ring: Any,
-    dt: float,
-    theta: float,
-    i: int,
-) -> None:
-    vx, vy = relative_velocity(bottles, footing, turn, 0.0, i)
+def _resist_ring(world: World, dt: float, theta: float, i: int) -> None:
+    settings, bottles, spin, own = world.settings, world.bottles, world.spin, world.linear.own
+    footing, ring = world.footing, world.ring
+    vx, vy = relative_velocity(bottles, footing, footing.turn, 0.0, i)
+    turn = footing.turn
     turning = spin.omega[i] - turn[i] if turn is not None else spin.omega[i]
     least = DIFFERENCE * settings.slip_limit
     speed, rim, radius = math.sqrt(vx * vx + vy * vy), abs(turning) * ring.radius[i], ring.radius[i]
@@ -119,36 +87,25 @@ def _ring_forces(slide: float, rim: float, slip_limit: float) -> tuple[float, fl
 
 
 @part
-def _resist_straddling(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    own: Blocks,
-    belts: Any,
-    surface: Any,
-    footing: Any,
-    ring: Any,
-    dt: float,
-    theta: float,
-    first: int,
-    end: int,
-) -> None:
+def _resist_straddling(world: World, dt: float, theta: float, first: int, end: int) -> None:
     """Rings that may stand on several belts; their secant is taken as if all stood on the belt under the axis."""
+    settings, bottles, belts, footing = world.settings, world.bottles, world.belts, world.footing
+    own = world.linear.own
     if belts is None:
         return
     begin, stop = units(first, end)
     for entry in range(belts.uncertain.first[begin], belts.uncertain.first[stop]):
         i = belts.uncertain.bottle[entry]
-        radius = ring.radius[i]
+        radius = world.ring.radius[i]
         if radius == 0.0:
             continue
         step = DIFFERENCE * settings.slip_limit
-        fx, fy, moment = _straddled(settings, bottles, belts, surface, ring, spin, i, 0.0, 0.0, 0.0)
-        fx_x, fy_x, moment_x = _straddled(settings, bottles, belts, surface, ring, spin, i, step, 0.0, 0.0)
-        _, fy_y, moment_y = _straddled(settings, bottles, belts, surface, ring, spin, i, 0.0, step, 0.0)
-        _, _, moment_t = _straddled(settings, bottles, belts, surface, ring, spin, i, 0.0, 0.0, step / radius)
+        fx, fy, moment = _straddled(world, i, 0.0, 0.0, 0.0)
+        fx_x, fy_x, moment_x = _straddled(world, i, step, 0.0, 0.0)
+        _, fy_y, moment_y = _straddled(world, i, 0.0, step, 0.0)
+        _, _, moment_t = _straddled(world, i, 0.0, 0.0, step / radius)
         vx, vy = relative_velocity(bottles, footing, footing.turn, 0.0, i)
-        limit = dt * surface.friction[footing.carrier[i], bottles.type[i]] * bottles.weight[i]
+        limit = dt * world.surface.friction[footing.carrier[i], bottles.type[i]] * bottles.weight[i]
         secant = limit * regularisation(math.sqrt(vx * vx + vy * vy), settings.slip_limit, None)
         turned = firmness(2.0 * secant * bottles.inverse_mass[i])
         slope = theta * (1.0 - turned) * dt / step
@@ -161,32 +118,6 @@ def _resist_straddling(
 
 
 @part
-def _straddled(
-    settings: Settings,
-    bottles: Bottles,
-    belts: Any,
-    surface: Any,
-    ring: Any,
-    spin: Any,
-    i: int,
-    dvx: float,
-    dvy: float,
-    domega: float,
-) -> tuple[float, float, float]:
-    return straddling_ring(
-        i,
-        belts,
-        surface,
-        surface.ux.size - 1,
-        bottles.x[i],
-        bottles.y[i],
-        bottles.vx[i] + dvx,
-        bottles.vy[i] + dvy,
-        spin.omega[i] + domega,
-        ring.radius[i],
-        bottles.weight[i],
-        bottles.type[i],
-        settings.slip_limit,
-        0.0,
-        None,
-    )
+def _straddled(world: World, i: int, dvx: float, dvy: float, domega: float) -> tuple[float, float, float]:
+    vx, vy, omega = world.bottles.vx[i] + dvx, world.bottles.vy[i] + dvy, world.spin.omega[i] + domega
+    return straddling_ring(i, world, vx, vy, omega, 0.0, None)

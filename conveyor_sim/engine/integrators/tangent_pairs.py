@@ -6,8 +6,9 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.contacts import Pairs
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear
-from conveyor_sim.engine.arrays.world import Settings, Worker
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import WIDTH
@@ -16,13 +17,12 @@ from conveyor_sim.engine.threads.workers import UNIT, share
 
 
 @part
-def stiffest_pairs(
-    settings: Settings, bottles: Bottles, linear: Linear, pairs: Any, curves: Any, worker: Worker
-) -> None:
+def stiffest_pairs(world: World, worker: Worker) -> None:
     """Write to `pairs.tangent.most`, for each unit, the largest stiffness times mobility (1/s^2) of closed contacts.
 
     Closed now, that is at `bottles.x`, or before the step.
     """
+    bottles, pairs = world.bottles, world.pairs
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])
@@ -30,43 +30,34 @@ def stiffest_pairs(
         most = 0.0
         for p in range(uint64(first), uint64(min(first + UNIT, stop))):
             i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
-            ahead, before, _, _ = _overlaps(bottles, linear, i, j)
+            ahead, before, _, _ = _overlaps(bottles, world.linear, i, j)
             depth = ahead if ahead > before else before
             if depth > 0.0:
-                stiffness = contact_stiffness(pairs.law, p, curves, settings.slip_limit, settings.atan, depth, 1.0)
+                stiffness = contact_stiffness(world, pairs.law, p, depth, 1.0)
                 rate = stiffness * (bottles.inverse_mass[i] + bottles.inverse_mass[j])
                 most = rate if rate > most else most
         pairs.tangent.most[first // UNIT] = most
 
 
 @part
-def linear_pairs(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    linear: Linear,
-    pairs: Any,
-    curves: Any,
-    worker: Worker,
-    dt: float,
-    theta: float,
-    again: int,
-) -> None:
+def linear_pairs(world: World, worker: Worker, step: tuple[float, float], again: int) -> None:
     """Find forces and moments ahead, and `pairs.tangent`, of this worker's share of the pairs.
 
-    Normal forces, for peaks, are those before the step.
+    Normal forces, for peaks, are those before the step. step: as in `linear_contact`.
     """
+    pairs = world.pairs
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
         i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
-        ahead, before, nx, ny = _overlaps(bottles, linear, i, j)
-        hold = theta > 0.5 and (before > 0.0 or (again > 0 and pairs.tangent.normal[p] > 0.0))
+        ahead, before, nx, ny = _overlaps(world.bottles, world.linear, i, j)
+        hold = step[1] > 0.5 and (before > 0.0 or (again > 0 and pairs.tangent.normal[p] > 0.0))
         if ahead > 0.0 or before > 0.0 or hold:
-            _close(settings, bottles, spin, linear, pairs, curves, p, i, j, ahead, before, nx, ny, dt, theta, hold)
+            _close(world, p, (before, ahead), nx, ny, step, hold)
         else:
-            _write(pairs, pairs.moment, pairs.normal, p, 0.0, 0.0, 0.0, 0.0, 0.0)
+            _write(pairs, p, 0.0, 0.0, 0.0, 0.0)
+            _note_normal(pairs, p, 0.0)
             pairs.tangent.normal[p] = 0.0
             pairs.tangent.tangential[p] = 0.0
 
@@ -82,54 +73,41 @@ def _overlaps(bottles: Bottles, linear: Linear, i: int, j: int) -> tuple[float, 
 
 @part
 def _close(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    linear: Linear,
-    pairs: Any,
-    curves: Any,
+    world: World,
     p: int,
-    i: int,
-    j: int,
-    ahead: float,
-    before: float,
+    overlaps: tuple[float, float],
     nx: float,
     ny: float,
-    dt: float,
-    theta: float,
+    step: tuple[float, float],
     hold: bool,
 ) -> None:
-    change = linear.change
+    """overlaps, step, hold: as in `linear_contact`."""
+    bottles, spin, pairs, change = world.bottles, world.spin, world.pairs, world.linear.change
+    i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
     vx, vy = bottles.vx[i] - bottles.vx[j], bottles.vy[i] - bottles.vy[j]
     dvx, dvy = change.x[i] - change.x[j], change.y[i] - change.y[j]
     slip, slip_change = vy * nx - vx * ny, dvy * nx - dvx * ny
     mobility = rim_mobility = bottles.inverse_mass[i] + bottles.inverse_mass[j]
     arm_i = arm_j = 0.0
     if spin is not None:
-        shorter = 0.5 * settings.lever * ahead
+        shorter = 0.5 * world.settings.lever * overlaps[1]
         arm_i, arm_j = bottles.radius[i] - shorter, bottles.radius[j] - shorter
         slip += spin.omega[i] * arm_i + spin.omega[j] * arm_j
         slip_change += change.turn[i] * arm_i + change.turn[j] * arm_j
         rim_mobility += arm_i * arm_i * spin.inverse_inertia[i] + arm_j * arm_j * spin.inverse_inertia[j]
     normal, tangential, along, across, normal_before = linear_contact(
+        world,
         pairs.law,
         p,
-        curves,
-        settings.slip_limit,
-        settings.atan,
-        before,
-        ahead,
+        overlaps,
         1.0,
-        vx * nx + vy * ny,
-        (vx + theta * dvx) * nx + (vy + theta * dvy) * ny,
+        (vx * nx + vy * ny, (vx + step[1] * dvx) * nx + (vy + step[1] * dvy) * ny),
         slip,
-        mobility,
-        rim_mobility,
-        dt,
-        theta,
+        (mobility, rim_mobility),
+        step,
         hold,
     )
-    tangential -= across * slip_change / dt
+    tangential -= across * slip_change / step[0]
     tangent = pairs.tangent
     tangent.nx[p] = nx
     tangent.ny[p] = ny
@@ -138,32 +116,27 @@ def _close(
     tangent.normal[p] = along
     tangent.tangential[p] = across
     fx, fy = -normal * nx - tangential * ny, tangential * nx - normal * ny
-    _write(pairs, pairs.moment, pairs.normal, p, fx, fy, arm_i * tangential, arm_j * tangential, normal_before)
+    _write(pairs, p, fx, fy, arm_i * tangential, arm_j * tangential)
+    _note_normal(pairs, p, normal_before)
 
 
 @part
-def _write(
-    pairs: Any,
-    moment: Any,
-    normals: Any,
-    p: int,
-    fx: float,
-    fy: float,
-    moment_i: float,
-    moment_j: float,
-    normal: float,
-) -> None:
+def _write(pairs: Pairs, p: int, fx: float, fy: float, moment_i: float, moment_j: float) -> None:
     q = p + uint64(pairs.i.size)
     pairs.fx[p] = fx
     pairs.fy[p] = fy
     pairs.fx[q] = -fx
     pairs.fy[q] = -fy
-    if moment is not None:
-        moment[p] = moment_i
-        moment[q] = moment_j
-    if normals is not None:
-        normals[p] = normal
-        normals[q] = normal
+    if pairs.moment is not None:
+        pairs.moment[p] = moment_i
+        pairs.moment[q] = moment_j
+
+
+@part
+def _note_normal(pairs: Pairs, p: int, normal: float) -> None:
+    if pairs.normal is not None:
+        pairs.normal[p] = normal
+        pairs.normal[p + uint64(pairs.i.size)] = normal
 
 
 @part
@@ -173,23 +146,22 @@ def resist_pairs(pairs: Any, way: Any, old: Any, beta: float, worker: Worker) ->
         return
     begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
-        _resist(pairs, pairs.tangent, pairs.moment, way, old, beta, p)
+        _resist(pairs, way, old, beta, p)
 
 
 @part
-def _resist(pairs: Any, tangent: Any, moment: Any, way: Any, old: Any, beta: float, p: int) -> None:
+def _resist(pairs: Pairs, way: Any, old: Any, beta: float, p: int) -> None:
+    tangent: Any = pairs.tangent
     i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
     nx, ny = tangent.nx[p], tangent.ny[p]
     vx = (way.x[i] + beta * old.x[i]) - (way.x[j] + beta * old.x[j])
     vy = (way.y[i] + beta * old.y[i]) - (way.y[j] + beta * old.y[j])
     slip = vy * nx - vx * ny
     arm_i, arm_j = tangent.arm_i[p], tangent.arm_j[p]
-    if moment is not None:
+    if pairs.moment is not None:
         slip += (way.turn[i] + beta * old.turn[i]) * arm_i + (way.turn[j] + beta * old.turn[j]) * arm_j
     along, across = tangent.normal[p] * (vx * nx + vy * ny), tangent.tangential[p] * slip
-    _write(
-        pairs, moment, None, p, along * nx - across * ny, along * ny + across * nx, across * arm_i, across * arm_j, 0.0
-    )
+    _write(pairs, p, along * nx - across * ny, along * ny + across * nx, across * arm_i, across * arm_j)
 
 
 @part

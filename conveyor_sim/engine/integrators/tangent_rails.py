@@ -2,39 +2,25 @@
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
-from conveyor_sim.engine.arrays.integrators import Linear
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.integrators.tangent import contact_stiffness, linear_contact
 from conveyor_sim.engine.integrators.tangent_pairs import add_block
 from conveyor_sim.engine.rails.arc import arc_contact
-from conveyor_sim.engine.rails.rails import find_rail_contacts, law_entry, rail_arm
+from conveyor_sim.engine.rails.deepest_contacts import law_entry, rail_arm
+from conveyor_sim.engine.rails.rails import find_rail_contacts
 from conveyor_sim.engine.rails.segment import segment_contact
 from conveyor_sim.engine.threads.workers import UNIT, units
 
 
 @part
-def stiffest_rails(
-    settings: Settings,
-    bottles: Bottles,
-    linear: Linear,
-    segments: Any,
-    near_segments: Any,
-    arcs: Any,
-    near_arcs: Any,
-    railed: Any,
-    law: Any,
-    curves: Any,
-    found: RailContacts,
-    first: int,
-    end: int,
-) -> None:
+def stiffest_rails(world: World, found: RailContacts, first: int, end: int) -> None:
     """Write to `linear.most`, for each unit of bottles first to end, the largest stiffness over mass (1/s^2).
 
     Of the contacts with rails that are closed now, at `bottles.x`.
     """
+    bottles, linear, railed = world.bottles, world.linear, world.railed
     begin, stop = units(first, end)
     for unit in range(begin, stop):
         linear.most[unit] = 0.0
@@ -43,37 +29,21 @@ def stiffest_rails(
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
         most = linear.most[i // UNIT]
-        for c in range(find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)):
-            entry = law_entry(settings, bottles, found, c, i)
-            stiffness = contact_stiffness(
-                law, entry, curves, settings.slip_limit, settings.atan, found.overlap[c], found.share[c]
-            )
+        for c in range(find_rail_contacts(i, world, found)):
+            entry = law_entry(world, found, c, i)
+            stiffness = contact_stiffness(world, world.rail_law, entry, found.overlap[c], found.share[c])
             rate = stiffness * bottles.inverse_mass[i]
             most = rate if rate > most else most
         linear.most[i // UNIT] = most
 
 
 @part
-def linear_rails(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    load: Load,
-    linear: Linear,
-    segments: Any,
-    near_segments: Any,
-    arcs: Any,
-    near_arcs: Any,
-    railed: Any,
-    law: Any,
-    curves: Any,
-    found: RailContacts,
-    dt: float,
-    theta: float,
-    first: int,
-    end: int,
-) -> None:
-    """Add what rails exert ahead on bottles first to end to `load` and `spin.moment`, and resist to `linear.own`."""
+def linear_rails(world: World, found: RailContacts, step: tuple[float, float], first: int, end: int) -> None:
+    """Add what rails exert ahead on bottles first to end to `load` and `spin.moment`, and resist to `linear.own`.
+
+    step: as in `linear_contact`.
+    """
+    bottles, linear, railed = world.bottles, world.linear, world.railed
     if railed is None:
         return
     begin, stop = units(first, end)
@@ -82,10 +52,10 @@ def linear_rails(
         x, y, radius = bottles.x[i], bottles.y[i], bottles.radius[i]
         old_x, old_y = linear.x[i], linear.y[i]
         # Contacts that are closed ahead; then those that were before the step, of surfaces that are not touched ahead.
-        for earlier in range(2 if theta > 0.5 else 1):
+        for earlier in range(2 if step[1] > 0.5 else 1):
             if earlier:
                 bottles.x[i], bottles.y[i] = old_x, old_y
-            count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, None, found)
+            count = find_rail_contacts(i, world, found)
             bottles.x[i], bottles.y[i] = x, y
             for c in range(count):
                 overlap = found.overlap[c]
@@ -93,40 +63,19 @@ def linear_rails(
                     away = found.nx[c] * (x - old_x) + found.ny[c] * (y - old_y)
                     before, ahead = overlap, min(overlap + away, 0.0)
                 else:
-                    entry = found.entry[c]
-                    before = _overlap(segments, near_segments, arcs, near_arcs, entry, old_x, old_y, radius)
+                    before = _overlap(world, found.entry[c], old_x, old_y, radius)
                     ahead = overlap
-                seen_to = earlier and _touched(
-                    segments, near_segments, arcs, near_arcs, found.surface[c], i, x, y, radius
-                )
+                seen_to = earlier and _touched(world, found.surface[c], i, x, y, radius)
                 if found.share[c] > 0.0 and not seen_to:
-                    _add_contact(
-                        settings,
-                        bottles,
-                        spin,
-                        load,
-                        linear,
-                        law,
-                        curves,
-                        found,
-                        c,
-                        i,
-                        before,
-                        ahead,
-                        dt,
-                        theta,
-                        earlier > 0,
-                    )
+                    _add_contact(world, found, c, i, (before, ahead), step, earlier > 0)
 
 
 @part
-def _overlap(
-    segments: Any, near_segments: Any, arcs: Any, near_arcs: Any, entry: int, x: float, y: float, radius: float
-) -> float:
+def _overlap(world: World, entry: int, x: float, y: float, radius: float) -> float:
     """Overlap (m) of a circle with the piece at an entry of the lists (`RailContacts.entry`)."""
     if entry >= 0:
-        return _segment_overlap(segments, near_segments, entry, x, y, radius)
-    return _arc_overlap(arcs, near_arcs, -1 - entry, x, y, radius)
+        return _segment_overlap(world.segments, world.near_segments, entry, x, y, radius)
+    return _arc_overlap(world.arcs, world.near_arcs, -1 - entry, x, y, radius)
 
 
 @part
@@ -146,18 +95,9 @@ def _arc_overlap(arcs: Any, near: Any, entry: int, x: float, y: float, radius: f
 
 
 @part
-def _touched(
-    segments: Any,
-    near_segments: Any,
-    arcs: Any,
-    near_arcs: Any,
-    surface: int,
-    i: int,
-    x: float,
-    y: float,
-    radius: float,
-) -> bool:
+def _touched(world: World, surface: int, i: int, x: float, y: float, radius: float) -> bool:
     """Whether bottle i at (x, y) touches a rail surface."""
+    segments, near_segments, arcs, near_arcs = world.segments, world.near_segments, world.arcs, world.near_arcs
     touched = False
     if segments is not None:
         for entry in range(near_segments.start[i], near_segments.start[i + 1]):
@@ -172,51 +112,39 @@ def _touched(
 
 @part
 def _add_contact(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    load: Load,
-    linear: Linear,
-    law: Any,
-    curves: Any,
+    world: World,
     found: RailContacts,
     c: int,
     i: int,
-    before: float,
-    ahead: float,
-    dt: float,
-    theta: float,
+    overlaps: tuple[float, float],
+    step: tuple[float, float],
     hold: bool,
 ) -> None:
+    """overlaps, step, hold: as in `linear_contact`."""
+    bottles, spin, load, linear = world.bottles, world.spin, world.load, world.linear
     nx, ny = found.nx[c], found.ny[c]
     closing, slip = bottles.vx[i] * nx + bottles.vy[i] * ny, bottles.vy[i] * nx - bottles.vx[i] * ny
     closing_change = linear.change.x[i] * nx + linear.change.y[i] * ny
     mobility = rim_mobility = bottles.inverse_mass[i]
     arm = 0.0
     if spin is not None:
-        arm = rail_arm(ahead, bottles.radius[i], settings.lever)
+        arm = rail_arm(overlaps[1], bottles.radius[i], world.settings.lever)
         slip += spin.omega[i] * arm
         rim_mobility += arm * arm * spin.inverse_inertia[i]
     normal, tangential, along, across, normal_before = linear_contact(
-        law,
-        law_entry(settings, bottles, found, c, i),
-        curves,
-        settings.slip_limit,
-        settings.atan,
-        before,
-        ahead,
+        world,
+        world.rail_law,
+        law_entry(world, found, c, i),
+        overlaps,
         found.share[c],
-        closing,
-        closing + theta * closing_change,
+        (closing, closing + step[1] * closing_change),
         slip,
-        mobility,
-        rim_mobility,
-        dt,
-        theta,
+        (mobility, rim_mobility),
+        step,
         hold,
     )
     # The block, which holds this contact, will take that off again.
-    normal -= along * closing_change / dt
+    normal -= along * closing_change / step[0]
     load.fx[i] += -normal * nx - tangential * ny
     load.fy[i] += tangential * nx - normal * ny
     if spin is not None:

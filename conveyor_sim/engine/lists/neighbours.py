@@ -81,7 +81,7 @@ def _fill_radii(pairs: Pairs, reach: Any, bottles: Bottles) -> None:
     if reach is None:
         return
     for p in range(pairs.used[0]):
-        pairs.radius_i[p] = bottles.radius[pairs.i[p]]  # type: ignore[index]
+        pairs.radius_i[p] = bottles.radius[pairs.i[p]]
         reach[p] = bottles.radius[pairs.i[p]] + bottles.radius[pairs.j[p]]
 
 

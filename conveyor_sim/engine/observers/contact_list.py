@@ -1,10 +1,9 @@
 """All closed contacts as columns, by the same functions that make the forces; read-only."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.arrays.world import World
@@ -23,14 +22,12 @@ def list_contacts(world: World, found: RailContacts, kind: NDArray[np.uint8], a:
     found: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m),
     N, T (N). The neighbour lists must hold. Friction that is solved implicitly is listed as the explicit law has it.
     """
-    count = _pair_contacts(world.settings, world.bottles, world.spin, world.pairs, world.curves, kind, a, b, values)
-    return _rail_contacts(world, world.bottles, world.spin, world.rail_law, found, kind, a, b, values, count)
+    return _rail_contacts(world, found, kind, a, b, values, _pair_contacts(world, kind, a, b, values))
 
 
 @part
-def _pair_contacts(
-    settings: Any, bottles: Any, spin: Any, pairs: Any, curves: Any, kind: NDArray[np.uint8], a: I8, b: I8, values: F8
-) -> int:
+def _pair_contacts(world: World, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
+    bottles, pairs = world.bottles, world.pairs
     if pairs is None:
         return 0
     count = 0
@@ -40,32 +37,21 @@ def _pair_contacts(
         overlap, nx, ny = normal_and_overlap(bottles.x[j] - bottles.x[i], bottles.y[j] - bottles.y[i], reach)
         if overlap > 0.0:
             if count < kind.size:
-                normal, tangential, _ = pair_contact(
-                    settings, bottles, spin, pairs, pairs.spring, curves, p, overlap, nx, ny
-                )
+                normal, tangential, _ = pair_contact(world, p, overlap, nx, ny)
                 kind[count] = BOTTLE_BOTTLE
                 a[count] = i
                 b[count] = j
                 arm = bottles.radius[i] - 0.5 * overlap
-                _write(values, count, bottles.x[i], bottles.y[i], arm, nx, ny, overlap, normal, tangential)
+                _write_point(values, count, bottles, i, arm * nx, arm * ny)
+                _write_force(values, count, nx, ny, overlap, normal, tangential)
             count += 1
     return count
 
 
 @part
-def pair_contact(
-    settings: Any,
-    bottles: Any,
-    spin: Any,
-    pairs: Any,
-    springs: Any,
-    curves: Any,
-    p: int,
-    overlap: float,
-    nx: float,
-    ny: float,
-) -> tuple[float, float, float]:
+def pair_contact(world: World, p: int, overlap: float, nx: float, ny: float) -> tuple[float, float, float]:
     """N and T (N) on the first bottle of pair p, and its slip (m/s); the normal is that from the first to the other."""
+    settings, bottles, spin, pairs = world.settings, world.bottles, world.spin, world.pairs
     i, j = pairs.i[p], pairs.j[p]
     vx = bottles.vx[i] - bottles.vx[j]
     vy = bottles.vy[i] - bottles.vy[j]
@@ -74,77 +60,46 @@ def pair_contact(
         shorter = 0.5 * settings.lever * overlap
         slip += spin.omega[i] * (bottles.radius[i] - shorter) + spin.omega[j] * (bottles.radius[j] - shorter)
     closing = vx * nx + vy * ny
-    limit, atan = settings.slip_limit, settings.atan
-    spring = elongation(springs, p)
-    normal, tangential = contact_force(pairs.law, p, curves, limit, atan, overlap, 1.0, closing, slip, spring, None)
+    limit, atan, spring = settings.slip_limit, settings.atan, elongation(pairs.spring, p)
+    normal, tangential = contact_force(
+        pairs.law, p, world.curves, limit, atan, overlap, 1.0, closing, slip, spring, None
+    )
     return normal, tangential, slip
 
 
 @part
 def _rail_contacts(
-    world: World,
-    bottles: Any,
-    spin: Any,
-    law: Any,
-    found: Any,
-    kind: NDArray[np.uint8],
-    a: I8,
-    b: I8,
-    values: F8,
-    count: int,
+    world: World, found: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8, count: int
 ) -> int:
-    if law is None:
+    bottles = world.bottles
+    if world.rail_law is None:
         return count
     for i in range(bottles.x.size):
-        here = find_rail_contacts(
-            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
-        )
-        for c in range(here):
+        for c in range(find_rail_contacts(i, world, found)):
             if found.share[c] > 0.0:
                 if count < kind.size:
-                    spring = rail_elongation(
-                        law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, i, found.entry[c]
-                    )
-                    normal, tangential, _, _ = rail_contact(
-                        c,
-                        i,
-                        world.settings,
-                        world.settings.atan,
-                        bottles,
-                        spin,
-                        world.moving,
-                        found,
-                        law,
-                        world.curves,
-                        spring,
-                        0.0,
-                        None,
-                    )
+                    spring = rail_elongation(world, i, found.entry[c])
+                    normal, tangential, _, _ = rail_contact(c, i, world, found, spring, 0.0, None)
                     nx, ny, overlap = found.nx[c], found.ny[c], found.overlap[c]
                     kind[count] = BOTTLE_RAIL
                     a[count] = i
                     b[count] = found.rail[c]
                     arm = bottles.radius[i] - overlap
-                    _write(values, count, bottles.x[i], bottles.y[i], arm, nx, ny, overlap, normal, tangential)
+                    _write_point(values, count, bottles, i, arm * nx, arm * ny)
+                    _write_force(values, count, nx, ny, overlap, normal, tangential)
                 count += 1
     return count
 
 
 @part
-def _write(
-    values: F8,
-    c: int,
-    x: float,
-    y: float,
-    arm: float,
-    nx: float,
-    ny: float,
-    overlap: float,
-    normal: float,
-    tangential: float,
-) -> None:
-    values[0, c] = x + arm * nx
-    values[1, c] = y + arm * ny
+def _write_point(values: F8, c: int, bottles: Bottles, i: int, x: float, y: float) -> None:
+    """x, y: from the axis of bottle i, m."""
+    values[0, c] = bottles.x[i] + x
+    values[1, c] = bottles.y[i] + y
+
+
+@part
+def _write_force(values: F8, c: int, nx: float, ny: float, overlap: float, normal: float, tangential: float) -> None:
     values[2, c] = nx
     values[3, c] = ny
     values[4, c] = overlap

@@ -24,6 +24,7 @@ from conveyor_sim.engine.support.base import add_base_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
 from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, wait_for_all
+from conveyor_sim.engine.world_views import for_forces
 
 
 @part
@@ -32,7 +33,7 @@ def note_damage(world: World, worker: Worker, dt: float) -> None:
 
     Every worker calls it; on return all have read what they need.
     """
-    _note(world, world.damage, worker, dt)
+    _note(for_forces(world), world.damage, worker, dt)
 
 
 @part
@@ -44,11 +45,11 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
     begin, stop = share(worker, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        _find_base(world, world.bottles, world.spin, damage.tipping, dt, first, end)
+        _find_base(world, damage.tipping, dt, first, end)
         for i in range(first, end):
             if world.bottles.id[i] >= 0:
-                count = _list_pairs(i, world, world.pairs, world.slots, damage.impacts, worker.history)
-                count = _list_rails(i, world, world.rail_law, damage, worker, count)
+                count = _list_pairs(i, world, damage.impacts, worker.history)
+                count = _list_rails(i, world, damage, worker, count)
                 _scuff(i, damage.scuffing, worker.history, count, dt)
                 _crush(i, damage.crushing, worker.history, count)
                 _hit(i, damage.impacts, worker.history, count)
@@ -58,22 +59,23 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
 
 
 @part
-def _list_pairs(i: int, world: World, pairs: Any, slots: Any, impacts: Any, history: LoadHistory) -> int:
+def _list_pairs(i: int, world: World, impacts: Any, history: LoadHistory) -> int:
     """Write the closed contacts of bottle i with others to `history`; return how many."""
-    if pairs is None:
+    slots = world.slots
+    if world.pairs is None:
         return 0
     count = 0
     for place in range(int(slots.filled[i])):
         # In one loop, or all of the law would be compiled twice.
         further = int(slots.more_start[i]) + place - WIDTH
         entry = slots.entry[i * WIDTH + place] if place < WIDTH else slots.more_entry[further]
-        count = _list_pair(i, int(entry), world, pairs, impacts, history, count)
+        count = _list_pair(i, int(entry), world, impacts, history, count)
     return count
 
 
 @part
-def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, history: LoadHistory, count: int) -> int:
-    bottles = world.bottles
+def _list_pair(i: int, entry: int, world: World, impacts: Any, history: LoadHistory, count: int) -> int:
+    bottles, pairs = world.bottles, world.pairs
     p = entry if entry < pairs.i.size else entry - pairs.i.size
     j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
     reach = bottles.radius[i] + bottles.radius[j]
@@ -83,44 +85,24 @@ def _list_pair(i: int, entry: int, world: World, pairs: Any, impacts: Any, histo
     overlap, nx, ny = normal_and_overlap(dx, dy, reach)
     # The law is that of i and j in the order of the pair.
     sign = 1.0 if entry < pairs.i.size else -1.0
-    normal, tangential, slip = pair_contact(
-        world.settings, bottles, world.spin, pairs, pairs.spring, world.curves, p, overlap, sign * nx, sign * ny
-    )
+    normal, tangential, slip = pair_contact(world, p, overlap, sign * nx, sign * ny)
     approach = _approach(impacts, i, nx, ny) - _approach(impacts, j, nx, ny)
-    _write(history, count, nx, ny, normal, tangential, slip, approach, bottles.id[j] + 1, -1)
+    _write_force(history, count, nx, ny, normal, tangential, slip)
+    _write_place(history, count, approach, bottles.id[j] + 1, -1)
     return count + 1
 
 
 @part
-def _list_rails(i: int, world: World, law: Any, damage: Any, worker: Worker, count: int) -> int:
-    if law is None:
+def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -> int:
+    if world.rail_law is None:
         return count
     bottles, found = world.bottles, worker.found
-    here = find_rail_contacts(
-        i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
-    )
-    for c in range(here):
+    for c in range(find_rail_contacts(i, world, found)):
         # What pushes through another piece of its surface counts there.
         if found.share[c] > 0.0 and count < MOST_BORNE:
             entry = found.entry[c]
-            spring = rail_elongation(
-                law.tangential_stiffness, world.near_segments, world.near_arcs, world.moving, i, entry
-            )
-            normal, tangential, slip, _ = rail_contact(
-                c,
-                i,
-                world.settings,
-                world.settings.atan,
-                bottles,
-                world.spin,
-                world.moving,
-                found,
-                law,
-                world.curves,
-                spring,
-                0.0,
-                None,
-            )
+            spring = rail_elongation(world, i, entry)
+            normal, tangential, slip, _ = rail_contact(c, i, world, found, spring, 0.0, None)
             nx, ny = found.nx[c], found.ny[c]
             arm = bottles.radius[i] - found.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
@@ -132,23 +114,15 @@ def _list_rails(i: int, world: World, law: Any, damage: Any, worker: Worker, cou
                 place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
             ux, uy = surface_velocity(world.moving, found, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
-            _write(worker.history, count, nx, ny, normal, tangential, slip, approach, key, place)
+            _write_force(worker.history, count, nx, ny, normal, tangential, slip)
+            _write_place(worker.history, count, approach, key, place)
             count += 1
     return count
 
 
 @part
-def _write(
-    history: LoadHistory,
-    c: int,
-    nx: float,
-    ny: float,
-    normal: float,
-    tangential: float,
-    slip: float,
-    approach: float,
-    key: int,
-    place: int,
+def _write_force(
+    history: LoadHistory, c: int, nx: float, ny: float, normal: float, tangential: float, slip: float
 ) -> None:
     history.nx[c] = nx
     history.ny[c] = ny
@@ -156,6 +130,10 @@ def _write(
     history.normal[c] = normal if normal > 0.0 else 0.0
     history.tangential[c] = tangential
     history.slip[c] = slip
+
+
+@part
+def _write_place(history: LoadHistory, c: int, approach: float, key: int, place: int) -> None:
     history.approach[c] = approach
     history.key[c] = key
     history.place[c] = place
@@ -294,31 +272,17 @@ def _keep_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> N
 
 
 @part
-def _find_base(world: World, bottles: Bottles, spin: Any, tipping: Any, dt: float, first: int, end: int) -> None:
+def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> None:
     """Find the friction under bottles first to end, N."""
     if tipping is None:
         return
     for i in range(first, end):
         tipping.fx[i] = tipping.fy[i] = tipping.moment[i] = 0.0
     load = Load(tipping.fx, tipping.fy, None, None)
-    check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(
-        world.settings,
-        bottles,
-        _apart(spin, tipping.moment),
-        load,
-        world.belts,
-        world.surface,
-        world.footing,
-        world.ring,
-        None,
-        None,
-        dt,
-        first,
-        end,
-    )
+    check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
+    add_base_friction(world, _apart(world.spin, tipping.moment), load, None, None, dt, first, end)
     lag = world.settings.lag * dt
-    add_static_friction(bottles, load, world.footing, world.static_friction, lag, False, first, end)
+    add_static_friction(world.bottles, load, world.footing, world.static_friction, lag, False, first, end)
 
 
 @part

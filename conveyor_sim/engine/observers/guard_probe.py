@@ -77,10 +77,7 @@ def _probe_rails(world: World, railed: Any, probe: GuardProbe, found: RailContac
     begin, stop = units(0, bottles.x.size)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        count = find_rail_contacts(
-            i, bottles, world.segments, world.near_segments, world.arcs, world.near_arcs, world.moving, found
-        )
-        for c in range(count):
+        for c in range(find_rail_contacts(i, world, found)):
             _note(probe, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
 
 

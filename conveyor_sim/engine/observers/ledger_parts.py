@@ -10,29 +10,28 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
-from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.integrators import Triple
-from conveyor_sim.engine.arrays.observers import Ledger
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Settings, Worker
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import drag_force, elastic_force
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
 from conveyor_sim.engine.contact.slots import sum_slots
+from conveyor_sim.engine.rails.deepest_contacts import law_entry, rail_arm
 from conveyor_sim.engine.rails.moving import add_rail_power
 from conveyor_sim.engine.threads.workers import UNIT, share, units
 
 
 @part
-def find_pair_parts(
-    settings: Settings, bottles: Bottles, spin: Any, pairs: Any, ledger: Any, curves: Any, worker: Worker
-) -> None:
+def find_pair_parts(world: World, worker: Worker) -> None:
     """Take the forces just found for this worker's share of the pairs apart, into `pairs.parts`."""
-    if ledger is None:
+    bottles, spin, pairs = world.bottles, world.spin, world.pairs
+    if world.ledger is None:
         return
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])
+    count: Any = uint64(pairs.i.size)
     for p in range(uint64(begin), uint64(stop)):
         i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
         reach = bottles.radius[i] + bottles.radius[j]
@@ -43,15 +42,15 @@ def find_pair_parts(
             vx, vy = bottles.vx[i] - bottles.vx[j], bottles.vy[i] - bottles.vy[j]
             slip = vy * nx - vx * ny
             if spin is not None:
-                shorter = 0.5 * settings.lever * overlap
+                shorter = 0.5 * world.settings.lever * overlap
                 arm_i, arm_j = bottles.radius[i] - shorter, bottles.radius[j] - shorter
                 slip += spin.omega[i] * arm_i + spin.omega[j] * arm_j
-            elastic = elastic_force(pairs.law, p, curves, overlap)
+            elastic = elastic_force(pairs.law, p, world.curves, overlap)
             drag = drag_force(pairs.law, p, elastic, overlap, -slip)
             along = -(pairs.fx[p] * nx + pairs.fy[p] * ny) - elastic
             across = pairs.fy[p] * nx - pairs.fx[p] * ny - drag
-        _write(pairs.parts.damping, p, uint64(pairs.i.size), along, drag, nx, ny, arm_i, arm_j)
-        _write(pairs.parts.friction, p, uint64(pairs.i.size), 0.0, across, nx, ny, arm_i, arm_j)
+        _write(pairs.parts.damping, p, count, along, drag, nx, ny, arm_i, arm_j)
+        _write(pairs.parts.friction, p, count, 0.0, across, nx, ny, arm_i, arm_j)
 
 
 @part
@@ -104,24 +103,16 @@ def _sum(slots: Any, by_pair: Triple, force: Triple, first: int, end: int) -> No
 
 @part
 def add_rail_parts(
-    ledger: Ledger,
-    law: ContactLaw,
-    curves: Any,
-    e: int,
-    moving: Any,
-    found: RailContacts,
-    c: int,
-    bottles: Bottles,
-    i: int,
-    arm: float,
-    normal: float,
-    tangential: float,
-    slip: float,
+    world: World, found: RailContacts, c: int, i: int, normal: float, tangential: float, slip: float
 ) -> None:
-    """Take N and T (N) of contact c of bottle i with a rail apart; arm in m, slip in m/s."""
+    """Take N and T (N) of contact c of bottle i with a rail apart; slip in m/s."""
+    ledger, law = world.ledger, world.rail_law
+    if ledger is None:
+        return
     nx, ny, overlap, shared = found.nx[c], found.ny[c], found.overlap[c], found.share[c]
-    elastic = elastic_force(law, e, curves, overlap)
-    drag = shared * drag_force(law, e, elastic, overlap, -slip)
+    entry, arm = law_entry(world, found, c, i), rail_arm(overlap, world.bottles.radius[i], world.settings.lever)
+    elastic = elastic_force(law, entry, world.curves, overlap)
+    drag = shared * drag_force(law, entry, elastic, overlap, -slip)
     along = normal - shared * elastic
     across = tangential - drag
     damping, friction = ledger.damping, ledger.friction
@@ -131,7 +122,7 @@ def add_rail_parts(
     friction.x[i] -= across * ny
     friction.y[i] += across * nx
     friction.turn[i] += arm * across
-    add_rail_power(ledger, moving, found, c, bottles, i, normal, tangential, along, drag, across)
+    add_rail_power(world, found, c, i, normal, tangential, along, drag, across)
 
 
 @part
@@ -152,18 +143,9 @@ def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
 
 
 @part
-def find_base_parts(
-    bottles: Bottles,
-    spin: Any,
-    load: Load,
-    belts: Any,
-    footing: Any,
-    ring: Any,
-    ledger: Any,
-    first: int,
-    end: int,
-) -> None:
+def find_base_parts(world: World, first: int, end: int) -> None:
     """Find what base friction has added to the load of bottles first to end, and the power of each belt."""
+    load, spin, footing, ledger = world.load, world.spin, world.footing, world.ledger
     if ledger is None:
         return
     base = ledger.base
@@ -176,8 +158,8 @@ def find_base_parts(
     if footing is not None:
         for i in range(uint64(first), uint64(end)):
             # A ring that may straddle belts was booked point by point.
-            if not _by_points(belts, ring, i):
-                power = _belt_power(bottles, footing, footing.turn, base, i)
+            if not _by_points(world.belts, world.ring, i):
+                power = _belt_power(world.bottles, footing, footing.turn, base, i)
                 ledger.belt_power[i // uint64(UNIT), footing.carrier[i]] += power
 
 

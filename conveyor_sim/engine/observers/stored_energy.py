@@ -8,7 +8,8 @@ from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.contact import elastic_energy, spring_energy
 from conveyor_sim.engine.contact.pairs import elongation, normal_and_overlap
-from conveyor_sim.engine.rails.rails import find_rail_contacts, law_entry, rail_elongation
+from conveyor_sim.engine.rails.deepest_contacts import law_entry
+from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_elongation
 from conveyor_sim.engine.support.static_friction import anchor_energy
 
 KINETIC, ELASTIC, SPRINGS, BASE_SPRINGS = 0, 1, 2, 3
@@ -24,7 +25,7 @@ def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
     energy[:] = 0.0
     _kinetic(world.bottles, world.spin, energy)
     _in_pairs(world.bottles, world.pairs, world.curves, energy)
-    _at_rails(world, world.rail_law, found, energy)
+    _at_rails(world, found, energy)
     anchor_energy(world.bottles, world.static_friction, energy, BASE_SPRINGS)
 
 
@@ -54,14 +55,13 @@ def _in_pairs(bottles: Any, pairs: Any, curves: Any, energy: F8) -> None:
 
 
 @part
-def _at_rails(world: World, law: Any, found: RailContacts, energy: F8) -> None:
+def _at_rails(world: World, found: RailContacts, energy: F8) -> None:
+    law = world.rail_law
     if law is None:
         return
-    bottles, near_segments, near_arcs, moving = world.bottles, world.near_segments, world.near_arcs, world.moving
-    for i in range(bottles.x.size):
-        count = find_rail_contacts(i, bottles, world.segments, near_segments, world.arcs, near_arcs, moving, found)
-        for c in range(count):
-            e = law_entry(world.settings, bottles, found, c, i)
-            spring = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
+    for i in range(world.bottles.x.size):
+        for c in range(find_rail_contacts(i, world, found)):
+            e = law_entry(world, found, c, i)
+            spring = rail_elongation(world, i, found.entry[c])
             energy[ELASTIC] += found.share[c] * elastic_energy(law, e, world.curves, found.overlap[c])
             energy[SPRINGS] += found.share[c] * spring_energy(law, e, spring, found.overlap[c])

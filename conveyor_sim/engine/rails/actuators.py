@@ -34,9 +34,10 @@ def clear_push(actuators: Any, first: int, end: int) -> None:
 
 @part
 def add_push(
-    actuators: Any, moving: Any, found: RailContacts, c: int, q: int, bottles: Bottles, i: int, n: float, t: float
+    moving: MovingRails, found: RailContacts, c: int, q: int, bottles: Bottles, i: int, n: float, t: float
 ) -> None:
     """Add what contact c of bottle i exerts on rail q along its motion; n and t: N and T on the bottle, N."""
+    actuators = moving.actuators
     if actuators is None:
         return
     ahead, aside = _motion_at(moving, found, c, q, bottles, i)
@@ -45,8 +46,7 @@ def add_push(
 
 @part
 def add_push_parts(
-    actuators: Any,
-    moving: Any,
+    moving: MovingRails,
     found: RailContacts,
     c: int,
     q: int,
@@ -57,6 +57,7 @@ def add_push_parts(
     across: float,
 ) -> None:
     """The same of what damping and friction have of it, for the energy ledger (`add_rail_power`)."""
+    actuators = moving.actuators
     if actuators is None:
         return
     ahead, aside = _motion_at(moving, found, c, q, bottles, i)

@@ -1,7 +1,8 @@
 """The contacts of one bottle with rails, the deepest ones: what touches it is kept here, whatever kind it is of."""
 
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.compiler.compile import kernel
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.threads.workers import MOST_CONTACTS
 
 
@@ -34,3 +35,15 @@ def keep_deepest(
     found.surface[place] = surface
     found.entry[place] = entry
     return min(count + 1, MOST_CONTACTS)
+
+
+@part
+def law_entry(world: World, found: RailContacts, c: int, i: int) -> int:
+    """Entry of contact c of bottle i in the rails' law."""
+    return world.bottles.type[i] * world.settings.rail_materials + found.material[c]
+
+
+@part
+def rail_arm(overlap: float, radius: float, lever: float) -> float:
+    """Arm from the axis to the contact point, m: R - delta, or the paper's R."""
+    return radius - lever * overlap

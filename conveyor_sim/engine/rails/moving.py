@@ -12,7 +12,7 @@ from typing import Any
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.moving import MovingRails
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Worker
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.rails.actuators import add_push, add_push_parts, clear_push, drive_rails, is_off_profile
 from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
@@ -146,7 +146,7 @@ def add_rail_push(
     q = found.entry[c] - MOVING
     if q < 0:
         return
-    add_push(moving.actuators, moving, found, c, q, bottles, i, normal, tangential)
+    add_push(moving, found, c, q, bottles, i, normal, tangential)
 
 
 @part
@@ -202,11 +202,9 @@ def clear_rail_power(ledger: Any, moving: Any, first: int, end: int) -> None:
 
 @part
 def add_rail_power(
-    ledger: Any,
-    moving: Any,
+    world: World,
     found: RailContacts,
     c: int,
-    bottles: Bottles,
     i: int,
     normal: float,
     tangential: float,
@@ -219,16 +217,17 @@ def add_rail_power(
     N of the contact and of its damping, T of the contact, of its drag and of its friction, all in N. What a force F
     dissipates is F (u - v): `ledger.py` has F v.
     """
+    moving, ledger = world.moving, world.ledger
     if moving is None:
         return
     q = found.entry[c] - MOVING
     if q < 0:
         return
-    ux, uy = surface_velocity(moving, found, c, bottles, i)
+    ux, uy = surface_velocity(moving, found, c, world.bottles, i)
     ahead = ux * found.nx[c] + uy * found.ny[c]
     aside = uy * found.nx[c] - ux * found.ny[c]
     unit, rails = i // UNIT, moving.x.size
     ledger.rail_power[unit, q] += tangential * aside - normal * ahead
     ledger.rail_power[unit, rails] += drag * aside - damped * ahead
     ledger.rail_power[unit, rails + 1] += across * aside
-    add_push_parts(moving.actuators, moving, found, c, q, bottles, i, damped, drag, across)
+    add_push_parts(moving, found, c, q, world.bottles, i, damped, drag, across)

@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw
 from conveyor_sim.engine.arrays.rails import RailContacts
-from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.arrays.world import Settings, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
 from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
 from conveyor_sim.engine.observers.ledger_parts import add_rail_parts
 from conveyor_sim.engine.rails.arc import arc_contact
-from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
+from conveyor_sim.engine.rails.deepest_contacts import keep_deepest, law_entry, rail_arm
 from conveyor_sim.engine.rails.moving import (
     add_rail_push,
     clear_rail_power,
@@ -56,20 +56,11 @@ def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, found: RailCon
 
 
 @part
-def find_rail_contacts(
-    i: int,
-    bottles: Bottles,
-    segments: Any,
-    near_segments: Any,
-    arcs: Any,
-    near_arcs: Any,
-    moving: Any,
-    found: RailContacts,
-) -> int:
+def find_rail_contacts(i: int, world: World, found: RailContacts) -> int:
     """Fill `found` with the contacts of bottle i with rails, shares included; return how many."""
-    count = _segment_contacts(i, bottles, segments, near_segments, found, 0)
-    count = _arc_contacts(i, bottles, arcs, near_arcs, found, count)
-    count = moving_contacts(i, bottles, moving, found, count)
+    count = _segment_contacts(i, world.bottles, world.segments, world.near_segments, found, 0)
+    count = _arc_contacts(i, world.bottles, world.arcs, world.near_arcs, found, count)
+    count = moving_contacts(i, world.bottles, world.moving, found, count)
     if count == 1:
         found.share[0] = 1.0
     elif count > 1:
@@ -79,39 +70,28 @@ def find_rail_contacts(
 
 @part
 def rail_contact(
-    c: int,
-    i: int,
-    settings: Settings,
-    atan: Any,
-    bottles: Bottles,
-    spin: Any,
-    moving: Any,
-    found: RailContacts,
-    law: ContactLaw,
-    curves: Any,
-    spring: Any,
-    spring_dt: float,
-    implicit: Any,
+    c: int, i: int, world: World, found: RailContacts, spring: Any, spring_dt: float, implicit: Any
 ) -> tuple[float, float, float, Any]:
     """N and T (N) on bottle i in its contact c with a rail, its slip (m/s) along it, and its spring before that slip.
 
     spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: as in `contact_force`.
     """
+    bottles, spin, settings, law = world.bottles, world.spin, world.settings, world.rail_law
     nx, ny = found.nx[c], found.ny[c]
-    ux, uy = surface_velocity(moving, found, c, bottles, i)
+    ux, uy = surface_velocity(world.moving, found, c, bottles, i)
     vx, vy = bottles.vx[i] - ux, bottles.vy[i] - uy
     closing = vx * nx + vy * ny
     slip = -vx * ny + vy * nx
     if spin is not None:
         slip += spin.omega[i] * rail_arm(found.overlap[c], bottles.radius[i], settings.lever)
-    entry = law_entry(settings, bottles, found, c, i)
+    entry = law_entry(world, found, c, i)
     kept = carried(law, entry, spring, found.overlap[c], closing * spring_dt, slip * spring_dt)
     normal, tangential = contact_force(
         law,
         entry,
-        curves,
+        world.curves,
         settings.slip_limit,
-        atan,
+        settings.atan,
         found.overlap[c],
         found.share[c],
         closing,
@@ -123,139 +103,73 @@ def rail_contact(
 
 
 @part
-def law_entry(settings: Settings, bottles: Bottles, found: RailContacts, c: int, i: int) -> int:
-    """Entry of contact c of bottle i in the rails' law."""
-    return bottles.type[i] * settings.rail_materials + found.material[c]
-
-
-@part
-def rail_arm(overlap: float, radius: float, lever: float) -> float:
-    """Arm from the axis to the contact point, m: R - delta, or the paper's R."""
-    return radius - lever * overlap
-
-
-@part
-def count_rail_contacts(
-    bottles: Bottles,
-    segments: Any,
-    near_segments: Any,
-    arcs: Any,
-    near_arcs: Any,
-    moving: Any,
-    railed: Any,
-    found: RailContacts,
-    first: int,
-    end: int,
-    counts: Any,
-) -> None:
+def count_rail_contacts(world: World, found: RailContacts, first: int, end: int, counts: Any) -> None:
     """Add to counts[i] the closed rail contacts of bottles first to end; for the implicit solver."""
+    railed = world.railed
     if railed is None:
         return
     begin, stop = units(first, end)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        counts[i] += find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, moving, found)
+        counts[i] += find_rail_contacts(i, world, found)
 
 
 @part
-def add_rail_forces(
-    settings: Settings,
-    bottles: Bottles,
-    spin: Any,
-    path: Any,
-    load: Load,
-    segments: Any,
-    near_segments: Any,
-    arcs: Any,
-    near_arcs: Any,
-    moving: Any,
-    railed: Any,
-    law: Any,
-    curves: Any,
-    implicit: Any,
-    ledger: Any,
-    found: RailContacts,
-    first: int,
-    end: int,
-    spring_dt: float,
-) -> None:
+def add_rail_forces(world: World, found: RailContacts, first: int, end: int, spring_dt: float) -> None:
     """Add the forces and moments of all rails on bottles first to end to `load` and `spin.moment`.
 
-    path, spring_dt: how far the tangential springs are taken along (`pair_phase`).
+    spring_dt: s, how far the tangential springs are taken along (`pair_phase`).
     """
+    railed = world.railed
     if railed is None:
         return
-    clear_rail_power(ledger, moving, first, end)
-    clear_rail_push(moving, first, end)
+    bottles, spin, load, law = world.bottles, world.spin, world.load, world.rail_law
+    clear_rail_power(world.ledger, world.moving, first, end)
+    clear_rail_push(world.moving, first, end)
     begin, stop = units(first, end)
-    slip_time = slip_time_of(path, spring_dt)
+    slip_time = slip_time_of(world.path, spring_dt)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        count = find_rail_contacts(i, bottles, segments, near_segments, arcs, near_arcs, moving, found)
+        count = find_rail_contacts(i, world, found)
         for c in range(count):
             found.solution[c] = 0.0
             if found.share[c] > 0.0:
-                kept = rail_elongation(law.tangential_stiffness, near_segments, near_arcs, moving, i, found.entry[c])
-                spring = _drawn_out(settings, law, bottles, spin, path, moving, found, c, i, kept)
-                compliance = _compliance(settings, implicit, i)
-                normal, tangential, slip, spring = rail_contact(
-                    c,
-                    i,
-                    settings,
-                    settings.atan,
-                    bottles,
-                    spin,
-                    moving,
-                    found,
-                    law,
-                    curves,
-                    spring,
-                    slip_time,
-                    compliance,
-                )
+                spring = _drawn_out(world, found, c, i, rail_elongation(world, i, found.entry[c]))
+                compliance = _compliance(world.settings, world.implicit, i)
+                normal, tangential, slip, spring = rail_contact(c, i, world, found, spring, slip_time, compliance)
                 load.fx[i] += -normal * found.nx[c] - tangential * found.ny[c]
                 load.fy[i] += -normal * found.ny[c] + tangential * found.nx[c]
-                add_rail_push(moving, found, c, bottles, i, normal, tangential)
+                add_rail_push(world.moving, found, c, bottles, i, normal, tangential)
                 _note_normal(load.normal_sum, load.normal_max, i, normal)
-                _note_parts(ledger, settings, bottles, moving, found, c, i, law, curves, normal, tangential, slip)
+                add_rail_parts(world, found, c, i, normal, tangential, slip)
                 if spin is not None:
-                    spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], settings.lever) * tangential
-                entry = law_entry(settings, bottles, found, c, i)
+                    spin.moment[i] += rail_arm(found.overlap[c], bottles.radius[i], world.settings.lever) * tangential
+                entry = law_entry(world, found, c, i)
                 found.solution[c] = _spring_after(
                     law, entry, spring, found.overlap[c], slip, slip_time, normal, found.share[c]
                 )
         if spring_dt > 0.0:
-            _store_springs(law.tangential_stiffness, near_segments, near_arcs, moving, found, count, i)
+            _store_springs(world, found, count, i)
 
 
 @part
-def _drawn_out(
-    settings: Settings,
-    law: ContactLaw,
-    bottles: Bottles,
-    spin: Any,
-    path: Any,
-    moving: Any,
-    found: RailContacts,
-    c: int,
-    i: int,
-    spring: Any,
-) -> Any:
+def _drawn_out(world: World, found: RailContacts, c: int, i: int, spring: Any) -> Any:
     """Elongation (m) of a spring, or None, after what bottle and rail have gone since it was kept."""
+    path = world.path
     if spring is None:
         return None
     if path is None:
         return spring
+    bottles = world.bottles
     nx, ny = found.nx[c], found.ny[c]
-    ux, uy = surface_path(moving, found, c, bottles, i)
+    ux, uy = surface_path(world.moving, found, c, bottles, i)
     x, y = path.x[i] - ux, path.y[i] - uy
     approach = x * nx + y * ny
     way = y * nx - x * ny
-    if spin is not None:
-        way += path.turn[i] * rail_arm(found.overlap[c] - 0.5 * approach, bottles.radius[i], settings.lever)
-    entry = law_entry(settings, bottles, found, c, i)
+    if world.spin is not None:
+        way += path.turn[i] * rail_arm(found.overlap[c] - 0.5 * approach, bottles.radius[i], world.settings.lever)
     further = way_in_touch(way, approach, found.overlap[c])
-    return carried(law, entry, spring, found.overlap[c], approach, further) + further
+    return carried(world.rail_law, law_entry(world, found, c, i), spring, found.overlap[c], approach, further) + further
 
 
 @part
@@ -275,39 +189,6 @@ def _note_normal(sums: Any, largest: Any, i: int, normal: float) -> None:
 
 
 @part
-def _note_parts(
-    ledger: Any,
-    settings: Settings,
-    bottles: Bottles,
-    moving: Any,
-    found: RailContacts,
-    c: int,
-    i: int,
-    law: ContactLaw,
-    curves: Any,
-    normal: float,
-    tangential: float,
-    slip: float,
-) -> None:
-    if ledger is not None:
-        add_rail_parts(
-            ledger,
-            law,
-            curves,
-            law_entry(settings, bottles, found, c, i),
-            moving,
-            found,
-            c,
-            bottles,
-            i,
-            rail_arm(found.overlap[c], bottles.radius[i], settings.lever),
-            normal,
-            tangential,
-            slip,
-        )
-
-
-@part
 def _compliance(settings: Settings, implicit: Any, i: int) -> Any:
     if implicit is None:
         return None
@@ -315,15 +196,15 @@ def _compliance(settings: Settings, implicit: Any, i: int) -> Any:
 
 
 @part
-def rail_elongation(tangential: Any, near_segments: Any, near_arcs: Any, moving: Any, i: int, entry: int) -> Any:
-    """Elongation of the spring of a contact of bottle i, by its entry in the lists (`RailContacts.entry`)."""
-    if tangential is None:
+def rail_elongation(world: World, i: int, entry: int) -> Any:
+    """Elongation of the spring of a contact of bottle i, by its entry in the lists (`RailContacts.entry`), or None."""
+    if world.rail_law.tangential_stiffness is None:
         return None
-    if moves(moving, entry):
-        return moving_spring(moving, i, entry)
+    if moves(world.moving, entry):
+        return moving_spring(world.moving, i, entry)
     if entry >= 0:
-        return _spring_at(near_segments, entry)
-    return _spring_at(near_arcs, -1 - entry)
+        return _spring_at(world.near_segments, entry)
+    return _spring_at(world.near_arcs, -1 - entry)
 
 
 @part
@@ -334,22 +215,20 @@ def _spring_at(near: Any, entry: int) -> float:
 
 
 @part
-def _store_springs(
-    tangential: Any, near_segments: Any, near_arcs: Any, moving: Any, found: Any, count: int, i: int
-) -> None:
+def _store_springs(world: World, found: RailContacts, count: int, i: int) -> None:
     """Keep the springs of the closed contacts of bottle i, forget those of all its other rails."""
-    if tangential is None:
+    if world.rail_law.tangential_stiffness is None:
         return
-    _forget_springs(near_segments, i)
-    _forget_springs(near_arcs, i)
-    forget_moving_springs(moving, i)
+    _forget_springs(world.near_segments, i)
+    _forget_springs(world.near_arcs, i)
+    forget_moving_springs(world.moving, i)
     for c in range(count):
-        if moves(moving, found.entry[c]):
-            set_moving_spring(moving, i, found.entry[c], found.solution[c])
+        if moves(world.moving, found.entry[c]):
+            set_moving_spring(world.moving, i, found.entry[c], found.solution[c])
         elif found.entry[c] >= 0:
-            _set_spring(near_segments, found.entry[c], found.solution[c])
+            _set_spring(world.near_segments, found.entry[c], found.solution[c])
         else:
-            _set_spring(near_arcs, -1 - found.entry[c], found.solution[c])
+            _set_spring(world.near_arcs, -1 - found.entry[c], found.solution[c])
 
 
 @part

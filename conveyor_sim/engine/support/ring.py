@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.support.belts import carrier, surface_velocity
 from conveyor_sim.engine.threads.workers import UNIT
@@ -75,30 +76,18 @@ def ring_share(own: float, other: float, limit: float, first: float, rest: float
     return (1.0 - 0.5 * turned * turned - rest * slowed * slowed) * (own * first * inverse)
 
 
-@kernel
+@part
 def straddling_ring(
-    i: int,
-    belts: Any,
-    surface: Any,
-    floor: int,
-    x: float,
-    y: float,
-    vx: float,
-    vy: float,
-    omega: float,
-    radius: float,
-    weight: float,
-    kind: int,
-    slip_limit: float,
-    lag: float,
-    powers: Any,
+    i: int, world: World, vx: float, vy: float, omega: float, lag: float, powers: Any
 ) -> tuple[float, float, float]:
     """Force (N, x and y) and moment about the axis (N m) on a ring whose points may stand on different belts.
 
-    i: the bottle, whose candidate belts are listed; kind: its type. x, y: m, vx, vy: m/s, omega: rad/s, of its axis.
-    radius: R_b, m. weight: m g, N. lag: s, as in `relative_velocity`. powers: (units, H + 1), W, the power of each belt
-    is added to it; or None.
+    i: the bottle, whose candidate belts are listed. vx, vy: m/s, omega: rad/s, of its axis. lag: s, as in
+    `relative_velocity`. powers: (units, H + 1), W, the power of each belt is added to it; or None.
     """
+    bottles, belts, surface, slip_limit = world.bottles, world.belts, world.surface, world.settings.slip_limit
+    x, y, radius, weight, kind = bottles.x[i], bottles.y[i], world.ring.radius[i], bottles.weight[i], bottles.type[i]
+    floor = surface.ux.size - 1
     squared = 0.25 * slip_limit * slip_limit
     fx = fy = moment = 0.0
     last_x, last_y = x + radius * _COS[POINTS - 1], y + radius * _SIN[POINTS - 1]
