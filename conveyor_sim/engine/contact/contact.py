@@ -46,22 +46,9 @@ def contact_force(
     elastic = elastic_force(law, e, curves, depth)
     damped = never_pull(law, add_damping(law, e, elastic, elastic, depth, closing))
     normal = share * add_drag(law, e, damped, elastic, depth, closing)
-    tangential = _tangential(
-        law.friction,
-        law.tangential_stiffness,
-        law.tangential_mindlin,
-        law.tangential_damping,
-        e,
-        slip_limit,
-        atan,
-        depth,
-        share,
-        # Coulomb's law needs a pressing contact: paper damping may pull at the end of a rebound.
-        0.0 if normal < 0.0 else normal,
-        slip,
-        spring,
-        implicit,
-    )
+    # Coulomb's law needs a pressing contact: paper damping may pull at the end of a rebound.
+    pressing = 0.0 if normal < 0.0 else normal
+    tangential = _tangential(law, e, slip_limit, atan, depth, share, pressing, slip, spring, implicit)
     return normal, add_drag(law, e, tangential, elastic, depth, -slip * share)
 
 
@@ -85,10 +72,7 @@ def drag_force(law: ContactLaw, e: int, elastic: float, depth: float, velocity: 
 
 @part
 def _tangential(
-    friction: Any,
-    stiffness: Any,
-    mindlin: Any,
-    damping: Any,
+    law: ContactLaw,
     e: int,
     slip_limit: float,
     atan: Any,
@@ -100,25 +84,25 @@ def _tangential(
     implicit: Any,
 ) -> float:
     """Coulomb friction, by its regularised curve or, where the pair has one, by its tangential spring."""
-    if friction is None:
+    if law.friction is None:
         return 0.0
-    most = friction[e] * pressing
+    most = law.friction[e] * pressing
     sliding = -most * _curve_share(most, slip, slip_limit, atan, implicit)
     if spring is None:
         return sliding
-    stiff = _tangential_stiffness(stiffness, mindlin, e, depth)
-    held = -share * _add_damping(stiff * spring, damping, e, slip)
+    stiff = _tangential_stiffness(law, e, depth)
+    held = -share * _add_damping(stiff * spring, law.tangential_damping, e, slip)
     held = -most if -most > held else held
     held = most if held > most else held
     return held if stiff > 0.0 else sliding
 
 
 @part
-def _tangential_stiffness(stiffness: Any, mindlin: Any, e: int, depth: float) -> float:
+def _tangential_stiffness(law: ContactLaw, e: int, depth: float) -> float:
     """N/m, of the tangential spring at an overlap: as given, or 8 G* sqrt(R* delta) (Mindlin 1949)."""
-    if mindlin is None:
-        return stiffness[e]
-    return stiffness[e] + mindlin[e] * math.sqrt(depth)
+    if law.tangential_mindlin is None:
+        return law.tangential_stiffness[e]
+    return law.tangential_stiffness[e] + law.tangential_mindlin[e] * math.sqrt(depth)
 
 
 @part
@@ -143,7 +127,7 @@ def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float
     if spring is None:
         return 0.0
     depth = 0.0 if overlap < 0.0 else overlap
-    return 0.5 * _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth) * spring * spring
+    return 0.5 * _tangential_stiffness(law, e, depth) * spring * spring
 
 
 @kernel
@@ -188,7 +172,7 @@ def spring_after(
     overlap: m. normal: N, of the contact; 0, as without contact, forgets the spring. 0 for a pair that has none.
     """
     depth = 0.0 if overlap < 0.0 else overlap
-    stiffness = _tangential_stiffness(law.tangential_stiffness, law.tangential_mindlin, e, depth)
+    stiffness = _tangential_stiffness(law, e, depth)
     longer = spring + dt * slip
     most = law.friction[e] * (0.0 if normal < 0.0 else normal)
     # The force is that of the share of a spring, as is N.
