@@ -147,9 +147,9 @@ def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: fl
         overlap, nx, ny = normal_and_overlap(difference[row], difference[row + _1], _reach(settings, reach, p))
         closing = -(dvx * nx + dvy * ny)
         slip = dvx * ny - dvy * nx + _rim_slip(settings, world.spin, reach, gathered, c, half * overlap)
-        spring = elongation(springs, p)
         if path is None:
-            spring = carried(pairs.law, p, spring, overlap, closing * spring_dt, slip * spring_dt)
+            kept, deeper, slipped = elongation(springs, p), closing * spring_dt, slip * spring_dt
+            spring = carried(pairs.law, p, kept, overlap, deeper, slipped)
         else:
             spring = _drawn_out(world, gathered, c, p, overlap, nx, ny)
         slip_time = slip_time_of(path, spring_dt)
