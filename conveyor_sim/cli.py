@@ -8,24 +8,19 @@ import signal
 import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conveyor_sim.support.interrupt import one_line, while_importing
 
 with while_importing():
     import click
     from rich.console import Console, RenderableType
-    from rich.table import Table
 
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.support.progress import ProgressBar
     from conveyor_sim.support.signals import HandledOnce, held_back
     from conveyor_sim.version import __version__
-
-if TYPE_CHECKING:
-    from conveyor_sim.model import Model
-    from conveyor_sim.scene import Scene
 
 # Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
 
@@ -69,6 +64,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 
     SCENE is a file, or the name of a shipped scene. Its effects and its time step are listed with their reasons.
     """
+    from conveyor_sim.explain.account import account
     from conveyor_sim.model import build_model
     from conveyor_sim.runs.report import plot_function
     from conveyor_sim.scene import load_scene
@@ -77,7 +73,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     path = scene_path(scene)
     checked = load_scene(path, outside_tables=outside_tables)
     model = build_model(checked)
-    _print(_account(checked, model))
+    _print(account(checked, model))
     plot_scene = plot_function("plot_scene")
     if plot_scene is not None:
         try:
@@ -155,6 +151,7 @@ def run(
     from conveyor_sim.explain.choices import setting_line, step_rows
     from conveyor_sim.model import build_model
     from conveyor_sim.runs.compilation import Compilation
+    from conveyor_sim.runs.drawing import Drawing
     from conveyor_sim.runs.force_check import achieved, pressed
     from conveyor_sim.runs.report import report
     from conveyor_sim.runs.runner import run_scene
@@ -164,15 +161,17 @@ def run(
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
     click.echo(setting_line(model))
-    folder = None if no_record else click.get_current_context().with_resource(run_folder(out))
-    if folder is not None:
+    folder = drawing = None
+    if not no_record:
+        folder = click.get_current_context().with_resource(run_folder(out))
         require_recordable(folder)  # not only once everything has been compiled
+        drawing = click.get_current_context().with_resource(Drawing())
     Compilation(loaded, _say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
         done = run_scene(loaded, folder, bar.update, threads)
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
-    if done.bag is None:
+    if done.bag is None or drawing is None:
         factor = done.simulated / done.wall
         click.echo(f"{done.simulated:.2f} s simulated in {done.wall:.2f} s, {factor:.3g} x real time")
         reached = achieved(model, done.peak_force)
@@ -186,7 +185,7 @@ def run(
         for said in done.guard:
             click.echo(f"guard: {said}")
     else:
-        report(done.bag, done.wall)
+        report(done.bag, done.wall, drawing)
 
 
 @main.command()
@@ -331,13 +330,15 @@ def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[i
 
     Draws BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces.
     """
-    from conveyor_sim.runs.report import plot_function
+    from conveyor_sim.runs.drawing import Drawing
+    from conveyor_sim.runs.report import can_draw
 
-    plot_bag = plot_function("plot_bag")
-    if plot_bag is None:
+    if not can_draw():
         sys.exit(1)
-    folder = out or (bag if bag.is_dir() else bag.parent) / "pictures"
-    for picture in plot_bag(bag, folder, times=times or None, bottles=bottles or None):
+    with Drawing() as drawing:
+        drawing.begin(bag, times or None, bottles or None)
+        pictures = drawing.pictures(out or (bag if bag.is_dir() else bag.parent) / "pictures")
+    for picture in pictures:
         click.echo(picture)
 
 
@@ -362,24 +363,3 @@ def _say(sentence: str) -> None:
 def _print(content: RenderableType) -> None:
     """Prints to the terminal; brackets in names and paths mean nothing."""
     Console(markup=False, highlight=False).print(content)
-
-
-def _account(scene: Scene, model: Model) -> Table:
-    """What a scene comes to: contents, effects and why, time step and why, errors to expect."""
-    from conveyor_sim.explain.choices import accuracy_rows, note_rows, step_rows
-    from conveyor_sim.scene import initial_bottles
-
-    table = Table.grid(padding=(0, 2))
-    fed = ["without end" if entry.most is None else str(entry.most) for _, entry in scene.entries()]
-    table.add_row("scene", ": ".join(filter(None, (model.name, printable_lines(scene.description)))))
-    table.add_row("bottles", f"{len(initial_bottles(scene))} at the start; fed: {', '.join(fed) or 'none'}")
-    table.add_row("belts", ", ".join(model.belts) or "none")
-    table.add_row("rails", ", ".join(model.rails) or "none")
-    table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    for name, text in [*accuracy_rows(model), *step_rows(scene), *note_rows(scene, model)]:
-        table.add_row(name, text)
-    for index, bound in enumerate(model.bounds):
-        table.add_row("" if index else "bounds", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")
-    for effect in model.effects:
-        table.add_row("effect", f"{effect.name} {'on' if effect.on else 'off'}: {effect.why}")
-    return table

@@ -36,8 +36,8 @@ MAY_IMPORT: Mapping[str, str] = {
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
     "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
     "version | numpy rich ruamel scipy",
-    "explain": "effects errors model scene simulation timestep | rich",
-    "plot": "accuracy bag errors line observe scene | matplotlib numpy",
+    "explain": "effects errors model scene simulation support timestep | rich",
+    "plot": "accuracy bag errors line observe scene support | matplotlib numpy",
     "runs": "bag engine errors line model observe plot scene simulation support timestep | click numpy rich",
     "ros": "bag control errors explain line model runs scene simulation support version | builtin_interfaces click "
     "conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",

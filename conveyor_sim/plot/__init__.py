@@ -6,22 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.plot import style
-from conveyor_sim.plot.accuracy import accuracy_figures
-from conveyor_sim.plot.damage import bottles_figure, rails_figure
-from conveyor_sim.plot.data import Frame, Plant
-from conveyor_sim.plot.energy import energy_figure
-from conveyor_sim.plot.flow import flow_figure, force_figure
-from conveyor_sim.plot.recording import Recording
-from conveyor_sim.plot.series import velocity_figure
-from conveyor_sim.plot.views import plant_figure, scene_figure, table_figure
-
 if TYPE_CHECKING:
     from conveyor_sim.accuracy.results import Study
     from conveyor_sim.scene import Scene
 
 __all__ = ["plot_accuracy", "plot_bag", "plot_scene"]
+
+# Each imports what it draws with: a process that draws a recording needs no kernels, which studies do.
 
 
 def plot_accuracy(study: Study, out_dir: str | Path) -> list[Path]:
@@ -31,6 +22,9 @@ def plot_accuracy(study: Study, out_dir: str | Path) -> list[Path]:
     `stiffness` what softer contacts change; a picture without rows is left out.
     Raises ConveyorError if the files can't be written.
     """
+    from conveyor_sim.plot import style
+    from conveyor_sim.plot.accuracy import accuracy_figures
+
     out = Path(out_dir)
     with style.look():
         figures = accuracy_figures(study)
@@ -48,30 +42,14 @@ def plot_bag(
     `damage_bottles` if damage was.
     Raises BagError if the bag can't be read, ConveyorError for a time or bottle that it does not hold.
     """
-    out = Path(out_dir)
+    from conveyor_sim.bag.reader import open_bag
+    from conveyor_sim.plot import style
+    from conveyor_sim.plot.files import write
+    from conveyor_sim.plot.pictures import figures_of
+
     with open_bag(bag) as opened, opened.sense(), style.look():
-        recording = Recording(opened)
-        frames = recording.frames(times)
-        velocities = recording.velocities(bottles)
-        end = float(recording.flow.time[-1])
-        name = recording.scene.name
-        peak = float(recording.peak_force.largest.max())
-        figures = {
-            "table": table_figure(recording.plant, frames, name, peak),
-            "plant": plant_figure(recording.plant, frames[-1], name, peak),
-            **{f"velocity_bottle_{v.bottle}": velocity_figure(v, recording.belts, end) for v in velocities},
-            "flow": flow_figure(recording.flow, recording.belts),
-            "force": force_figure(recording.peak_force),
-        }
-        energy = recording.energy
-        if energy is not None:
-            figures["energy"] = energy_figure(energy, recording.belts)
-        damage = recording.damage
-        if damage is not None:
-            figures["damage_bottles"] = bottles_figure(damage, name)
-            if len(damage.wear.rail):
-                figures["damage_rails"] = rails_figure(recording.plant, damage, name)
-        return [path for stem, figure in figures.items() for path in style.save(figure, out / stem)]
+        drawn = {name: style.rendered(draw()) for name, draw in figures_of(opened, times, bottles).items()}
+    return [path for name, pair in drawn.items() for path in write(pair, Path(out_dir) / name)]
 
 
 def plot_scene(scene: Scene, path: str | Path) -> Path:
@@ -79,6 +57,10 @@ def plot_scene(scene: Scene, path: str | Path) -> Path:
 
     Raises ConveyorError if the files can't be written.
     """
+    from conveyor_sim.plot import style
+    from conveyor_sim.plot.data import Frame, Plant
+    from conveyor_sim.plot.views import scene_figure
+
     path = Path(path)
     stem = path.with_suffix("") if path.suffix in (".png", ".svg") else path
     with style.look():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.plot.files import Pair, write
 
 INK: Final = "#1f2933"
 MUTED: Final = "#616e7c"
@@ -91,20 +93,29 @@ def freeze(figure: Figure) -> None:
     figure.set_layout_engine(None)
 
 
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write `stem`.png and `stem`.svg; equal figures give equal bytes.
-
-    Raises ConveyorError if the files can't be written.
-    """
-    png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
-    try:
-        stem.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(png, dpi=_PNG_DPI, metadata={"Software": None})
+def lay_out(figure: Figure) -> None:
+    """Find the layout that the PNG has, and keep it: matplotlib would draw the whole figure once more to find it."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        dpi = figure.dpi
+        figure.set_dpi(_PNG_DPI)
+        engine.execute(figure)
         freeze(figure)
-        figure.savefig(svg, dpi=_SVG_DPI, metadata={"Date": None, "Creator": None})
-    except OSError as error:
-        raise ConveyorError(f"{stem}.png and .svg can't be written: {error.strerror or error}") from error
-    return [png, svg]
+        figure.set_dpi(dpi)
+
+
+def rendered(figure: Figure) -> Pair:
+    """PNG and SVG of a figure; equal figures give equal bytes."""
+    png, svg = BytesIO(), BytesIO()
+    lay_out(figure)
+    figure.savefig(png, format="png", dpi=_PNG_DPI, metadata={"Software": None})
+    figure.savefig(svg, format="svg", dpi=_SVG_DPI, metadata={"Date": None, "Creator": None})
+    return png.getvalue(), svg.getvalue()
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write `stem`.png and `stem`.svg. Raises ConveyorError if the files can't be written."""
+    return write(rendered(figure), stem)
 
 
 def save_png(figure: Figure, path: Path) -> Path:

@@ -23,6 +23,7 @@ with while_importing():
     from conveyor_sim.ros.observer import Observer
     from conveyor_sim.ros.stop_request import StopRequest
     from conveyor_sim.runs.compilation import compiling, seconds_to_compile
+    from conveyor_sim.runs.drawing import Drawing
     from conveyor_sim.runs.report import report
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.printable import printable_lines
@@ -114,8 +115,8 @@ def _keep_logs(logs: Path, bag: Path) -> None:
 def main(scene: str, out: Path | None, duration: float | None, outside_tables: bool) -> None:
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
     try:
-        with run_folder(out) as bag:
-            report(bag, run_in_lockstep(scene, bag, duration, outside_tables))
+        with run_folder(out) as bag, Drawing() as drawing:
+            report(bag, run_in_lockstep(scene, bag, duration, outside_tables), drawing)
     except ConveyorError as error:
         print(f"main job: {printable_lines(error)}", file=sys.stderr)
         sys.exit(STATUS if isinstance(error, Interrupted) else 1)
