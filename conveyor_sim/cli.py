@@ -66,7 +66,9 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     """
     from conveyor_sim.explain.account import account
     from conveyor_sim.model import build_model
+    from conveyor_sim.model.remedies import step_limit
     from conveyor_sim.runs.report import plot_function
+    from conveyor_sim.runs.speed import expected
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
@@ -74,6 +76,8 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     checked = load_scene(path, outside_tables=outside_tables)
     model = build_model(checked)
     _print(account(checked, model))
+    for line in expected(step_limit(checked)):
+        click.echo(line)
     plot_scene = plot_function("plot_scene")
     if plot_scene is not None:
         try:
@@ -137,10 +141,17 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
 )
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
+@click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def run(
-    scene: str, out: Path | None, duration: float | None, no_record: bool, threads: int | None, outside_tables: bool
+    scene: str,
+    out: Path | None,
+    duration: float | None,
+    no_record: bool,
+    no_pictures: bool,
+    threads: int | None,
+    outside_tables: bool,
 ) -> None:
     """Simulate SCENE without ROS, and record it.
 
@@ -148,12 +159,11 @@ def run(
     """
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.explain.choices import setting_line, step_rows
+    from conveyor_sim.explain.choices import setting_line
     from conveyor_sim.model import build_model
     from conveyor_sim.runs.compilation import Compilation
     from conveyor_sim.runs.drawing import Drawing
-    from conveyor_sim.runs.force_check import achieved, pressed
-    from conveyor_sim.runs.report import report
+    from conveyor_sim.runs.report import report, report_unrecorded
     from conveyor_sim.runs.runner import run_scene
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
@@ -165,27 +175,16 @@ def run(
     if not no_record:
         folder = click.get_current_context().with_resource(run_folder(out))
         require_recordable(folder)  # not only once everything has been compiled
-        drawing = click.get_current_context().with_resource(Drawing())
+        drawing = None if no_pictures else click.get_current_context().with_resource(Drawing())
     Compilation(loaded, _say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
         done = run_scene(loaded, folder, bar.update, threads)
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
-    if done.bag is None or drawing is None:
-        factor = done.simulated / done.wall
-        click.echo(f"{done.simulated:.2f} s simulated in {done.wall:.2f} s, {factor:.3g} x real time")
-        reached = achieved(model, done.peak_force)
-        if reached is not None:
-            click.echo(reached.sentence)
-        load = pressed(model, done.load)
-        if load is not None:
-            click.echo(load.sentence)
-        for _, text in step_rows(loaded):
-            click.echo(text)
-        for said in done.guard:
-            click.echo(f"guard: {said}")
+    if done.bag is None:
+        report_unrecorded(loaded, model, done)
     else:
-        report(done.bag, done.wall, drawing)
+        report(done.bag, done.wall, drawing, done.spent)
 
 
 @main.command()

@@ -110,6 +110,11 @@ class Simulation:
         return self.tick * self.model.tick_ns * 1e-9
 
     @property
+    def kernel_seconds(self) -> float:
+        """Wall time that steps have taken, s."""
+        return self._integration.kernel_seconds
+
+    @property
     def stamp_ns(self) -> int:
         """Simulated time for message headers, ns: 1 at tick 0, for ROS reads 0 as unset."""
         return max(1, self.tick * self.model.tick_ns)

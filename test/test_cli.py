@@ -54,6 +54,10 @@ def test_check_tells_and_draws(command: Command, tmp_path: Path) -> None:
 def test_check_takes_the_name_of_a_shipped_scene(command: Command, tmp_path: Path) -> None:
     result = command("check", "two_bottles", "--out", "pictures")
     assert result.exit_code == 0, result.output
+    speed, bound, change, _ = result.output.splitlines()[-4:]
+    assert re.match(r"speed: about \d+ x real time on one core with 2 bottles, an estimate", speed)
+    assert bound.startswith("bound: impact of two bottles needs 2 steps a tick")
+    assert change.startswith("change: fewer steps: accuracy: {preset: draft}")
     assert (tmp_path / "pictures" / "two_bottles.png").exists()
 
 
@@ -74,7 +78,15 @@ def test_run_records_sums_up_and_draws(command: Command, tmp_path: Path) -> None
     assert result.output.startswith("leapfrog, dt = 100 us")
     for words in ("real-time factor", "predicted error", "achieved"):
         assert words in result.output
+    assert [line.partition(":")[0] for line in result.output.splitlines()[-3:]] == ["speed", "bound", "change"]
     assert str(folder.relative_to(tmp_path)) in result.output
+
+
+def test_run_draws_nothing_where_that_is_asked_for(command: Command, tmp_path: Path) -> None:
+    result = command("run", SMALL_LINE, "--duration", "0.1", "--out", "bag", "--no-pictures")
+    assert result.exit_code == 0, result.output
+    assert "picture" not in result.output
+    assert {path.name for path in (tmp_path / "bag").iterdir()} == {"bag_0.mcap", "metadata.yaml", "summary.json"}
 
 
 def test_run_with_nothing_to_draw_is_a_good_run(command: Command, tmp_path: Path) -> None:
@@ -98,12 +110,13 @@ def test_run_of_a_duration_that_is_no_number_of_ticks_is_refused(command: Comman
 def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     result = command("run", SMALL_LINE, "--no-record", "--duration", "0.1")
     assert result.exit_code == 0, result.output
-    setting, *_, peak, steps = result.output.splitlines()
+    setting, *_, peak, speed, bound, change = result.output.splitlines()
     assert setting.startswith("leapfrog, dt = 100 us (100 steps a tick, given in the scene; ")
     assert "; predicted error: " in setting
-    assert "0.10 s simulated in" in result.output
+    assert re.fullmatch(r"speed: 0\.10 s simulated in .* x real time; \d+ % in the kernels, .*", speed)
     assert peak.startswith("peak force ")
-    assert steps.startswith("100 steps a tick are given in the scene; contact friction needs ")
+    assert bound.startswith("bound: 100 steps a tick are given in the scene; contact friction needs ")
+    assert change.startswith("change: ")
     assert list(tmp_path.iterdir()) == []
 
 

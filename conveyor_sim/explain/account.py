@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.table import Table
 
-from conveyor_sim.explain.choices import accuracy_rows, note_rows, step_rows
+from conveyor_sim.explain.choices import accuracy_rows, note_rows
 from conveyor_sim.model import Model
 from conveyor_sim.scene import Scene, initial_bottles
 from conveyor_sim.support.printable import printable_lines
@@ -19,7 +19,7 @@ def account(scene: Scene, model: Model) -> Table:
     table.add_row("belts", ", ".join(model.belts) or "none")
     table.add_row("rails", ", ".join(model.rails) or "none")
     table.add_row("duration", f"{scene.duration:g} s in {scene.duration_ticks} ticks of {scene.tick:g} s")
-    for name, text in [*accuracy_rows(model), *step_rows(scene), *note_rows(scene, model)]:
+    for name, text in [*accuracy_rows(model), *note_rows(scene, model)]:
         table.add_row(name, text)
     for index, bound in enumerate(model.bounds):
         table.add_row("" if index else "bounds", f"{bound.name}: at most {bound.dt:.3g} s, {bound.reason}")

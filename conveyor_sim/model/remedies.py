@@ -96,12 +96,14 @@ class StepLimit:
     @property
     def lines(self) -> list[str]:
         """For a reader who wants fewer steps: the bound, the remedies, and a warning where a run will be slow."""
-        found = [self._bound(), self._remedies()]
+        found = [self.bound, self.change]
         if self.steps >= MANY_STEPS:
             found.append(self._warning())
         return [line for line in found if line]
 
-    def _bound(self) -> str:
+    @property
+    def bound(self) -> str:
+        """The bound that rules, and by how much; empty where there is none."""
         if not self.bounds:
             return ""
         first, *others = self.bounds
@@ -111,14 +113,20 @@ class StepLimit:
             text += f", {_times(self.ratio)} the next bound, {others[0].name} ({fewest_steps(self.tick, others[0].dt)})"
         return f"{_steps(self.steps)} are given in the scene; {text}" if self.given else text
 
-    def _remedies(self) -> str:
+    @property
+    def change(self) -> str:
+        """The remedies; empty where none is known, unless the steps are many."""
         if not self.remedies:
             return "" if self.steps < MANY_STEPS else "no single change of the scene that is known to help lowers it"
         return "fewer steps: " + "; or ".join(remedy.sentence(self.steps) for remedy in self.remedies)
 
+    def seconds(self, bottles: int) -> float:
+        """Of computing on one core for a simulated second of so many bottles, in round numbers."""
+        return self.steps / self.tick * (bottles + BESIDE) * BOTTLE_STEP
+
     def _warning(self) -> str:
         bottles = 100 if self.bottles is None else max(1, self.bottles)
-        seconds = self.steps / self.tick * (bottles + BESIDE) * BOTTLE_STEP
+        seconds = self.seconds(bottles)
         text = f"{seconds:.2g}" if seconds < 100.0 else f"{seconds:.0f}"
         return f"slow: a simulated second of {bottles} bottles will take about {text} s of computing on one core"
 

@@ -1,7 +1,8 @@
-"""What a person sees at the end of a run: the summary, and pictures with their paths."""
+"""What a person sees at the end of a run: the summary, pictures with their paths, and how fast it went."""
 
 from __future__ import annotations
 
+import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -10,25 +11,49 @@ import click
 from rich.console import Console
 
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.model import Model
+from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.runs.drawing import Drawing
-from conveyor_sim.runs.summary import render, summarize, write_summary
+from conveyor_sim.runs.force_check import achieved, pressed
+from conveyor_sim.runs.runner import Run
+from conveyor_sim.runs.speed import Spent, measured
+from conveyor_sim.runs.summarize import summarize
+from conveyor_sim.runs.summary import write_summary
+from conveyor_sim.runs.summary_table import render
+from conveyor_sim.scene import Scene
 
 
-def report(bag: Path, wall: float | None, drawing: Drawing) -> None:
-    """Print the summary of a run that took `wall` s, and write it and the pictures into the run's folder."""
-    drawing.begin(bag)
+def report(bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent | None = None) -> None:
+    """Print the summary of a run that took `wall` s, and write it and the pictures into the run's folder.
+
+    drawing: None draws nothing.
+    """
+    began = time.monotonic()
+    if drawing is not None:
+        drawing.begin(bag)
     summary = summarize(bag, wall)
     Console(markup=False, highlight=False).print(render(summary))
     click.echo(f"summary: {write_summary(summary, bag)}")
-    if not can_draw():
-        return
-    try:
-        pictures = drawing.pictures(bag / "pictures")
-    except ConveyorError as error:  # such as a scene without bottles: nothing to draw, but a good run all the same
-        click.echo(f"no pictures: {error}", err=True)
-        return
-    for picture in pictures:
-        click.echo(f"picture: {picture}")
+    if drawing is not None and can_draw():
+        try:
+            for picture in drawing.pictures(bag / "pictures"):
+                click.echo(f"picture: {picture}")
+        except ConveyorError as error:  # such as a scene without bottles: nothing to draw, but a good run all the same
+            click.echo(f"no pictures: {error}", err=True)
+    after = 0.0 if drawing is None else time.monotonic() - began
+    for line in measured(summary.simulated, wall, spent, after, summary.limit, summary.topics):
+        click.echo(line)
+
+
+def report_unrecorded(scene: Scene, model: Model, run: Run) -> None:
+    """Print what is known of a run of which nothing was recorded."""
+    for check in (achieved(model, run.peak_force), pressed(model, run.load)):
+        if check is not None:
+            click.echo(check.sentence)
+    for said in run.guard:
+        click.echo(f"guard: {said}")
+    for line in measured(run.simulated, run.wall, run.spent, 0.0, step_limit(scene), {}):
+        click.echo(line)
 
 
 def can_draw() -> bool:

@@ -15,6 +15,7 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.runs.force_check import PeakWatch
+from conveyor_sim.runs.speed import Spent
 from conveyor_sim.runs.stopped import keep_stopped
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -38,6 +39,8 @@ class Run:
     """N, that pressed on a bottle for long (`force_check.Pressed`); None where it is not known."""
     guard: tuple[str, ...]
     """What the guard said."""
+    spent: Spent
+    """What `wall` went to."""
 
 
 def run_scene(
@@ -55,13 +58,15 @@ def run_scene(
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()
         peaks = PeakWatch(simulation)
-        start = time.monotonic()
+        stepping, start = 0.0, time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
+            began = time.perf_counter()
             try:
                 simulation.advance(1)
             except SimulationError as error:
                 outputs.after_failure()
                 raise keep_stopped(simulation, bag, error) from error
+            stepping += time.perf_counter() - began
             outputs.after_tick()
             peaks.after_tick()
             if progress is not None:
@@ -70,7 +75,9 @@ def run_scene(
             recorder.close()
         wall = time.monotonic() - start
         noticed = tuple(event.text for event in outputs.take_noticed())
-        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, noticed)
+        kernels = simulation.kernel_seconds
+        spent = Spent(kernels, stepping - kernels, 0.0 if recorder is None else wall - stepping)
+        return Run(bag, simulation.tick * scene.tick, wall, stop.is_set(), peaks.force, peaks.load, noticed, spent)
 
 
 @contextmanager

@@ -40,6 +40,8 @@ class Integration:
         self._chatters = False
         self._listening = self._ticks_between_listening()
         self.shortened_ticks = 0
+        self.kernel_seconds = 0.0
+        """Wall time that steps have taken, s."""
 
     @property
     def threads(self) -> int:
@@ -92,9 +94,10 @@ class Integration:
             raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
         began = time.perf_counter()
         self._take_steps(1)
+        took = time.perf_counter() - began
+        self.kernel_seconds += took
         if self._choice is not None:
-            steps = self._model.steps_per_tick
-            self._choice.took(time.perf_counter() - began, steps * self._state.world.bottles.id.size)
+            self._choice.took(took, self._model.steps_per_tick * self._state.world.bottles.id.size)
         wrong = self._guard.end(self._model.dt)
         if wrong is not None:
             self._do_again(tick, seconds, wrong)

@@ -21,7 +21,8 @@ from conveyor_sim.plot import style
 from conveyor_sim.plot.damage import bottles_figure, rails_figure
 from conveyor_sim.plot.data import Damage
 from conveyor_sim.plot.recording import Recording
-from conveyor_sim.runs.summary import render, summarize
+from conveyor_sim.runs.summarize import summarize
+from conveyor_sim.runs.summary_table import render
 from conveyor_sim.simulation import Simulation
 
 

@@ -14,7 +14,7 @@ from conveyor_sim.plot import style
 from conveyor_sim.plot.energy import energy_figure
 from conveyor_sim.plot.plant import draw_rails
 from conveyor_sim.plot.recording import Recording
-from conveyor_sim.runs.summary import summarize
+from conveyor_sim.runs.summarize import summarize
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,9 @@ from rich.console import Console
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.model import build_model
 from conveyor_sim.model.remedies import step_limit
-from conveyor_sim.runs.summary import Summary, render, summarize, write_summary
+from conveyor_sim.runs.summarize import summarize
+from conveyor_sim.runs.summary import Summary, write_summary
+from conveyor_sim.runs.summary_table import render
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 
 TICKS = 100
@@ -92,7 +94,7 @@ def test_a_recording_is_told_the_errors_of_the_steps_it_ran_with(bag: Path, tmp_
     summary = summarize(edited(bag, tmp_path / "older", lengthen))
     assert summary.predicted == build_model(load_scene(SMALL_LINE, ran)).prediction.sentence
     assert summary.predicted != summarize(bag).predicted
-    assert summary.steps == []
+    assert summary.limit is None
 
 
 def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
@@ -108,8 +110,12 @@ def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_
     assert "not known fed, not known removed, " in shown(summary)
 
 
-def test_what_sets_the_steps_is_told(bag: Path) -> None:
-    assert summarize(bag).steps == step_limit(load_scene(SMALL_LINE)).lines != []
+def test_what_sets_the_steps_is_told(bag: Path, tmp_path: Path) -> None:
+    expected = step_limit(load_scene(SMALL_LINE))
+    assert expected.lines != []
+    summary = summarize(bag)
+    assert summary.limit == expected
+    assert json.loads(write_summary(summary, tmp_path).read_text())["steps"] == expected.lines
 
 
 def test_foreign_text_in_a_recording_is_told_in_printable_words(bag: Path, tmp_path: Path) -> None:

@@ -75,6 +75,16 @@ def test_a_command_ends_with_one_line(arguments: list[str], after: float) -> Non
     assert "Aborted" not in said
 
 
+def test_a_run_whose_pictures_are_being_drawn_ends_with_one_line_and_nothing_half_written(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    arguments = ["-c", MAIN, "run", str(ROOT / "test/bag/small_line.yaml"), "--duration", "0.2", "--out", str(folder)]
+    status, said = interrupted(arguments, words="summary: ")
+    assert (status, said.splitlines()[-1]) == (130, "interrupted")
+    assert "Traceback" not in said
+    assert {path.name for path in folder.iterdir()} <= {"run_0.mcap", "metadata.yaml", "summary.json", "pictures"}
+    assert not any(path.name.startswith(".") for path in folder.rglob("*"))
+
+
 def test_an_interrupt_that_a_callback_loses_comes_again() -> None:
     status, said = interrupted(["-c", SWALLOWED], 0.2, "compiling")
     assert (status, said) == (130, "compiling\ninterrupted\n")

@@ -18,7 +18,8 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.runs.runner import run_scene
-from conveyor_sim.runs.summary import render, summarize
+from conveyor_sim.runs.summarize import summarize
+from conveyor_sim.runs.summary_table import render
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
