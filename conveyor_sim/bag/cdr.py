@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 HEADER = b"\x00\x01\x00\x00"
 """Encapsulation: CDR, little endian, no options."""
+_TEXT = 12
+"""Byte at which a header's frame_id begins, with its length: behind the encapsulation and the stamp."""
 
 
 class CdrWriter:
@@ -53,6 +55,14 @@ class CdrWriter:
     def finish(self) -> bytes:
         """The whole message."""
         return bytes(self._buffer)
+
+
+def tick_of(data: bytes) -> int:
+    """The tick of a message of conveyor_msgs that has one: it follows the header. Raises struct.error if it is cut."""
+    (length,) = struct.unpack_from("<I", data, _TEXT)
+    behind = _TEXT + 4 + length - len(HEADER)
+    (tick,) = struct.unpack_from("<Q", data, len(HEADER) + behind + -behind % 8)
+    return int(tick)
 
 
 def pose_rows(x: NDArray[np.float64], y: NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.float64]:

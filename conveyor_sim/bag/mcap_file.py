@@ -21,6 +21,9 @@ from conveyor_sim.version import __version__
 QOS_KEY = "offered_qos_profiles"
 HASH_KEY = "topic_type_hash"
 """Keys of a channel's metadata."""
+PROFILE = "ros2"
+LIBRARY = "conveyor_sim"
+"""As the file's head states them; the library with its version."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class McapFile:
         self._schemas: dict[Schema, int] = {}
         self._topics: dict[int, TopicInfo] = {}
         self.info = FileInfo(name, 0, 0, 0)
-        self._writer.start(profile="ros2", library=f"conveyor_sim {__version__}")
+        self._writer.start(profile=PROFILE, library=f"{LIBRARY} {__version__}")
 
     @property
     def topics(self) -> list[TopicInfo]:

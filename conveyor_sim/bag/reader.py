@@ -7,23 +7,23 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path, PurePath
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
-from rosbags.rosbag2 import Reader
 
+from conveyor_sim.bag.any_source import AnySource
 from conveyor_sim.bag.index import sealed
 from conveyor_sim.bag.messages import LINE, Outcome
 from conveyor_sim.bag.metadata import FILE_NAME, file_names, read_metadata
-from conveyor_sim.bag.qos import DATA, Qos
+from conveyor_sim.bag.own_source import own_source
+from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.salvage import Salvage
+from conveyor_sim.bag.source import Source
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.support.printable import printable
@@ -75,13 +75,12 @@ class Bag(AbstractContextManager["Bag"]):
     `line` is the recorded conveyor_msgs/Line (its fields as attributes, arrays as NumPy, texts as lists of str).
     """
 
-    def __init__(self, path: Path, reader: AnyReader, verified: bool) -> None:
+    def __init__(self, path: Path, source: Source, verified: bool) -> None:
         self.path = path
         self.verified = verified
         """Every byte is as it was written; False: some carry no checksum."""
-        self._reader = reader
-        self._shares_position = _is_scanned(reader)
-        line_topics = [c.topic for c in reader.connections if c.msgtype == LINE and c.msgcount]
+        self._source = source
+        line_topics = [recorded.topic for recorded in source.topics if recorded.type == LINE and recorded.count]
         if not line_topics:
             raise BagError(f"{path}: no message of type {LINE}, expected the latched topic line")
         self.namespace = line_topics[0].rpartition("/")[0]
@@ -92,20 +91,24 @@ class Bag(AbstractContextManager["Bag"]):
 
     def close(self) -> None:
         """Closes the files; iterating afterwards is an error."""
-        self._reader.close()
+        self._source.close()
 
     @property
     def counts(self) -> dict[str, int]:
         """Recorded messages by topic, names as in OUTPUTS (without the namespace and its slash)."""
         counts: Counter[str] = Counter()
-        for connection in self._reader.connections:
-            counts[self._relative(connection.topic)] += connection.msgcount
+        for recorded in self._source.topics:
+            counts[self._relative(recorded.topic)] += recorded.count
         return dict(counts)
 
     @property
     def types(self) -> dict[str, str]:
         """Message type by topic, names as in OUTPUTS."""
-        return {self._relative(c.topic): c.msgtype for c in self._reader.connections}
+        return self._types
+
+    @cached_property
+    def _types(self) -> dict[str, str]:
+        return {self._relative(recorded.topic): recorded.type for recorded in self._source.topics}
 
     def time(self, tick: int) -> float:
         """Simulated time of a tick, s."""
@@ -114,16 +117,16 @@ class Bag(AbstractContextManager["Bag"]):
     @property
     def qos(self) -> dict[str, Qos]:
         """Quality of service that was offered when it was recorded, by topic, names as in OUTPUTS."""
-        return {self._relative(c.topic): _offered(c) for c in self._reader.connections}
+        return {self._relative(recorded.topic): recorded.qos for recorded in self._source.topics}
 
     @property
     def span_ns(self) -> tuple[int, int]:
         """Log times of the first and the last message."""
-        return self._reader.start_time, self._reader.end_time - 1
+        return self._source.span_ns
 
     def type_hash(self, topic: str) -> str:
         """RIHS01 hash of a topic's type by the definition that the bag states."""
-        return self._reader.typestore.hash_rihs01(self.types[topic])
+        return self._source.type_hash(self.types[topic])
 
     def raw(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, stop_ns: int | None = None
@@ -132,43 +135,45 @@ class Bag(AbstractContextManager["Bag"]):
 
         If given: of some topics, from a log time on, before a log time.
         """
-        count, stated = 0, 0
-        with in_one_sentence(self.path), self._own_reader() as reader:
-            chosen = [c for c in reader.connections if topics is None or self._relative(c.topic) in topics]
-            if not chosen:
-                return
-            stated = sum(connection.msgcount for connection in chosen)
-            for connection, log_time, data in reader.messages(chosen, start_ns, stop_ns):
+        chosen = [r for r in self._source.topics if topics is None or self._relative(r.topic) in topics]
+        names = {recorded.topic: self._relative(recorded.topic) for recorded in chosen}
+        count, stated = 0, sum(recorded.count for recorded in chosen)
+        with in_one_sentence(self.path):
+            for topic, log_time, data in self._source.messages(names.keys(), start_ns, stop_ns):
                 count += 1
-                yield self._relative(connection.topic), log_time, data
+                yield names[topic], log_time, data
         if start_ns is None and stop_ns is None and count < stated:
             raise BagError(f"{self.path}: only {count} of {stated} messages can be read; damaged or cut short?")
-
-    def _own_reader(self) -> AbstractContextManager[AnyReader]:
-        """A reader that nobody else moves on: rosbags has one position for all who read a file without an index."""
-        if not self._shares_position:
-            return nullcontext(self._reader)
-        return AnyReader(self._reader.paths, default_typestore=typestore())
 
     def decode(self, topic: str, data: bytes) -> Any:
         """A rosbags message object. Raises BagError if the bytes are not one of the topic's type."""
         with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded"):
-            return self._reader.deserialize(data, self.types[topic])
+            return self._source.deserialize(data, self.types[topic])
 
     def sense(self) -> AbstractContextManager[None]:
         """Around whatever makes sense of decoded messages: where damage can't be excluded, errors become BagErrors."""
         return nullcontext() if self.verified else in_one_sentence(self.path, "its messages make no sense")
 
-    def messages(self, topic: str) -> Iterator[Frame[Any]]:
-        """Every message of one topic that carries a tick, as a rosbags object."""
+    def ticks(self, topic: str) -> NDArray[np.int64]:
+        """The ticks (n,) of the messages of one topic."""
+        return np.array([self._tick(topic, data) for _, _, data in self.raw({topic})], dtype=np.int64)
+
+    def messages(self, topic: str, ticks: Collection[int] | None = None) -> Iterator[Frame[Any]]:
+        """The messages of one topic that carries a tick, as rosbags objects: every one, or those of some ticks."""
         for _, _, data in self.raw({topic}):
+            if ticks is not None and self._tick(topic, data) not in ticks:
+                continue
             message = self.decode(topic, data)
             yield Frame(message.tick, message.tick * self._tick_ns(message) * 1e-9, message)
 
-    def read(self, topic: str) -> Iterator[Frame[Any]]:
-        """Every message of one topic as its row of topics.TOPICS reads it: columns, or whatever it says there."""
+    def _tick(self, topic: str, data: bytes) -> int:
+        with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded"):
+            return self._source.tick(data, self.types[topic])
+
+    def read(self, topic: str, ticks: Collection[int] | None = None) -> Iterator[Frame[Any]]:
+        """The same as its row of topics.TOPICS reads them: columns, or whatever it says there."""
         row = TOPICS[topic]
-        for frame in self.messages(topic):
+        for frame in self.messages(topic, ticks):
             yield Frame(frame.tick, frame.time, row.unpack(frame.data))
 
     def bottles(self) -> Iterator[Frame[BottleColumns]]:
@@ -211,25 +216,6 @@ class Bag(AbstractContextManager["Bag"]):
         return int(message.tick_ns if message.__msgtype__ == LINE else self.line.tick_ns)
 
 
-def _is_scanned(reader: AnyReader) -> bool:
-    """Whether rosbags finds messages by going through a file, for want of an index of chunks."""
-    bags: list[Any] = [bag.storage for bag in reader.readers if isinstance(bag, Reader)]
-    storages = [file for bag in bags for file in getattr(bag, "storages", [bag])]
-    return any(not getattr(storage, "chunks", True) for storage in storages)
-
-
-def _offered(connection: Connection) -> Qos:
-    profiles = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
-    if not profiles:
-        return DATA
-    first = profiles[0]  # of one publisher; several of one topic offer the same here
-    return Qos(
-        depth=max(1, first.depth),
-        reliability="best_effort" if first.reliability is QosReliability.BEST_EFFORT else "reliable",
-        durability="transient_local" if first.durability is QosDurability.TRANSIENT_LOCAL else "volatile",
-    )
-
-
 @contextmanager
 def in_one_sentence(path: Path, what: str = "can't be read as a bag") -> Iterator[None]:
     """Turns whatever the libraries raise over a bag that they can't read into a BagError of one sentence."""
@@ -262,13 +248,13 @@ def open_bag(path: str | Path) -> Bag:
         seals = [_verify(path, file) for file in files]
         verified = bool(seals) and all(seals)
         # By its files, if it is MCAP: these repeat, under a checksum, what metadata.yaml says.
-        reader = AnyReader(files or [path], default_typestore=typestore())
-        reader.open()
+        own = own_source(files[0]) if verified and len(files) == 1 else None
+        source = own or AnySource(files or [path])
         try:
-            return Bag(path, reader, verified)
+            return Bag(path, source, verified)
         except BaseException:
             with suppress(Exception):
-                reader.close()
+                source.close()
             raise
 
 

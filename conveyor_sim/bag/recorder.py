@@ -10,12 +10,13 @@ import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.lock import claim
-from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, McapFile, Schema
-from conveyor_sim.bag.metadata import to_yaml, write_metadata
+from conveyor_sim.bag.mcap_file import McapFile
+from conveyor_sim.bag.metadata import write_metadata
 from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import default_distro, definition, type_hash
+from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import BagError
 
 FLUSH_INTERVAL = 0.5
@@ -59,13 +60,8 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._flusher.start()
 
     def _register(self, topic: str) -> int:
-        output = OUTPUTS[topic]
-        schema = Schema(output.type, "ros2msg", definition(output.type, self._distro).encode())
-        metadata = {
-            QOS_KEY: to_yaml([output.qos.as_rosbag2()]),
-            HASH_KEY: type_hash(output.type, self._distro),
-        }
-        return self._file.add_topic(f"/{topic}", schema, "cdr", metadata)
+        schema, metadata = schema_of(topic, self._distro), metadata_of(topic, self._distro)
+        return self._file.add_topic(f"/{topic}", schema, ENCODING, metadata)
 
     def wants(self, topic: str) -> bool:
         """Whether the topic is recorded."""

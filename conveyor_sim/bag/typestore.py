@@ -12,7 +12,8 @@ from rosbags.typesys.store import Typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.resources import msg_defs_dir
 
-DISTROS = {"jazzy": Stores.ROS2_JAZZY, "kilted": Stores.ROS2_KILTED}
+DEFAULT = "jazzy"
+DISTROS = {DEFAULT: Stores.ROS2_JAZZY, "kilted": Stores.ROS2_KILTED}
 PACKAGE = "conveyor_msgs"
 SEPARATOR = "=" * 80 + "\n"
 
@@ -23,11 +24,11 @@ def default_distro() -> str:
     if sourced in DISTROS:
         return sourced
     installed = [distro for distro in DISTROS if any(True for _ in distributions(name=f"ros-{distro}-rclpy"))]
-    return installed[0] if installed else "jazzy"
+    return installed[0] if installed else DEFAULT
 
 
 @lru_cache(maxsize=len(DISTROS))
-def typestore(distro: str = "jazzy") -> Typestore:
+def typestore(distro: str = DEFAULT) -> Typestore:
     """The types of a distribution plus conveyor_msgs. Raises ConveyorError for a distribution not in DISTROS."""
     if distro not in DISTROS:
         raise ConveyorError(f"ROS distribution {distro!r} given, expected one of {', '.join(DISTROS)}")
@@ -40,13 +41,13 @@ def typestore(distro: str = "jazzy") -> Typestore:
 
 
 @lru_cache(maxsize=64)
-def type_hash(name: str, distro: str = "jazzy") -> str:
+def type_hash(name: str, distro: str = DEFAULT) -> str:
     """RIHS01 hash of a message type such as "conveyor_msgs/msg/Bottles"; equals the one ROS itself computes."""
     return typestore(distro).hash_rihs01(name)
 
 
 @lru_cache(maxsize=64)
-def definition(name: str, distro: str = "jazzy") -> str:
+def definition(name: str, distro: str = DEFAULT) -> str:
     """The `ros2msg` definition of a type, followed by those of the types it is made of.
 
     The text of a conveyor_msgs type is its file's own, so that its comments (units!) reach every reader of a bag.

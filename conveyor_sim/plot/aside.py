@@ -19,14 +19,17 @@ from typing import BinaryIO
 
 import numpy as np
 
+from conveyor_sim.bag.channels import metadata_of, schema_of
 from conveyor_sim.bag.reader import Bag, open_bag
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.topics import OUTPUTS
+from conveyor_sim.bag.typestore import DEFAULT
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Velocity
 from conveyor_sim.plot.files import Pair
 from conveyor_sim.plot.pictures import Figures, figures_of
 from conveyor_sim.plot.series import velocity_figure
+from conveyor_sim.scene import Scene
 
 LONGEST = ("flow", "table", "damage_rails", "energy", "plant")
 """What takes longest is drawn first, so that no process is left with it at the end."""
@@ -57,8 +60,10 @@ def child() -> None:
 
 
 def get_ready() -> None:
-    """Load what drawing needs: message types, fonts, the parser of formulas, the writers of files."""
-    typestore()
+    """Load what drawing needs: types of messages and scenes, fonts, the parser of formulas, the writers of files."""
+    for topic in OUTPUTS:
+        schema_of(topic, DEFAULT), metadata_of(topic, DEFAULT)
+    Scene.model_rebuild()
     still = np.zeros(2)
     nothing = Velocity(0, 0, np.array([0.0, 1.0]), still, still, still.astype(np.int64))
     with style.look():

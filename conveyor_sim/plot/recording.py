@@ -125,8 +125,9 @@ class Recording:
                     f"expected one within the recording, {seconds[0]:g} to {seconds[-1]:g} s"
                 )
         chosen = np.unique([ticks[int(np.argmin(np.abs(seconds - time)))] for time in times])
-        contacts = {f.tick: f.data for f in self._bag.contacts() if f.tick in chosen} if self._has_contacts else {}
-        return [self._frame(f.tick, f.data, contacts.get(f.tick)) for f in self._bag.bottles() if f.tick in chosen]
+        wanted = set(chosen.tolist())
+        contacts = {f.tick: f.data for f in self._bag.read("contacts", wanted)} if self._has_contacts else {}
+        return [self._frame(f.tick, f.data, contacts.get(f.tick)) for f in self._bag.read("bottles", wanted)]
 
     def velocities(self, bottles: Sequence[int] | None) -> list[Velocity]:
         """Velocities of some bottles by id; default: the 1st and the 50th fed, or the last if there are fewer.
@@ -186,7 +187,7 @@ class Recording:
         ticks = self._summary.ticks
         if not self._has_contacts:
             return ticks
-        both = np.intersect1d(ticks, np.array([frame.tick for frame in self._bag.contacts()], dtype=np.int64))
+        both = np.intersect1d(ticks, self._bag.ticks("contacts"))
         return both if len(both) else ticks
 
     @cached_property
