@@ -17,6 +17,7 @@ with while_importing():
     from rich.console import Console, RenderableType
 
     from conveyor_sim.errors import ConveyorError
+    from conveyor_sim.support.garbage import collected_later
     from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.support.progress import ProgressBar
     from conveyor_sim.support.signals import HandledOnce, held_back
@@ -157,16 +158,17 @@ def run(
 
     It runs as fast as possible, and records what the node would.
     """
-    from conveyor_sim.bag.folder import require_recordable
-    from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.explain.choices import setting_line
-    from conveyor_sim.model import build_model
-    from conveyor_sim.runs.compilation import Compilation
-    from conveyor_sim.runs.drawing import Drawing
-    from conveyor_sim.runs.report import report, report_unrecorded
-    from conveyor_sim.runs.runner import run_scene
-    from conveyor_sim.scene import load_scene
-    from conveyor_sim.support.resources import scene_path
+    with collected_later():
+        from conveyor_sim.bag.folder import require_recordable
+        from conveyor_sim.bag.recorder import run_folder
+        from conveyor_sim.explain.choices import setting_line
+        from conveyor_sim.model import build_model
+        from conveyor_sim.runs.compilation import Compilation
+        from conveyor_sim.runs.drawing import Drawing
+        from conveyor_sim.runs.report import report, report_unrecorded
+        from conveyor_sim.runs.runner import run_scene
+        from conveyor_sim.scene import load_scene
+        from conveyor_sim.support.resources import scene_path
 
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
@@ -176,6 +178,8 @@ def run(
         folder = click.get_current_context().with_resource(run_folder(out))
         require_recordable(folder)  # not only once everything has been compiled
         drawing = None if no_pictures else click.get_current_context().with_resource(Drawing())
+        if drawing is not None:
+            drawing.get_ready()
     Compilation(loaded, _say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
         done = run_scene(loaded, folder, bar.update, threads)

@@ -4,7 +4,6 @@ that it forks: they share what it has read of the bag.
 
 from __future__ import annotations
 
-import gc
 import os
 import pickle
 import signal
@@ -49,7 +48,6 @@ def child() -> None:
     """
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever else is printed
-    get_ready()
     try:
         task = pickle.load(requests)
     except EOFError:  # there is nothing to draw
@@ -68,7 +66,6 @@ def get_ready() -> None:
     nothing = Velocity(0, 0, np.array([0.0, 1.0]), still, still, still.astype(np.int64))
     with style.look():
         style.rendered(velocity_figure(nothing, ("belt",), 1.0))
-    gc.freeze()  # else looking for garbage in it copies pages that the processes share
 
 
 def side_by_side(task: Task, processes: int, lifeline: BinaryIO | None = None) -> Drawn:

@@ -7,6 +7,7 @@ import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -37,10 +38,15 @@ PATIENCE = 3.0  # s of wall time to wait for the node's last diagnostics, sent o
 
 
 def run_in_lockstep(
-    scene_name: str, bag: Path, duration: float | None = None, outside_tables: bool = False
+    scene_name: str,
+    bag: Path,
+    duration: float | None = None,
+    outside_tables: bool = False,
+    started: Callable[[], None] = lambda: None,
 ) -> float | None:
     """Run node and controller to the end of `duration` (s; None: the scene's), recorded to `bag`.
 
+    started: called once the first tick has passed.
     Returns the wall time in s from the first tick to the last, if the node could tell it.
     Raises ConveyorError if one of them ends before that, or on Ctrl-C or SIGTERM. Either way nothing is left running.
     """
@@ -79,6 +85,7 @@ def run_in_lockstep(
         with told_if_long(compiling(seconds_to_compile(build_model(scene)))):
             while not observer.started and going_on():
                 observer.wait(LOOK)
+        started()
         with ProgressBar(scene.name, scene.duration) as progress:
             while going_on():
                 observer.wait(LOOK)
@@ -116,7 +123,8 @@ def main(scene: str, out: Path | None, duration: float | None, outside_tables: b
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
     try:
         with run_folder(out) as bag, Drawing() as drawing:
-            report(bag, run_in_lockstep(scene, bag, duration, outside_tables), drawing)
+            # Not before: the processes that start keep all cores busy.
+            report(bag, run_in_lockstep(scene, bag, duration, outside_tables, drawing.get_ready), drawing)
     except ConveyorError as error:
         print(f"main job: {printable_lines(error)}", file=sys.stderr)
         sys.exit(STATUS if isinstance(error, Interrupted) else 1)

@@ -23,6 +23,7 @@ from conveyor_sim.engine.compiler.kernel_cache import NotCached, cached_only
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import compile_kernels
+from conveyor_sim.support.garbage import collected_later
 
 BASE_SECONDS, EFFECT_SECONDS = 6.0, 1.5
 """s of a core to compile, and for each effect that is on: a fit to scenes of 5 to 13 effects, measured in 2026."""
@@ -102,7 +103,7 @@ class Compilation:
     def _load(self) -> bool:
         """Take the kernels from the cache, if all are there."""
         try:
-            with cached_only():
+            with cached_only(), collected_later():
                 compile_kernels(self._scene)
         except NotCached:
             return False

@@ -15,18 +15,29 @@ from pathlib import Path
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.plot.files import Pair, write
 
-CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.plot.aside import child; child()"
+CODE = """
+import sys
+sys.path[:] = {path!r}
+from conveyor_sim.support.garbage import collected_later
+with collected_later():
+    from conveyor_sim.plot.aside import child, get_ready
+    get_ready()
+child()
+"""
 
 
 class Drawing(AbstractContextManager["Drawing"]):
-    """A process that loads what drawing needs while there is nothing to draw yet, and ends with the context.
+    """A process that draws, and ends with the context. Without matplotlib nothing is drawn.
 
-    `begin` once there is a recording, then `pictures`. Without matplotlib it draws nothing.
+    `get_ready` while there is nothing to draw yet, `begin` once there is a recording, then `pictures`.
     """
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        if find_spec("matplotlib") is None:
+
+    def get_ready(self) -> None:
+        """Have all loaded that drawing needs, which takes about a second of a core, if that was not done before."""
+        if self._process is not None or find_spec("matplotlib") is None:
             return
         # A session of its own: Ctrl-C at the terminal is this process's affair.
         self._process = subprocess.Popen(
@@ -39,6 +50,7 @@ class Drawing(AbstractContextManager["Drawing"]):
 
     def begin(self, bag: Path, times: Sequence[float] | None = None, bottles: Sequence[int] | None = None) -> None:
         """Have a recording read and drawn (as `plot.plot_bag` would) while this process does something else."""
+        self.get_ready()
         if self._process is not None:
             assert self._process.stdin is not None
             with suppress(BrokenPipeError):  # it has ended, so there will be no answer

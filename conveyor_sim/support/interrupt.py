@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from conveyor_sim.support.garbage import collected_later
+
 STATUS = 130
 """128 and the number of SIGINT, as shells have it."""
 AGAIN = 0.05
@@ -27,7 +29,8 @@ def while_importing() -> Iterator[None]:
         return
     before = signal.signal(signal.SIGINT, _end)
     try:
-        yield
+        with collected_later():
+            yield
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -22,6 +22,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def group_of(drawing: Drawing) -> int:
+    drawing.get_ready()
     assert drawing._process is not None
     return drawing._process.pid
 
