@@ -12,7 +12,7 @@ from conveyor_sim.support.interrupt import one_line, while_importing
 with while_importing():
     import click
 
-    from bench import control, dense, growth, lockstep, markdown, memory, node, plant, start, targets
+    from bench import control, dense, growth, lockstep, markdown, memory, node, plant, start, targets, whole
     from bench.measure import Effort, say
     from bench.rows import Row, Rows
     from conveyor_sim.support.machine import PACKAGES, machine
@@ -43,6 +43,7 @@ PARTS: dict[str, Part] = {
     "node": node,
     "control": control,
     "lockstep": lockstep,
+    "whole": whole,
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import control, dense, growth, lockstep, node, plant, start
+from bench import control, dense, growth, lockstep, node, plant, start, whole
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
@@ -62,6 +62,10 @@ def _lockstep(quantity: str) -> Callable[[Rows], float | None]:
 def _evidence(rows: Rows) -> float | None:
     ratio = _middle(rows.ratio(control.CASE, 0, control.WITH_EVIDENCE, control.DOWNSTREAM_STOP, control.WHOLE))
     return None if ratio is None else ratio - 1.0
+
+
+def _whole(command: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(whole.CASE, 0, command, whole.WALL))
 
 
 def _middle(spread: Spread | None) -> float | None:
@@ -131,6 +135,10 @@ TARGETS = (
     ),
     Target("scans a second in lockstep over DDS", "lockstep", LEAST, 1500.0, _lockstep(lockstep.RATE)),
     Target("s from the start of both nodes to the first scans", "lockstep", MOST, 2.0, _lockstep(lockstep.START)),
+    *(
+        Target(f"s of wall time, {command}", "whole", MOST, most, _whole(command))
+        for command, most in ((whole.RUN, 4.0), (whole.MAKE_RUN, 7.0))
+    ),
     Target("what evidence adds to it", "control", MOST, 0.2, _evidence),
 )
 
