@@ -25,8 +25,8 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import compile_kernels
 from conveyor_sim.support.garbage import collected_later
 
-BASE_SECONDS, EFFECT_SECONDS = 6.0, 1.5
-"""s of a core to compile, and for each effect that is on: a fit to scenes of 5 to 13 effects, measured in 2026."""
+BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
+"""s of a core to compile, and for each effect that is on: a fit to scenes of 5 to 14 effects, measured in 2026."""
 
 # As it ends, Python looks through all objects for garbage: numba's are so many that it takes half a second.
 atexit.register(gc.freeze)
