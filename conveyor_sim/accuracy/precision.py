@@ -163,8 +163,8 @@ class WorkPrecision:
 
     def points(self, settings: Sequence[Setting], budget: float, progress: Progress) -> list[Point]:
         """What came of settings that were tried out; their costs are measured in turns within a budget (s)."""
-        trials = {setting: self._trials[setting] for setting in settings if setting in self._trials}
-        running = {setting: trial.simulation for setting, trial in trials.items() if trial.simulation is not None}
+        tried = [(setting, self._trials[setting]) for setting in settings if setting in self._trials]
+        running = {setting: trial.simulation for setting, trial in tried if trial.simulation is not None}
         costs = costs_of(running, self.starts[-1].simulation, budget, progress)
         return [
             Point(
@@ -176,7 +176,7 @@ class WorkPrecision:
                 failure=trial.failure,
                 resting=trial.resting,
             )
-            for setting, trial in trials.items()
+            for setting, trial in tried
         ]
 
     def _run(self, setting: Setting) -> _Trial:

@@ -40,8 +40,12 @@ class Integration:
         self._chatters = False
         self._listening = self._ticks_between_listening()
         self.shortened_ticks = 0
-        self.kernel_seconds = 0.0
+        self._kernel_seconds = 0.0
+
+    @property
+    def kernel_seconds(self) -> float:
         """Wall time that steps have taken, s."""
+        return self._kernel_seconds
 
     @property
     def threads(self) -> int:
@@ -95,7 +99,7 @@ class Integration:
         began = time.perf_counter()
         self._take_steps(1)
         took = time.perf_counter() - began
-        self.kernel_seconds += took
+        self._kernel_seconds += took
         if self._choice is not None:
             self._choice.took(took, self._model.steps_per_tick * self._state.world.bottles.id.size)
         wrong = self._guard.end(self._model.dt)
