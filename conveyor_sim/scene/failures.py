@@ -1,0 +1,74 @@
+"""How machines of a scene file fail, and when they are stopped by plan."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Le, Len
+from pydantic import AllowInfNan, Strict, Tag
+
+from conveyor_sim.scene.part import Part, one_of
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.types import Holds, NotNegative, Positive, Says, quantity
+from conveyor_sim.scene.words import shown
+
+Shape = Annotated[float, Strict(), AllowInfNan(False), Ge(0.1), Le(100), Says("a number from 0.1 to 100")]
+
+
+class Exponential(Part):
+    """Times that are drawn from the seed, whatever has passed before."""
+
+    kind: Literal["exponential"] = quantity("The kind of distribution.")
+    mean: Positive = quantity("Mean time.", "s")
+
+
+class Weibull(Part):
+    """Times that are drawn from the seed: early failures (shape below 1) or wear (above)."""
+
+    kind: Literal["weibull"] = quantity("The kind of distribution.")
+    mean: Positive = quantity("Mean time: the scale parameter times Gamma(1 + 1/shape).", "s")
+    shape: Shape = quantity("Shape parameter; 1 is the exponential distribution.", "1")
+
+
+class FixedTimes(Part):
+    """Times that are given."""
+
+    kind: Literal["list"] = quantity("The kind of distribution.")
+    times: Annotated[tuple[Positive, ...], Len(1), Holds("a list of times, at least one")] = quantity(
+        "They are taken in order, and from the first one again after the last.", "s"
+    )
+
+
+Times = Annotated[
+    Annotated[Exponential, Tag("(exponential)")]
+    | Annotated[Weibull, Tag("(weibull)")]
+    | Annotated[FixedTimes, Tag("(list)")],
+    one_of({"exponential": "(exponential)", "weibull": "(weibull)", "list": "(list)"}),
+]
+"""Where times come from."""
+
+
+class Failure(Part):
+    """A way in which a machine fails, again and again."""
+
+    between: Times = quantity("From the end of one repair, or the start of the run, to the next failure.")
+    repair: Times = quantity("How long it is down.")
+    counted: Literal["running", "clock"] = quantity(
+        "What `between` counts. running: while it is in Execute, neither starved nor blocked; clock: all the time.",
+        default="running",
+    )
+
+
+class PlannedStop(Part):
+    """A stop by plan: a break, a changeover, cleaning. The machine stops, and starts again by itself."""
+
+    start: NotNegative = quantity("When the first one begins.", "s")
+    duration: Positive = quantity("How long it lasts.", "s")
+    every: Positive | None = quantity(
+        "From the beginning of one to that of the next. Left out: there is one.", "s", default=None
+    )
+
+    def problems(self, path: Path) -> Iterator[Problem]:
+        """One that begins before the one before it has ended."""
+        if self.every is not None and self.every <= self.duration:
+            text = f"{shown(self.every)} given, expected more than the duration, {self.duration:g} (s)"
+            yield Problem((*path, "every"), text)
