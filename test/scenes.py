@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,28 @@ from numpy.typing import NDArray
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.simulation import Simulation
 
+ROOT = Path(__file__).parent.parent
+SHIPPED = sorted(
+    [
+        *ROOT.glob("config/*.yaml"),
+        *ROOT.glob("config/scenarios/*.yaml"),
+        *ROOT.glob("examples/*.yaml"),
+        *ROOT.glob("docs/**/scene.yaml"),
+        ROOT / "test" / "testing" / "table.yaml",  # that of docs/testing_control_logic.md
+    ]
+)
+"""Every scene file that is shipped or shown."""
+
 RADIUS = 0.065
 MASS = 0.2
 NO_FLOOR: dict[str, Any] = {"floor": "none"}
 PEAKS: dict[str, Any] = {"effects": {"peaks": "on"}}
 NO_OUTPUTS = dict.fromkeys(Scene.TOPICS, 0)
+
+
+def shipped_name(path: Path) -> str:
+    """The name of one of `SHIPPED`, for a test."""
+    return path.parent.name if path.stem == "scene" else path.stem
 
 
 def scene(**fields: Any) -> Scene:

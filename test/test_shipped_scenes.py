@@ -3,21 +3,12 @@
 from pathlib import Path
 
 import pytest
+from scenes import SHIPPED, shipped_name
 
 from conveyor_sim.runs.force_check import HARDER, PeakWatch, achieved
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
-ROOT = Path(__file__).parent.parent
-SCENES = sorted(
-    [
-        *ROOT.glob("config/*.yaml"),
-        *ROOT.glob("config/scenarios/*.yaml"),
-        *ROOT.glob("examples/*.yaml"),
-        *ROOT.glob("docs/**/scene.yaml"),
-        ROOT / "test" / "testing" / "table.yaml",  # that of docs/testing_control_logic.md
-    ]
-)
 SECONDS = {"buffer_lane": 30.0, "reject_line": 60.0, "watched_eyes": 60.0, "zoned_line": 60.0}
 """Of those that go on as they are then."""
 BEYOND = {"buffer_lane"}
@@ -27,13 +18,9 @@ WORDS = "more than its predicted error rests on"
 PEAKS = {"effects": {"peaks": "on"}}
 
 
-def name_of(path: Path) -> str:
-    return path.parent.name if path.stem == "scene" else path.stem
-
-
-@pytest.mark.parametrize("path", SCENES, ids=name_of)
+@pytest.mark.parametrize("path", SHIPPED, ids=shipped_name)
 def test_it_runs_as_its_prediction_expects(path: Path) -> None:
-    name = name_of(path)
+    name = shipped_name(path)
     # Peaks as the scene has them, or on where other scenes have the same kernels with them.
     scene = load_scene(path, PEAKS if name in ("buffer_lane", "reject_line", "watched_eyes") else {})
     simulation = Simulation(scene, threads=1)
@@ -55,5 +42,5 @@ def test_it_runs_as_its_prediction_expects(path: Path) -> None:
 
 
 def test_the_scenes_are_found() -> None:
-    assert {"paper_plant", "zoned_line", "push", "glass_line_1e7", "table"} <= {name_of(path) for path in SCENES}
-    assert len(SCENES) >= 17
+    assert {"paper_plant", "zoned_line", "push", "glass_line_1e7", "table"} <= {shipped_name(path) for path in SHIPPED}
+    assert len(SHIPPED) >= 17

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from conveyor_sim.line.process_image import Command
+from conveyor_sim.line.tag import Tag
 from conveyor_sim.support.printable import printable
 
 FAULT = "fault"
@@ -33,7 +33,7 @@ class CommandOutcome:
     reason: str
 
 
-def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: Sequence[float]) -> str:
+def refusal(table: Sequence[Tag], what: str, names: Sequence[str], values: Sequence[float]) -> str:
     """Why a set of inputs can't be applied, "" if it can. table: those there are; what: the word for one of them."""
     if len(names) != len(values):
         return f"{len(names)} names and {len(values)} values given, expected as many of both"
@@ -52,9 +52,9 @@ def refusal(table: Sequence[Command], what: str, names: Sequence[str], values: S
             return f"{name}: given twice"
         seen.add(name)
         command = known[name]
-        if command.type == "bool" and value not in (0.0, 1.0):
+        if command.kind == "bool" and value not in (0.0, 1.0):
             return f"{name}: {value:g} given, expected 0 or 1"
-        if command.type == "count" and not float(value).is_integer():
+        if command.kind in ("count", "enumeration") and not float(value).is_integer():
             return f"{name}: {value:g} given, expected a whole number from {command.low:g} to {command.high:g}"
         unit = "" if command.unit == "1" else f" {command.unit}"
         if not math.isfinite(value) or not command.low <= value <= command.high:

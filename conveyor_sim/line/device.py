@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.support.footing import find_carriers
-from conveyor_sim.line.process_image import Command, Signal
+from conveyor_sim.line.process_image import of_roles
+from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.state import State
 
 
@@ -73,16 +74,19 @@ class Device:
     blocked_ticks = 0
     """Ticks at which it had a bottle to put onto the line and no room."""
 
-    def __init__(
-        self,
-        name: str,
-        signals: Sequence[Signal] = (),
-        commands: Sequence[Command] = (),
-        faults: Sequence[Command] = (),
-    ) -> None:
-        """name: as its signals begin, "photo_eyes/exit"."""
+    def __init__(self, name: str, tags: Sequence[Tag] = ()) -> None:
+        """name: as its tags begin, "photo_eyes/exit". tags: all that can be read of it, commanded and injected."""
         self._name = name
-        self._signals, self._commands, self._faults = tuple(signals), tuple(commands), tuple(faults)
+        self._take_tags(tags)
+
+    def classify(self, kind: str) -> None:
+        """Have its tags say whose they are. kind: of its part of the scene."""
+        self._take_tags([replace(tag, device=self._name, device_class=kind) for tag in self._tags])
+
+    def _take_tags(self, tags: Sequence[Tag]) -> None:
+        self._tags = tuple(tags)
+        self._signals, self._commands = of_roles(tags, SIGNALS), of_roles(tags, COMMANDS)
+        self._faults = of_roles(tags, ("fault",))
 
     @property
     def name(self) -> str:
@@ -90,17 +94,22 @@ class Device:
         return self._name
 
     @property
-    def signals(self) -> tuple[Signal, ...]:
+    def tags(self) -> tuple[Tag, ...]:
+        """Signals, commands and faults."""
+        return self._tags
+
+    @property
+    def signals(self) -> tuple[Tag, ...]:
         """What it shows to controllers."""
         return self._signals
 
     @property
-    def commands(self) -> tuple[Command, ...]:
+    def commands(self) -> tuple[Tag, ...]:
         """What controllers may tell it."""
         return self._commands
 
     @property
-    def faults(self) -> tuple[Command, ...]:
+    def faults(self) -> tuple[Tag, ...]:
         """What can be made to go wrong with it."""
         return self._faults
 
@@ -131,6 +140,6 @@ class Device:
         return ()
 
     def states(self, now: ScanContext) -> Sequence[float]:
-        """The values of the signals of the role "state", in their order; asked for at every tick."""
+        """The values of the signals that add to "state", in their order; asked for at every tick."""
         signals = zip(self._signals, self.values(now), strict=True)
-        return [value for signal, value in signals if signal.role == "state"]
+        return [value for signal, value in signals if signal.adds_to == "state"]

@@ -28,7 +28,7 @@ class EventLog:
         self._machines = [
             (device, names)
             for device in devices
-            if (names := [signal.name for signal in device.signals if signal.role == "state"])
+            if (names := [signal.name for signal in device.signals if signal.adds_to == "state"])
         ]
         self.events = []
         self.total = 0
@@ -61,7 +61,7 @@ class EventLog:
 
     def note_removed(self, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
         """A device has taken bottles, by their ids."""
-        rejects = any(signal.role == "rejected" for signal in device.signals)
+        rejects = any(signal.adds_to == "rejected" for signal in device.signals)
         self._note_bottles("bottle_rejected" if rejects else "bottle_removed", device, sorted(bottles), now)
 
     def note_fed(self, device: Device, first: int, now: ScanContext) -> None:

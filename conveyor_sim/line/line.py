@@ -15,7 +15,8 @@ from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
-from conveyor_sim.line.process_image import ProcessImage, Role
+from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.line.tag import Adds
 from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scene.schema import Scene
@@ -50,17 +51,13 @@ class Line:
         self._taking = [device for device in devices if type(device).take is not Device.take]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
         self._counting = [
-            device for device in devices if any(signal.role not in ("", "state") for signal in device.signals)
+            device for device in devices if any(signal.adds_to not in ("", "state") for signal in device.signals)
         ]
         self.takes = bool(self._taking) and state.model.has("outfeed")
         """Whether any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
         """Whether any device puts bottles onto the line."""
-        self.image = ProcessImage(
-            tuple(signal for device in devices for signal in device.signals),
-            tuple(command for device in devices for command in device.commands),
-            tuple(fault for device in devices for fault in device.faults),
-        )
+        self.image = ProcessImage(tuple(tag for device in devices for tag in device.tags))
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         self._surfaces = BeltSurfaces(state)
         self._pending: list[_Pending] = []
@@ -257,12 +254,12 @@ class Line:
         for device in self._devices:
             device.wake()
 
-    def _counted(self, *roles: Role) -> dict[str, int]:
-        """Sums of the signals of some roles, by the names of the devices that have such."""
+    def _counted(self, *sums_of: Adds) -> dict[str, int]:
+        """Sums of the signals that add to something, by the names of the devices that have such."""
         sums = {}
         for device in self._counting:
             values = zip(device.signals, device.values(self.now), strict=True)
-            counts = [int(value) for signal, value in values if signal.role in roles]
+            counts = [int(value) for signal, value in values if signal.adds_to in sums_of]
             if counts:
                 sums[device.name] = sum(counts)
         return sums

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Command, Signal, switch
+from conveyor_sim.line.tag import Tag, number, switch
 
 ROUNDING = 1e-9
 """Of a cycle: sums of rate x tick must not miss the tick they fall on."""
@@ -12,14 +12,18 @@ ROUNDING = 1e-9
 class MachineDevice(Device):
     """A machine that works in cycles, one bottle each. It runs at the start."""
 
-    def __init__(self, name: str, rate: float, rate_limit: float | None, signals: Sequence[Signal]) -> None:
+    def __init__(self, name: str, rate: float, rate_limit: float | None, signals: Sequence[Tag]) -> None:
         """rate, rate_limit: 1/s."""
         most = rate if rate_limit is None else rate_limit
         super().__init__(
             name,
-            [Signal(f"{name}/running", "1", "bool", "state"), *signals],
-            [switch(f"{name}/run"), Command(f"{name}/rate", "1/s", "number", 0.0, most)],
-            [switch(f"{name}/stop")],
+            [
+                switch(f"{name}/running", "status", "It runs, and nobody has stopped it.", 1.0, "state"),
+                *signals,
+                switch(f"{name}/run", "command", "Runs while on.", 1.0),
+                number(f"{name}/rate", "setpoint", "Bottles a second.", "1/s", 0.0, most, rate, nominal=rate),
+                switch(f"{name}/stop", "fault", "Stopped from outside while on."),
+            ],
         )
         self.run = True
         self.rate = rate

@@ -1,60 +1,34 @@
-"""The process image: all that a controller may read and write, once a tick, by name, with units, types and limits."""
+"""The process image: all that a controller may read and write, once a tick, by name."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
-Kind = Literal["bool", "count", "number"]
-"""bool: 0 or 1; count: a whole number."""
-
-Role = Literal["", "fed", "removed", "rejected", "state"]
-"""What a signal adds to: bottles put onto the line, taken off it, thrown out of it; or whether it is the state of a
-machine, each change of which is an event; "": neither."""
-
-
-@dataclass(frozen=True)
-class Signal:
-    """What a controller reads: an output of the line."""
-
-    name: str
-    unit: str
-    """ "1" where it has no dimension."""
-    type: Kind
-    role: Role = ""
-
-
-@dataclass(frozen=True)
-class Command:
-    """What a controller writes, or a fault that a test injects: an input of the line."""
-
-    name: str
-    unit: str
-    type: Kind
-    low: float
-    high: float
-
-
-def switch(name: str) -> Command:
-    """An input that is off (0) or on (1)."""
-    return Command(name, "1", "bool", 0.0, 1.0)
+from conveyor_sim.line.tag import COMMANDS, SIGNALS, Role, Tag
 
 
 @dataclass(frozen=True)
 class ProcessImage:
-    """Three tables by name. Values travel in the order of these tuples."""
+    """The tags of a line, and three tables of them by role. Values travel in the order of these tuples."""
 
-    signals: tuple[Signal, ...]
-    commands: tuple[Command, ...]
-    faults: tuple[Command, ...]
+    tags: tuple[Tag, ...]
+    signals: tuple[Tag, ...] = field(init=False)
+    commands: tuple[Tag, ...] = field(init=False)
+    faults: tuple[Tag, ...] = field(init=False)
     """Not for controllers: a test injects them."""
     signal_names: tuple[str, ...] = field(init=False)
     command_names: tuple[str, ...] = field(init=False)
     fault_names: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        for table in ("signal", "command", "fault"):
-            entries: Iterable[Signal | Command] = getattr(self, f"{table}s")
-            object.__setattr__(self, f"{table}_names", tuple(entry.name for entry in entries))
+        for table, roles in (("signal", SIGNALS), ("command", COMMANDS), ("fault", ("fault",))):
+            chosen = of_roles(self.tags, roles)
+            object.__setattr__(self, f"{table}s", chosen)
+            object.__setattr__(self, f"{table}_names", tuple(tag.name for tag in chosen))
+
+
+def of_roles(tags: Sequence[Tag], roles: Sequence[Role]) -> tuple[Tag, ...]:
+    """Those of some roles, in their order."""
+    return tuple(tag for tag in tags if tag.role in roles)
 
 
 def speed_command(belt: str) -> str:

@@ -48,6 +48,12 @@ class Setup:
         kind = self.model.bottle_types.index(bottle)
         return Entry(kind, float(self.model.type_radius[kind]), direction, speed)
 
+    def fastest_flow(self, belt: str) -> float:
+        """Bottles a second that a belt can bring at most: the smallest ones, touching in as many lanes as there are."""
+        shape = self.scene.belts[belt]
+        diameter = 2.0 * float(self.model.type_radius.min())
+        return max(map(abs, shape.speed_limits)) / diameter * max(1, int(shape.width / diameter))
+
     def random(self, branch: tuple[int, ...], index: int) -> np.random.Generator:
         """A random stream of its own."""
         seed = np.random.SeedSequence(self.scene.seed, spawn_key=(*branch, index))

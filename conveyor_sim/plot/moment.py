@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from conveyor_sim.line.process_image import Kind
+from conveyor_sim.line.tag import Kind
 from conveyor_sim.plot import style
 from conveyor_sim.plot.bottles import speed_scale
 from conveyor_sim.plot.data import Floats, Frame, Plant

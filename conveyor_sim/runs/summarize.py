@@ -14,7 +14,7 @@ from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import SceneError
 from conveyor_sim.line.devices import build_devices
-from conveyor_sim.line.process_image import Role
+from conveyor_sim.line.tag import Adds
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import StepLimit, step_limit
 from conveyor_sim.model.step_choice import choose_steps
@@ -123,8 +123,8 @@ class _Tally:
             topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},
         )
 
-    def _counted(self, roles: dict[str, Role] | None, *wanted: Role) -> int | None:
-        """The sum of the signals of some roles at the end."""
+    def _counted(self, roles: dict[str, Adds] | None, *wanted: Adds) -> int | None:
+        """The sum at the end of the signals that add to something."""
         if roles is None:
             return None
         names = self._bag.line.signal_names
@@ -166,10 +166,10 @@ def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
     )
 
 
-def _roles(line: Any, model: Model) -> dict[str, Role]:
-    """What the signals of a recorded scene count, by name."""
+def _roles(line: Any, model: Model) -> dict[str, Adds]:
+    """What the signals of a recorded scene add to, by name."""
     devices = build_devices(recorded_scene(line, line.scene_name), model)
-    return {signal.name: signal.role for device in devices for signal in device.signals}
+    return {signal.name: signal.adds_to for device in devices for signal in device.signals}
 
 
 def _model(line: Any) -> Model | None:

@@ -13,7 +13,8 @@ from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import FAULT, CommandOutcome
-from conveyor_sim.line.process_image import Command, Kind, ProcessImage, Signal
+from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.line.tag import Kind
 
 _FIRST_ROWS = 1024
 
@@ -37,9 +38,9 @@ class History:
 
     def __init__(self, image: ProcessImage) -> None:
         self._index = {name: column for column, name in enumerate(image.signal_names)}
-        entries: tuple[Signal | Command, ...] = (*image.signals, *image.commands, *image.faults)
+        entries = (*image.signals, *image.commands, *image.faults)
         self._unit = {entry.name: entry.unit for entry in entries}
-        self._kind = {entry.name: entry.type for entry in entries}
+        self._kind = {entry.name: entry.kind for entry in entries}
         self._rows = 0
         self._times = array("d")
         self._signals = np.empty((_FIRST_ROWS, len(image.signals)))

@@ -74,9 +74,9 @@ def _value(draw: st.DrawFn, given: Input) -> float:
     if draw(st.integers(0, 7)) == 7:
         wrong = [math.nan, math.inf, -math.inf, 1.0001 * given.high + 1e-9, given.low - 1e-9, -1e300, 1e-320, 0.5]
         return draw(st.sampled_from(wrong))
-    if given.type == "bool":
+    if given.kind == "bool":
         return draw(st.sampled_from([0.0, 1.0, 1.0]))
-    if given.type == "count":
+    if given.kind == "count":
         return float(draw(st.sampled_from([0, 1, -1, 3, -1000, 1000])))
     share = draw(st.sampled_from([0.0, 1.0, 0.5, 0.25, 0.001]))
     return draw(st.sampled_from([given.low, given.high, 0.0])) * share

@@ -80,12 +80,12 @@ class DeviceWatch:
         for signal in self._signals:
             value = self._now[signal.name]
             good = math.isfinite(value)
-            if signal.type == "bool":
+            if signal.kind == "bool":
                 good = value in (0.0, 1.0)
-            elif signal.type == "count":
+            elif signal.kind == "count":
                 good = float(value).is_integer() and (value >= 0.0 or signal.name.endswith("/pulses"))
             if not good:
-                raise Violation("signal of another type", f"{signal.name} is {value} ({signal.type})")
+                raise Violation("signal of another type", f"{signal.name} is {value} ({signal.kind})")
 
     def _rising(self) -> None:
         for name, value in self._now.items():

@@ -7,14 +7,14 @@ import pytest
 from scenes import base, belt, bottle, simulation
 
 from conveyor_sim.line.commands import refusal, shown
-from conveyor_sim.line.process_image import Command, Signal, switch
+from conveyor_sim.line.tag import count, number, switch
 from conveyor_sim.simulation import Simulation
 
 COMMANDS = (
-    Command("belts/one/cmd_speed", "m/s", "number", -1.0, 1.0),
-    Command("belts/two/cmd_speed", "m/s", "number", 0.0, 2.0),
+    number("belts/one/cmd_speed", "setpoint", "Speed.", "m/s", -1.0, 1.0),
+    number("belts/two/cmd_speed", "setpoint", "Speed.", "m/s", 0.0, 2.0),
 )
-OTHERS = (switch("gate/open"), Command("zone/offset", "1", "count", -9.0, 9.0))
+OTHERS = (switch("gate/open", "command", "Opens."), count("zone/offset", "fault", "Added.", -9.0, 9.0))
 
 UNKNOWN = "no such command, expected one of belts/one/cmd_speed, belts/two/cmd_speed"
 
@@ -34,14 +34,17 @@ def two_belts() -> Simulation:
 
 def test_the_tables_of_the_process_image() -> None:
     image = two_belts().process_image
-    assert image.commands == COMMANDS
+    assert [(tag.kind, tag.unit, tag.low, tag.high, tag.initial) for tag in image.commands] == [
+        ("number", "m/s", -1.0, 1.0, 0.2),
+        ("number", "m/s", 0.0, 2.0, 0.3),
+    ]
     assert image.command_names == ("belts/one/cmd_speed", "belts/two/cmd_speed")
-    assert image.signals == (
-        Signal("belts/one/speed", "m/s", "number"),
-        Signal("belts/one/bottles", "1", "count"),
-        Signal("belts/two/speed", "m/s", "number"),
-        Signal("belts/two/bottles", "1", "count"),
-    )
+    assert [(tag.name, tag.unit, tag.kind) for tag in image.signals] == [
+        ("belts/one/speed", "m/s", "number"),
+        ("belts/one/bottles", "1", "count"),
+        ("belts/two/speed", "m/s", "number"),
+        ("belts/two/bottles", "1", "count"),
+    ]
     assert image.faults == ()
 
 
@@ -137,7 +140,7 @@ def test_without_belts_there_is_nothing_to_command() -> None:
 
 
 def test_a_refusal_lists_some_of_many_names() -> None:
-    many = [switch(f"gates/{number}/open") for number in range(500)]
+    many = [switch(f"gates/{index}/open", "command", "Opens.") for index in range(500)]
     reason = refusal(many, "command", ["gates/500/open"], [1.0])
     assert reason.endswith("gates/19/open and 480 others")
 

@@ -59,9 +59,9 @@ def test_devices_act_in_the_order_of_the_scenes_fields(scene: Scene) -> None:
 
 
 def test_what_bottles_come_from_and_leave_by_counts_them(scene: Scene) -> None:
-    """Sums go by the roles of signals, so an entry or exit without one would be missing in them."""
+    """Sums go by what signals add to, so an entry or exit without such a one would be missing in them."""
     devices = {device.name: device for device in build_devices(scene, build_model(scene))}
     for (field, name), part in scene.devices():
-        roles = {signal.role for signal in devices[f"{field}/{name}"].signals} - {"", "state"}
-        assert roles <= {"fed"} if isinstance(part, Entry) else True
-        assert bool(roles) == isinstance(part, (Entry, Exit))
+        adds = {signal.adds_to for signal in devices[f"{field}/{name}"].signals} - {"", "state"}
+        assert adds <= {"fed"} if isinstance(part, Entry) else True
+        assert bool(adds) == isinstance(part, (Entry, Exit))

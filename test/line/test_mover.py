@@ -7,7 +7,6 @@ import pytest
 from physics.test_moving_rails import plant
 from scenes import RADIUS, bottle
 
-from conveyor_sim.line.process_image import switch
 from conveyor_sim.simulation import Simulation
 
 STROKE, TOP, ACCELERATION = 0.3, 0.5, 2.0
@@ -34,8 +33,9 @@ def test_the_process_image_has_them() -> None:
         "gates/g/position", "gates/g/is_closed", "gates/g/is_open", "gates/g/blocked",
         "pushers/p/position", "pushers/p/retracted", "pushers/p/extended", "pushers/p/blocked",
     )  # fmt: skip
-    assert image.commands[1:] == (switch("gates/g/open"), switch("pushers/p/push"))
-    assert image.faults == (switch("gates/g/jammed"), switch("pushers/p/jammed"))
+    assert image.command_names[1:] == ("gates/g/open", "pushers/p/push")
+    assert image.fault_names == ("gates/g/jammed", "pushers/p/jammed")
+    assert {tag.kind for tag in (*image.commands[1:], *image.faults)} == {"bool"}
 
 
 def test_a_stroke_takes_its_time_and_there_are_switches_at_its_ends() -> None:

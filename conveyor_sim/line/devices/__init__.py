@@ -46,5 +46,6 @@ def build_devices(scene: Scene, model: Model) -> tuple[Device, ...]:
     setup = Setup(scene, model)
     for (field, name), part in scene.devices():
         device = DEVICES[part.KIND](f"{field}/{name}", part, setup)
+        device.classify(part.KIND)
         setup.devices[device.name] = device
     return tuple(setup.devices.values())

@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Command, Signal, speed_command
+from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import Tag, count, number
 from conveyor_sim.line.watchdog import Watchdog
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 
@@ -18,18 +19,29 @@ class BeltDevice(Device):
         name: str,
         belt: StraightBelt | CurvedBelt,
         setup: Setup,
-        signals: Sequence[Signal] = (),
-        commands: Sequence[Command] = (),
-        faults: Sequence[Command] = (),
+        more: Sequence[Tag] = (),
+        backward: bool = False,
     ) -> None:
-        """The rest: what more a drive has."""
-        low, high = belt.speed_limits
+        """more: tags that a drive adds. backward: whether it can reverse the setpoint."""
         short_name = name.rpartition("/")[2]
+        setpoint, (low, high) = speed_command(short_name), belt.speed_limits
+        reach = (low, high, -low, -high) if backward else (low, high)
         super().__init__(
             name,
-            [Signal(f"{name}/speed", "m/s", "number"), Signal(f"{name}/bottles", "1", "count"), *signals],
-            [Command(speed_command(short_name), "m/s", "number", low, high), *commands],
-            faults,
+            [
+                number(
+                    f"{name}/speed",
+                    "actual",
+                    "Speed of the surface.",
+                    "m/s",
+                    min(0.0, *reach),
+                    max(0.0, *reach),
+                    belt.speed,
+                ),
+                count(f"{name}/bottles", "actual", "Bottles whose axis is on the belt."),
+                number(setpoint, "setpoint", "Speed to run at, positive forward.", "m/s", low, high, belt.speed),
+                *more,
+            ],
         )
         self._index = setup.index("belts", short_name)
         self._speed_command = speed_command(short_name)

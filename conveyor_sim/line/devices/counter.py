@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count
 from conveyor_sim.scene.parts.counter import Counter
 
 
@@ -13,7 +13,13 @@ class CounterDevice(Device):
     """One counter while it runs."""
 
     def __init__(self, name: str, counter: Counter, setup: Setup) -> None:
-        super().__init__(name, [Signal(f"{name}/{way}", "1", "count") for way in ("forward", "backward")])
+        super().__init__(
+            name,
+            [
+                count(f"{name}/forward", "counter", "Bottles that passed from left to right, seen along its line."),
+                count(f"{name}/backward", "counter", "Bottles that passed the other way."),
+            ],
+        )
         self._line = CrossingLine(counter.from_, counter.to)
         self.forward = self.backward = 0
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.line.ramp import Ramp
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
 from conveyor_sim.scene.drives import Drive
 
@@ -23,15 +23,19 @@ class DriveDevice(BeltDevice):
     """
 
     def __init__(self, name: str, belt: StraightBelt | CurvedBelt, drive: Drive, setup: Setup) -> None:
-        signals = [
-            Signal(f"{name}/running", "1", "bool", "state"),
-            Signal(f"{name}/at_speed", "1", "bool"),
-            Signal(f"{name}/fault", "1", "bool", "state"),
+        tags = [
+            switch(f"{name}/running", "status", "Commanded to run, and not tripped.", 1.0, "state"),
+            switch(f"{name}/at_speed", "status", "At the end of its ramp, also of one to standstill.", 1.0),
+            switch(f"{name}/fault", "status", "It has tripped.", adds_to="state"),
+            switch(f"{name}/run", "command", "Runs while on.", 1.0),
+            switch(f"{name}/reverse", "command", "Runs backward while on."),
+            switch(f"{name}/reset", "command", "As it rises, a trip is over if its cause is."),
+            switch(f"{name}/trip", "fault", "The drive trips and stops by its ramp."),
         ]
         if drive.pulses_per_metre is not None:
-            signals.append(Signal(f"{name}/pulses", "1", "count"))
-        commands = [switch(f"{name}/{what}") for what in ("run", "reverse", "reset")]
-        super().__init__(name, belt, setup, signals, commands, [switch(f"{name}/trip")])
+            text = "Pulses of the encoder, counted down in reverse."
+            tags.append(count(f"{name}/pulses", "counter", text, low=-MOST_COUNT))
+        super().__init__(name, belt, setup, tags, backward=True)
         self._drive = drive
         self.ramp = Ramp(belt.speed)
         self.run = True

@@ -7,8 +7,8 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.counter import CounterDevice
 from conveyor_sim.line.devices.zone import ZoneDevice
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.indicator import Indicator
 
 STANDS = 1e-3
@@ -27,11 +27,16 @@ class IndicatorDevice(Device):
     def __init__(self, name: str, indicator: Indicator, setup: Setup) -> None:
         downstream, backup, tick = indicator.downstream, indicator.backup, setup.scene.tick
         self._can_block = downstream is not None or backup is not None
-        kinds = ["jam", "starved", *(["blocked"] if self._can_block else [])]
-        super().__init__(
-            name,
-            [Signal(f"{name}/flow", "1/h", "number"), *(Signal(f"{name}/{kind}", "1", "bool") for kind in kinds)],
-        )
+        most = setup.fastest_flow(indicator.belt) * HOUR
+        tags = [
+            number(f"{name}/flow", "actual", "Passages within the last window.", "1/h", 0.0, most),
+            switch(f"{name}/jam", "status", "Bottles wait, the belt runs, and none has passed for the jam time."),
+            switch(f"{name}/starved", "status", "The belt runs, and no bottle has waited for the starved time."),
+        ]
+        if self._can_block:
+            text = "Bottles wait, the belt is to run, and downstream can't take them."
+            tags.append(switch(f"{name}/blocked", "status", text))
+        super().__init__(name, tags)
         self._counter = setup.device(CounterDevice, f"counters/{indicator.counter}")
         self._zone = setup.device(ZoneDevice, f"zones/{indicator.zone}")
         self._belt = setup.device(BeltDevice, f"belts/{indicator.belt}")

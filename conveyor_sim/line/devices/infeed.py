@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.entry import CLEAR, Quality
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.setup import JITTER, QUALITY, Setup
+from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.state import State
 
@@ -25,7 +25,13 @@ class InfeedDevice(Device):
     """One infeed while it runs."""
 
     def __init__(self, name: str, infeed: Infeed, setup: Setup) -> None:
-        super().__init__(name, [Signal(f"{name}/fed", "1", "count", "fed"), Signal(f"{name}/blocked", "1", "bool")])
+        super().__init__(
+            name,
+            [
+                count(f"{name}/fed", "counter", "Bottles let in.", adds_to="fed"),
+                switch(f"{name}/blocked", "status", "A bottle is due, and there is no room for it."),
+            ],
+        )
         self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
         self._radius = self._entry.radius
         index = setup.index("infeeds", name.rpartition("/")[2])

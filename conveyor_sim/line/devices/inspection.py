@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.crossing import CrossingLine
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count, seconds
 from conveyor_sim.scene.parts.inspection import Inspection
 
 
@@ -13,9 +13,15 @@ class InspectionDevice(Device):
     """One inspection while it runs."""
 
     def __init__(self, name: str, inspection: Inspection, setup: Setup) -> None:
-        counts = [Signal(f"{name}/{what}", "1", "count") for what in ("count", "bad")]
-        times = [Signal(f"{name}/{what}", "s", "number") for what in ("time", "bad_time")]
-        super().__init__(name, [*counts, *times])
+        super().__init__(
+            name,
+            [
+                count(f"{name}/count", "counter", "Bottles that passed from left to right, seen along its line."),
+                count(f"{name}/bad", "counter", "Bad bottles among them."),
+                seconds(f"{name}/time", "actual", "When the last bottle passed, between ticks."),
+                seconds(f"{name}/bad_time", "actual", "When the last bad bottle passed, between ticks."),
+            ],
+        )
         self._line = CrossingLine(inspection.from_, inspection.to)
         self.count = self.bad = 0
         self.time = self.bad_time = 0.0

@@ -5,16 +5,16 @@ from collections.abc import Sequence
 from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
 from conveyor_sim.line.course import course_to, later, position_at, resting
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.movers import Mover as MoverPart
 
 WORDS = {
-    "gates": ("open", "is_closed", "is_open"),
-    "pushers": ("push", "retracted", "extended"),
-    "diverters": ("divert", "at_home", "diverting"),
+    "gates": ("open", "is_closed", "is_open", "closed", "open"),
+    "pushers": ("push", "retracted", "extended", "retracted", "extended"),
+    "diverters": ("divert", "at_home", "diverting", "at home", "diverting"),
 }
-"""By kind: the command, and the end switches at home and at the end of the stroke."""
+"""By kind: the command, the end switches at home and at the end of the stroke, and what it is called there."""
 
 SWITCHED = 1e-3
 """Of the stroke: within it of an end that end's switch is on, within it of its course it is not blocked."""
@@ -29,21 +29,27 @@ class Mover(Device):
 
     def __init__(self, name: str, part: MoverPart, setup: Setup) -> None:
         shapes = setup.model.moving_shapes
-        number = [shape.name for shape in shapes].index(name)
-        shape = shapes[number]
-        order, home, away = WORDS[name.split("/")[0]]
+        index = [shape.name for shape in shapes].index(name)
+        shape = shapes[index]
+        order, home, away, at_home, at_end = WORDS[name.split("/")[0]]
+        share = shape.first / shape.stroke
         super().__init__(
             name,
             (
-                Signal(f"{name}/position", "1", "number"),
-                Signal(f"{name}/{home}", "1", "bool"),
-                Signal(f"{name}/{away}", "1", "bool"),
-                Signal(f"{name}/blocked", "1", "bool", "state"),
+                number(f"{name}/position", "actual", f"From 0, {at_home}, to 1, {at_end}.", "1", 0.0, 1.0, share),
+                switch(f"{name}/{home}", "status", f"It is {at_home}.", float(share <= SWITCHED)),
+                switch(f"{name}/{away}", "status", f"It is {at_end}.", float(share >= 1.0 - SWITCHED)),
+                switch(f"{name}/blocked", "status", "Bottles hold it up, or have pushed it away.", adds_to="state"),
+                switch(
+                    f"{name}/{order}",
+                    "command",
+                    f"Goes until {at_end}; off: until {at_home}.",
+                    round(share),
+                ),
+                switch(f"{name}/jammed", "fault", "Stands where it is, against whatever presses."),
             ),
-            (switch(f"{name}/{order}"),),
-            (switch(f"{name}/jammed"),),
         )
-        self._number, self._shape = number, shape
+        self._number, self._shape = index, shape
         self.target = self.position = shape.first
         """m or rad."""
         self.speed = 0.0

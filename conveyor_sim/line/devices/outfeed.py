@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count
 from conveyor_sim.scene.parts.outfeed import Outfeed
 
 
@@ -13,7 +13,7 @@ class OutfeedDevice(Device):
     """One outfeed while it runs."""
 
     def __init__(self, name: str, outfeed: Outfeed, setup: Setup) -> None:
-        super().__init__(name, [Signal(f"{name}/removed", "1", "count", "removed")])
+        super().__init__(name, [count(f"{name}/removed", "counter", "Bottles taken away.", adds_to="removed")])
         self._region = Region(outfeed.region)
         self.removed = 0
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from conveyor_sim.engine.sensors.beams import ROUNDING
 from conveyor_sim.line.beam import Beams, Span
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Command, Signal, switch
 from conveyor_sim.line.setup import PHOTO_EYES, Setup
+from conveyor_sim.line.tag import count, number, seconds, switch
 from conveyor_sim.line.timer import Edge, Timer
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
 
@@ -27,17 +27,16 @@ class PhotoEyeDevice(Device):
         super().__init__(
             name,
             [
-                Signal(f"{name}/blocked", "1", "bool"),
-                Signal(f"{name}/rose", "s", "number"),
-                Signal(f"{name}/fell", "s", "number"),
-                Signal(f"{name}/edges", "1", "count"),
-            ],
-            (),
-            [
-                switch(f"{name}/stuck_on"),
-                switch(f"{name}/stuck_off"),
-                Command(f"{name}/chatter", "Hz", "number", 0.0, FASTEST_CHATTER),
-                Command(f"{name}/delay", "s", "number", 0.0, LONGEST_DELAY),
+                switch(f"{name}/blocked", "status", "Something is in the beam, after debounce and delays."),
+                seconds(f"{name}/rose", "actual", "When the beam was last broken, between ticks; 0: never yet."),
+                seconds(f"{name}/fell", "actual", "When the beam was last freed, between ticks; 0: never yet."),
+                count(f"{name}/edges", "counter", "How often the beam was broken or freed."),
+                switch(f"{name}/stuck_on", "fault", "Sees a bottle always."),
+                switch(f"{name}/stuck_off", "fault", "Never sees a bottle; stuck_on wins."),
+                number(
+                    f"{name}/chatter", "fault", "Shows the opposite so often, at random.", "Hz", 0.0, FASTEST_CHATTER
+                ),
+                number(f"{name}/delay", "fault", "All that it sees comes so much later.", "s", 0.0, LONGEST_DELAY),
             ],
         )
         self._beams, self._index, self._debounce = beams, index, eye.debounce

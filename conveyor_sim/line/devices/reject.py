@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.reject import Reject
 
 
@@ -17,10 +17,17 @@ class RejectDevice(Device):
     """s, when the strokes that are still to hit began or begin."""
 
     def __init__(self, name: str, reject: Reject, setup: Setup) -> None:
-        names = ("rejected_bad", "rejected_good", "missed")
-        signals = [Signal(f"{name}/rejected", "1", "count", "rejected")]
-        signals += [Signal(f"{name}/{what}", "1", "count") for what in names]
-        super().__init__(name, signals, [switch(f"{name}/fire")], [switch(f"{name}/stop")])
+        super().__init__(
+            name,
+            [
+                count(f"{name}/rejected", "counter", "Bottles thrown out.", adds_to="rejected"),
+                count(f"{name}/rejected_bad", "counter", "Bad bottles thrown out."),
+                count(f"{name}/rejected_good", "counter", "Good bottles thrown out."),
+                count(f"{name}/missed", "counter", "Strokes that hit nothing."),
+                switch(f"{name}/fire", "command", "As it rises, a stroke that can hit one bottle."),
+                switch(f"{name}/stop", "fault", "Does not answer to fire."),
+            ],
+        )
         self._reject = reject
         self._region = Region(reject.region)
         self.fire = RisingEdge()

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.machine import MachineDevice
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.sink import Sink
 
 
@@ -18,10 +18,10 @@ class SinkDevice(MachineDevice):
 
     def __init__(self, name: str, sink: Sink, setup: Setup) -> None:
         signals = [
-            Signal(f"{name}/taken", "1", "count", "removed"),
-            Signal(f"{name}/taken_bad", "1", "count"),
-            Signal(f"{name}/starved", "1", "bool", "state"),
-            Signal(f"{name}/starved_time", "s", "number"),
+            count(f"{name}/taken", "counter", "Bottles taken.", adds_to="removed"),
+            count(f"{name}/taken_bad", "counter", "Bad bottles taken."),
+            switch(f"{name}/starved", "status", "It would take a bottle, and none is there.", adds_to="state"),
+            seconds(f"{name}/starved_time", "counter", "For how long in all it was starved."),
         ]
         super().__init__(name, sink.rate, sink.rate_limit, signals)
         self._region = Region(sink.region)

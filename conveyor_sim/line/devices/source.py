@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.entry import Quality
 from conveyor_sim.line.machine import MachineDevice
-from conveyor_sim.line.process_image import Signal
 from conveyor_sim.line.setup import MACHINES, Setup
+from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.source import Source
 
 
@@ -15,9 +15,9 @@ class SourceDevice(MachineDevice):
 
     def __init__(self, name: str, source: Source, setup: Setup) -> None:
         signals = [
-            Signal(f"{name}/produced", "1", "count", "fed"),
-            Signal(f"{name}/blocked", "1", "bool", "state"),
-            Signal(f"{name}/blocked_time", "s", "number"),
+            count(f"{name}/produced", "counter", "Bottles given.", adds_to="fed"),
+            switch(f"{name}/blocked", "status", "It would give a bottle, and there is no room.", adds_to="state"),
+            seconds(f"{name}/blocked_time", "counter", "For how long in all it was blocked."),
         ]
         super().__init__(name, source.rate, source.rate_limit, signals)
         self._position = source.position

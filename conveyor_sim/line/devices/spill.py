@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
-from conveyor_sim.line.process_image import Signal, switch
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.spill import Spill
 
 
@@ -13,7 +13,13 @@ class SpillDevice(Device):
     """One place of spills: each rise of its fault drops a bottle, as soon as there is room."""
 
     def __init__(self, name: str, spill: Spill, setup: Setup) -> None:
-        super().__init__(name, [Signal(f"{name}/dropped", "1", "count", "fed")], faults=[switch(f"{name}/drop")])
+        super().__init__(
+            name,
+            [
+                count(f"{name}/dropped", "counter", "Bottles dropped.", adds_to="fed"),
+                switch(f"{name}/drop", "fault", "As it rises, a bottle is dropped as soon as there is room."),
+            ],
+        )
         self._spill, self._entry = spill, setup.entry(spill.bottle, 0.0, 0.0)
         self.drop = RisingEdge()
         self.due = 0

@@ -1,30 +1,39 @@
 """Zones: how many bottles have their axis in a region, and whether it is full."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.process_image import Command, Signal
 from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.tag import count, number, switch
 from conveyor_sim.scene.parts.zone import Zone
 
 MOST_OFFSET = 1000.0
 """Bottles, that can be injected."""
+
+DENSEST = 1.0 / (2.0 * math.sqrt(3.0))
+"""Bottles of radius 1 on an area of 1, in a hexagonal pattern."""
 
 
 class ZoneDevice(Device):
     """One zone while it runs."""
 
     def __init__(self, name: str, zone: Zone, setup: Setup) -> None:
-        signals = [Signal(f"{name}/bottles", "1", "count"), Signal(f"{name}/density", "1/m^2", "number")]
-        if zone.full_at is not None:
-            signals.append(Signal(f"{name}/full", "1", "bool"))
-        super().__init__(name, signals, (), [Command(f"{name}/offset", "1", "count", -MOST_OFFSET, MOST_OFFSET)])
         self._region, self._full_at = Region(zone.region), zone.full_at
         x, y = self._region.corners.T
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+        densest = max(1.0 / self._area, DENSEST / float(setup.model.type_radius.min()) ** 2)
+        tags = [
+            count(f"{name}/bottles", "actual", "Bottles whose axis is in the region."),
+            number(f"{name}/density", "actual", "Bottles by the area of the region.", "1/m^2", 0.0, densest),
+            count(f"{name}/offset", "fault", "Added to the bottles that it counts.", -MOST_OFFSET, MOST_OFFSET),
+        ]
+        if zone.full_at is not None:
+            tags.append(switch(f"{name}/full", "status", f"Back-up switch: {zone.full_at} bottles or more are there."))
+        super().__init__(name, tags)
         self.offset = 0
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
