@@ -1,10 +1,11 @@
 """What every mapping of a scene file is built on: frozen, no unknown fields, its errors in plain words."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Discriminator, ModelWrapValidatorHandler, ValidationError, model_validator
 
+from conveyor_sim.scene.problems import dotted
 from conveyor_sim.scene.words import in_words, listed
 
 
@@ -20,6 +21,19 @@ class Part(BaseModel):
             return handler(data)
         except ValidationError as error:
             raise in_words(cls, error) from None
+
+
+P = TypeVar("P", bound=Part)
+
+
+def part_from(kind: type[P], data: object) -> P | str:
+    """A part from plain data that is not of a scene file, or the first thing that is wrong with it, in words."""
+    try:
+        return kind.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        path = dotted(tuple(first["loc"]))
+        return f"{path}: {first['msg']}" if path else first["msg"]
 
 
 def one_of(kinds: dict[str, str]) -> Discriminator:

@@ -1,0 +1,339 @@
+"""`Alarms`: all alarms of a line; what is said of them, what follows from it, and who was first."""
+
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from graphlib import CycleError
+from heapq import heappop, heappush
+
+import numpy as np
+
+from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, Alarm, AlarmState
+from conveyor_sim.line.alarms.declaration import Declared, ranks
+from conveyor_sim.observe.alarms import AlarmColumns
+from conveyor_sim.observe.events import Kind
+from conveyor_sim.scene.parts.alarm import CLASSES, PREFIX, AlarmFields
+from conveyor_sim.support.printable import printable
+
+MOST_ALARMS = 1000
+"""That controllers have at once, beside those of the line and the scene: declared, or raised without a declaration."""
+
+Note = Callable[[int, Kind, str, float, str], None]
+"""Takes an event: tick, kind, name, value (1 while the alarm stands), text."""
+
+
+class Alarms:
+    """Whoever knows a condition says it; deadlines are kept, so an alarm to which nothing happens costs nothing."""
+
+    def __init__(self, tick: float, note: Note, signals: Collection[str]) -> None:
+        """tick: its length, s. signals: names of those that can be measured."""
+        self.tick, self._note, self._signals = tick, note, signals
+        self._all: dict[str, Alarm] = {}
+        self._groups: dict[str, list[Alarm]] = {}
+        self._follow: dict[str, list[Alarm]] = {}  # of each id, whom it suppresses
+        self._next: float = np.inf  # no deadline is before this tick
+        self._counts: tuple[float, ...] | None = None
+        self._standing: tuple[float, ...] | None = None
+        self.numbered = 0
+        """Alarms so far, those that were forgotten too."""
+        self.first: dict[str, str] = {}
+        """Of each group in which not all is normal, the id of the alarm that came first; in the order of coming."""
+        self.measured: tuple[Alarm, ...] = ()
+        """Those whose conditions the line is to find out."""
+        self.changed = True
+        """Whether anything to be seen of them has changed since the tick before."""
+
+    def __getitem__(self, id: str) -> Alarm:
+        """Raises KeyError."""
+        return self._all[id]
+
+    def __contains__(self, id: object) -> bool:
+        return id in self._all
+
+    def __iter__(self) -> Iterator[Alarm]:
+        """In the order of their numbers."""
+        return iter(self._all.values())
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    # Declarations
+
+    def declaration_problem(self, declared: Sequence[Declared]) -> str:
+        """Why alarms can't be declared, "" if they can."""
+        new = dict(declared)
+        for id, fields in new.items():
+            present = self._all.get(id)
+            if present is not None and present.own:
+                return f"alarm {id}: is declared by the {present.declared_by}, expected another id"
+            if fields.tag is not None and fields.tag not in self._signals:
+                close = get_close_matches(fields.tag, self._signals, n=1)
+                hint = f", such as {close[0]}" if close else ""
+                return f"alarm {id}: tag: {printable(fields.tag)} given, expected a signal of the line{hint}"
+            for cause in fields.suppressed_by:
+                if cause not in new and cause not in self._all:
+                    close = get_close_matches(cause, [*new, *self._all], n=1)
+                    hint = f", such as {close[0]}" if close else ""
+                    return (
+                        f"alarm {id}: suppressed_by: {cause} given, expected an alarm that is declared before or "
+                        f"together with it{hint}"
+                    )
+        try:
+            ranks({**{alarm.id: alarm.fields.suppressed_by for alarm in self}, **_causes(new)})
+        except CycleError as error:
+            text = " by ".join(error.args[1][::-1])
+            return f"suppressed_by: {printable(text)} given, expected no alarm that suppresses itself in a circle"
+        kept = self._kept() | {id for causes in _causes(new).values() for id in causes if not self._own(id)}
+        if len(kept | new.keys()) > MOST_ALARMS:
+            return f"{len(new)} alarms declared beside {len(kept - new.keys())}, expected {MOST_ALARMS} at most"
+        return ""
+
+    def declare(self, tick: int, declared: Sequence[Declared], by: str, own: bool = False) -> None:
+        """Know alarms as declared; `declaration_problem` has nothing against it. by: who declares them, never "".
+        own: whether they are those of the line or the scene, which controllers can't say or declare.
+        """
+        changed, named = [], {id for one in declared for id in (one.id, *one.fields.suppressed_by)}
+        if not own:
+            self._make_room(sum(id not in self._all for id, _ in declared), named)
+        for id, fields in declared:
+            alarm = self._all.get(id)
+            if alarm is None:
+                changed.append(self._add(id, fields, by, own))
+            elif (alarm.fields, alarm.declared_by) != (fields, by):
+                alarm.declare(fields, by, self.tick)
+                changed.append(alarm)
+        if changed:
+            self._arrange()
+            self.settle(tick, changed)
+
+    def restored(self, alarms: Iterable[Alarm], numbered: int, first: dict[str, str]) -> None:
+        """Have these in place of all that there were."""
+        self._all = {alarm.id: alarm for alarm in alarms}
+        self.numbered, self.first = numbered, first
+        self._arrange()
+        for alarm in sorted(self, key=lambda alarm: alarm.rank):
+            alarm.suppressed = self._caused(alarm)
+            alarm.recall()
+        self._next, self._counts, self._standing, self.changed = 0, None, None, True
+
+    # Conditions
+
+    def value_problem(self, id: str) -> str:
+        """Why a controller can't say an alarm, "" if it can."""
+        alarm = self._all.get(id)
+        if alarm is not None and alarm.own:
+            return f"{PREFIX}{id}: is an alarm of the {alarm.declared_by}, expected one of a controller"
+        if alarm is not None and alarm.fields.measured:
+            return f"{PREFIX}{id}: is measured by the line, expected an alarm without `high` and `low`"
+        return ""
+
+    def room_problem(self, said: Mapping[str, bool]) -> str:
+        """Why there are too many alarms to be said at once, "" if there are not."""
+        if all(id in self._all for id in said):
+            return ""
+        kept = self._kept()
+        after = (kept | {id for id, on in said.items() if on}) - {
+            id for id in kept if not said.get(id, True) and self._spare(self._all[id], said=False)
+        }
+        if len(after) <= MOST_ALARMS:
+            return ""
+        raised = sum(said.values())
+        return f"{raised} alarms given beside {len(kept)} that stand or are declared, expected {MOST_ALARMS} at most"
+
+    def say(self, tick: int, said: Mapping[str, bool]) -> None:
+        """Whether the conditions of some alarms hold as of a tick; all of them at once.
+
+        One that nobody has declared is as by default; if there is no room for it, it is left out.
+        """
+        turned = []
+        for id, on in said.items():
+            alarm = self._all.get(id)
+            if alarm is None:
+                if not self._make_room(1):
+                    continue
+                alarm = self._add(id, UNDECLARED, "", False)
+                turned.append(alarm)
+            if alarm.condition is not on:
+                alarm.condition = on
+                if self._turn(alarm, tick):
+                    turned.append(alarm)
+        if turned:
+            self.settle(tick, turned)
+
+    def end(self, tick: int) -> None:
+        """What falls due as a tick ends."""
+        if tick < self._next:
+            return
+        due, self._next = [], np.inf
+        for alarm in self:
+            if NEVER < alarm.due <= tick:
+                alarm.active, alarm.due = alarm.condition, NEVER
+                due.append(alarm)
+            if NEVER < alarm.shelved_until <= tick:
+                alarm.shelved, alarm.shelved_until = "", NEVER
+                self.note(tick, "alarm_unshelved", alarm, "its time is over")
+                due.append(alarm)
+            self.watch(alarm)
+        if due:
+            self.settle(tick, due)
+
+    def watch(self, alarm: Alarm) -> None:
+        """Have its deadlines kept."""
+        for deadline in (alarm.due, alarm.shelved_until):
+            if NEVER < deadline < self._next:
+                self._next = deadline
+
+    # What follows
+
+    def settle(self, tick: int, touched: Iterable[Alarm]) -> None:
+        """Bring alarms that were changed, and those that follow from them, to their states: causes first, then by
+        priority.
+        """
+        waiting: list[tuple[int, int, int, str]] = []
+        queued: set[str] = set()
+
+        def queue(alarm: Alarm) -> None:
+            if alarm.id not in queued:
+                queued.add(alarm.id)
+                heappush(waiting, (alarm.rank, -alarm.fields.severity, alarm.number, alarm.id))
+
+        for alarm in touched:
+            queue(alarm)
+        while waiting:
+            alarm = self._all[heappop(waiting)[-1]]
+            alarm.suppressed = self._caused(alarm)
+            for kind in alarm.settle():
+                self.note(tick, kind, alarm, self._why(kind, alarm))
+            if alarm.fields.group and alarm.main is AlarmState.UNACKNOWLEDGED:
+                self.first.setdefault(alarm.fields.group, alarm.id)
+            if alarm.state is not alarm.shown:
+                alarm.shown, alarm.since = alarm.state, tick
+            if alarm.suppresses is not alarm.suppressing:
+                alarm.suppressing = alarm.suppresses
+                for follower in self._follow.get(alarm.id, ()):
+                    queue(follower)
+        for group in {self._all[id].fields.group for id in queued} & self.first.keys():
+            if all(alarm.main is AlarmState.NORMAL for alarm in self._groups[group]):
+                del self.first[group]
+        self._counts = self._standing = None
+        self.changed = True
+
+    def note(self, tick: int, kind: Kind, alarm: Alarm, text: str) -> None:
+        """Something has happened to an alarm."""
+        self._note(tick, kind, PREFIX + alarm.id, float(alarm.stands), text)
+
+    # What is shown
+
+    def counts(self) -> tuple[float, ...]:
+        """How many stand of each class, how many wait to be acknowledged, and the number of the first-out alarm that
+        came first; 0: there is none.
+        """
+        if self._counts is None:
+            standing = [alarm.fields.alarm_class for alarm in self if alarm.stands]
+            waiting = sum(alarm.main in ACKNOWLEDGED for alarm in self)
+            first = next((self._all[id].number for id in self.first.values()), 0)
+            self._counts = (*(float(standing.count(kind)) for kind in CLASSES), float(waiting), float(first))
+        return self._counts
+
+    def standing(self) -> tuple[float, ...]:
+        """1 for each alarm of line and scene that stands, 0 for the others, in their order."""
+        if self._standing is None:
+            self._standing = tuple(float(alarm.stands) for alarm in self if alarm.own)
+        return self._standing
+
+    def columns(self) -> AlarmColumns:
+        """All of them."""
+        alarms = list(self)
+        first = set(self.first.values())
+        return AlarmColumns(
+            number=np.array([alarm.number for alarm in alarms], dtype=np.uint64),
+            id=[alarm.id for alarm in alarms],
+            text=[alarm.text for alarm in alarms],
+            alarm_class=[alarm.fields.alarm_class for alarm in alarms],
+            priority=np.array([alarm.fields.severity for alarm in alarms], dtype=np.uint16),
+            tag=[alarm.fields.tag or "" for alarm in alarms],
+            group=[alarm.fields.group for alarm in alarms],
+            suppressed_by=[json.dumps(alarm.fields.suppressed_by, ensure_ascii=False) for alarm in alarms],
+            latching=np.array([alarm.fields.latching for alarm in alarms], dtype=np.bool_),
+            declared_by=[alarm.declared_by for alarm in alarms],
+            state=np.array([alarm.state for alarm in alarms], dtype=np.uint8),
+            active=np.array([alarm.active for alarm in alarms], dtype=np.bool_),
+            first_out=np.array([alarm.id in first for alarm in alarms], dtype=np.bool_),
+            shelved_until=np.array([alarm.shelved_until for alarm in alarms], dtype=np.int64),
+            since=np.array([alarm.since for alarm in alarms], dtype=np.uint64),
+            changed_by=[alarm.changed_by for alarm in alarms],
+        )
+
+    def _add(self, id: str, fields: AlarmFields, by: str, own: bool) -> Alarm:
+        self.numbered += 1
+        self._all[id] = Alarm(id, self.numbered, fields, by, own, self.tick)
+        return self._all[id]
+
+    def _arrange(self) -> None:
+        """Who is in which group, and who follows from whom, has changed."""
+        found = ranks({alarm.id: alarm.fields.suppressed_by for alarm in self})
+        self._groups, self._follow = {}, {}
+        for alarm in self:
+            alarm.rank = found[alarm.id]
+            if alarm.fields.group:
+                self._groups.setdefault(alarm.fields.group, []).append(alarm)
+            for cause in alarm.fields.suppressed_by:
+                self._follow.setdefault(cause, []).append(alarm)
+        self.first = {group: id for group, id in self.first.items() if self._all[id].fields.group == group}
+        self.measured = tuple(alarm for alarm in self if alarm.fields.measured)
+
+    def _turn(self, alarm: Alarm, tick: int) -> bool:
+        """Its condition has changed; whether that counts at once."""
+        delay = alarm.delays[alarm.condition]
+        if alarm.condition is alarm.active:
+            alarm.due = NEVER
+        elif delay:
+            alarm.due = tick + delay
+            self.watch(alarm)
+        else:
+            alarm.active, alarm.due = alarm.condition, NEVER
+            return True
+        return False
+
+    def _caused(self, alarm: Alarm) -> bool:
+        return any(self._all[cause].suppressing for cause in alarm.fields.suppressed_by)
+
+    def _why(self, kind: str, alarm: Alarm) -> str:
+        if kind == "alarm_raised":
+            return alarm.fields.text
+        if kind == "alarm_suppressed":
+            causes = [cause for cause in alarm.fields.suppressed_by if self._all[cause].suppressing]
+            return printable(f"follows from {', '.join(causes)}")
+        return "its condition has ended" if kind == "alarm_unshelved" else ""
+
+    def _spare(self, alarm: Alarm, said: bool | None = None) -> bool:
+        """Whether it can be forgotten: nobody declared it, it does not stand, and nobody has hidden it.
+        said: its condition, if another one than now is meant.
+        """
+        condition = alarm.condition if said is None else said
+        return not (alarm.declared_by or condition or alarm.shelved or alarm.out_of_service or alarm.id in self._follow)
+
+    def _own(self, id: str) -> bool:
+        return id in self._all and self._all[id].own
+
+    def _kept(self) -> set[str]:
+        """Ids of the controllers' alarms that can't be forgotten."""
+        return {alarm.id for alarm in self if not alarm.own and not self._spare(alarm)}
+
+    def _make_room(self, wanted: int, keep: Collection[str] = ()) -> bool:
+        """Forget as many alarms as it takes, the oldest first; whether there is room then."""
+        full = sum(not alarm.own for alarm in self) + wanted - MOST_ALARMS
+        if full > 0:
+            spare = [alarm.id for alarm in self if self._spare(alarm) and alarm.id not in keep][:full]
+            for id in spare:
+                del self._all[id]
+            full -= len(spare)
+        return full <= 0
+
+
+def _causes(declared: Mapping[str, AlarmFields]) -> dict[str, tuple[str, ...]]:
+    return {id: fields.suppressed_by for id, fields in declared.items()}
+
+
+UNDECLARED = AlarmFields()
+"""Of an alarm that nobody has declared."""

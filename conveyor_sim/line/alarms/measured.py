@@ -1,0 +1,60 @@
+"""Conditions of alarms on measured values: those of the scene, and of controllers that gave a limit."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from conveyor_sim.line.alarms.alarm import Alarm
+from conveyor_sim.line.alarms.alarms import Alarms
+from conveyor_sim.line.device import Device, ScanContext
+
+
+class _Watched(NamedTuple):
+    alarm: Alarm
+    column: int
+    """Of its signal among those of the device."""
+
+
+class Measured:
+    """Looks at the devices whose signals have alarms, each once a tick, and at no others."""
+
+    def __init__(self, alarms: Alarms, devices: Sequence[Device]) -> None:
+        self._alarms, self._devices = alarms, devices
+        self._of: tuple[Alarm, ...] = ()
+        self._watched: list[tuple[Device, list[_Watched]]] = []
+
+    def look(self, tick: int, now: ScanContext) -> None:
+        """A tick has ended: say which conditions hold."""
+        if self._of is not self._alarms.measured:
+            self._find()
+        if not self._watched:
+            return
+        said = {}
+        for device, watched in self._watched:
+            values = device.values(now)
+            for alarm, column in watched:
+                holds = beyond(alarm, float(values[column]))
+                if holds is not alarm.condition:
+                    said[alarm.id] = holds
+        if said:
+            self._alarms.say(tick, said)
+
+    def _find(self) -> None:
+        self._of = self._alarms.measured
+        wanted = {alarm.fields.tag for alarm in self._of}
+        self._watched = []
+        for device in self._devices:
+            columns = {tag.name: column for column, tag in enumerate(device.signals) if tag.name in wanted}
+            if columns:
+                here = [_Watched(alarm, columns[tag]) for alarm in self._of if (tag := alarm.fields.tag) in columns]
+                self._watched.append((device, here))
+
+
+def beyond(alarm: Alarm, value: float) -> bool:
+    """Whether its condition holds at a value; where that is no number, it stays as it is."""
+    fields = alarm.fields
+    band = fields.deadband if alarm.condition else 0.0
+    if fields.high is not None and value > fields.high - band:
+        return True
+    if fields.low is not None and value < fields.low + band:
+        return True
+    return alarm.condition if value != value else False

@@ -1,0 +1,135 @@
+"""What operators do with alarms: acknowledge, reset, shelve, unshelve, take out of service and back."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, RESET, Alarm, ticks
+from conveyor_sim.line.alarms.alarms import Alarms
+from conveyor_sim.observe.events import Kind
+from conveyor_sim.scene.parts.alarm import LONGEST_DELAY, PREFIX
+from conveyor_sim.support.printable import printable
+
+LISTED = 20
+"""Ids that a refusal lists, of those there are."""
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One of them."""
+
+    kind: Kind
+    """Of the event."""
+    can: Callable[[Alarm], bool]
+    expected: str
+    """What it can be done to."""
+    do: Callable[[Alarm], None]
+    all_of_them: bool = False
+    """Whether no name at all means all alarms that it can be done to."""
+
+
+def _acknowledge(alarm: Alarm) -> None:
+    alarm.main = ACKNOWLEDGED[alarm.main]
+
+
+def _reset(alarm: Alarm) -> None:
+    alarm.main = RESET[alarm.main]
+
+
+def _unshelve(alarm: Alarm) -> None:
+    alarm.shelved, alarm.shelved_until = "", NEVER
+
+
+def _remove(alarm: Alarm) -> None:
+    alarm.out_of_service = True
+
+
+def _return(alarm: Alarm) -> None:
+    alarm.out_of_service = False
+
+
+def _shelve(alarm: Alarm) -> None:
+    alarm.shelved, alarm.shelved_until = "one_shot", NEVER
+
+
+OPERATIONS = {
+    "acknowledge": Operation(
+        "alarm_acknowledged",
+        lambda alarm: alarm.main in ACKNOWLEDGED,
+        "one that waits to be acknowledged",
+        _acknowledge,
+        all_of_them=True,
+    ),
+    "reset": Operation(
+        "alarm_reset",
+        lambda alarm: alarm.main in RESET,
+        "one that has latched, whose condition is gone and that is acknowledged",
+        _reset,
+        all_of_them=True,
+    ),
+    "shelve": Operation("alarm_shelved", lambda alarm: not alarm.out_of_service, "one in service", _shelve),
+    "unshelve": Operation(
+        "alarm_unshelved", lambda alarm: bool(alarm.shelved), "one that is shelved", _unshelve, all_of_them=True
+    ),
+    "remove_from_service": Operation(
+        "alarm_out_of_service", lambda alarm: not alarm.out_of_service, "one in service", _remove
+    ),
+    "return_to_service": Operation(
+        "alarm_in_service", lambda alarm: alarm.out_of_service, "one that is out of service", _return
+    ),
+}
+"""By name."""
+
+
+def problem(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[float]) -> str:
+    """Why it can't be done, "" if it can. ids: with or without `alarms/`; values: of `shelve`, s for each, 0 or none at
+    all: until the condition ends next.
+    """
+    operation, seen = OPERATIONS[name], set[str]()
+    if values and (name != "shelve" or len(values) != len(ids)):
+        expected = f"as many as names ({len(ids)}), or none" if name == "shelve" else "none"
+        return f"{len(values)} values given, expected {expected}"
+    for value in values:
+        if not 0.0 <= value <= LONGEST_DELAY:
+            return f"{value:g} given, expected 0 to {LONGEST_DELAY} s, for how long it is shelved"
+    if not ids and not operation.all_of_them:
+        return "no name given, expected the id of an alarm"
+    for id in _bare(ids):
+        if id not in alarms:
+            return f"{printable(id)}: no such alarm, expected {_listed(alarms)}"
+        if id in seen:
+            return f"{id}: given twice"
+        seen.add(id)
+        if not operation.can(alarms[id]):
+            return f"{id}: is {_words(alarms[id])}, expected {operation.expected}"
+    return ""
+
+
+def perform(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[float], by: str, tick: int) -> None:
+    """Do what `problem` has nothing against. by: who does it."""
+    operation = OPERATIONS[name]
+    chosen = [alarms[id] for id in _bare(ids)] if ids else [alarm for alarm in alarms if operation.can(alarm)]
+    for index, alarm in enumerate(chosen):
+        operation.do(alarm)
+        if values and values[index]:
+            alarm.shelved, alarm.shelved_until = "timed", tick + max(1, ticks(values[index], alarms.tick))
+            alarms.watch(alarm)
+        alarm.changed_by = by
+        alarms.note(tick, operation.kind, alarm, f"by {by}")
+    if chosen:
+        alarms.settle(tick, chosen)
+
+
+def _bare(ids: Sequence[str]) -> list[str]:
+    return [id.removeprefix(PREFIX) for id in ids]
+
+
+def _words(alarm: Alarm) -> str:
+    return alarm.state.name.lower().replace("_", " ")
+
+
+def _listed(alarms: Alarms) -> str:
+    if not len(alarms):
+        return "none: there are none"
+    ids = [alarm.id for alarm in alarms]
+    others = f" and {len(ids) - LISTED} others" if len(ids) > LISTED else ""
+    return f"one of {', '.join(ids[:LISTED])}{others}"

@@ -1,0 +1,115 @@
+"""Alarms: what a scene file, a controller or the line declares of one (ISA-18.2)."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, get_args
+
+from annotated_types import Ge, Le, Len
+from pydantic import AfterValidator, Strict, StringConstraints
+
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.types import Flag, Holds, NotNegative, Number, Says, Text, quantity
+from conveyor_sim.scene.words import shown
+from conveyor_sim.support.printable import printable
+
+AlarmClass = Literal["error", "warning", "message"]
+CLASSES: tuple[AlarmClass, ...] = get_args(AlarmClass)
+
+PRIORITIES = {"error": 800, "warning": 500, "message": 200}
+"""Of the classes, where an alarm has none of its own: in the ranges of severity that OPC 40083 gives."""
+
+LONGEST_DELAY = 86_400
+"""s, a day: of delays and of shelving."""
+
+MOST_CAUSES = 100
+"""Alarms that one is suppressed by."""
+
+LONGEST_ID = 100
+
+PREFIX = "alarms/"
+"""What the names of alarms begin with in the process image and in events; their ids do not."""
+
+
+def id_problem(id: str) -> str:
+    """Why a text can't be the id of an alarm, "" if it can."""
+    good = id.isprintable() and id == id.strip() and 0 < len(id) <= LONGEST_ID and not id.startswith(PREFIX)
+    return "" if good else f"{shown(id)} given, expected {_ID_WORDS}"
+
+
+def _id(text: str) -> str:
+    if id_problem(text):
+        raise ValueError(_ID_WORDS)
+    return text
+
+
+_ID_WORDS = f"an id of 1 to {LONGEST_ID} printable characters, without `{PREFIX}` before it"
+AlarmId = Annotated[str, AfterValidator(_id), Says(_ID_WORDS)]
+_Priority = Annotated[int, Strict(), Ge(1), Le(1000), Says("a whole number from 1 to 1000")]
+_Delay = Annotated[float, Strict(), Ge(0), Le(LONGEST_DELAY), Says(f"a number from 0 to {LONGEST_DELAY}")]
+_Short = Annotated[Text, AfterValidator(printable)]
+_Group = Annotated[
+    str,
+    StringConstraints(max_length=100),
+    AfterValidator(printable),
+    Says("a name of at most 100 characters"),
+]
+
+
+class AlarmFields(Part):
+    """What can be declared of an alarm, whoever declares it."""
+
+    text: _Short = quantity("What it says, cut after 200 characters. Left out: its id.", default="")
+    alarm_class: AlarmClass = quantity("How bad it is.", default="warning")
+    priority: _Priority | None = quantity(
+        "From 1, lowest, to 1000: OPC UA's severity. Left out: 800 of an error, 500 of a warning, 200 of a message.",
+        "1",
+        default=None,
+    )
+    tag: Text | None = quantity("Signal that it is about.", default=None)
+    high: Number | None = quantity("It comes when the signal is above this.", "that of the signal", default=None)
+    low: Number | None = quantity("It comes when the signal is below this.", "that of the signal", default=None)
+    deadband: NotNegative = quantity(
+        "It goes when the signal is back by so much: not above `high` less this, nor below `low` plus this.",
+        "that of the signal",
+        default=0.0,
+    )
+    on_delay: _Delay = quantity("It comes after its condition has held for so long.", "s", default=0.0)
+    off_delay: _Delay = quantity("It goes after its condition has been gone for so long.", "s", default=0.0)
+    latching: Flag = quantity("Whether it stands until it is acknowledged and reset.", default=False)
+    suppressed_by: Annotated[
+        tuple[AlarmId, ...], Len(0, MOST_CAUSES), Holds(f"a list of at most {MOST_CAUSES} ids of alarms")
+    ] = quantity("Ids of alarms that it follows from: while one of them stands, it is suppressed.", default=())
+    group: _Group = quantity("Group within which the first to come is marked (first-out). Left out: none.", default="")
+
+    @property
+    def measured(self) -> bool:
+        """Whether the line finds out by itself whether its condition holds."""
+        return self.high is not None or self.low is not None
+
+    @property
+    def severity(self) -> int:
+        """Its priority, given or by its class."""
+        return PRIORITIES[self.alarm_class] if self.priority is None else self.priority
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Fields that do not fit together, each with the rest of the sentence."""
+        if not self.measured:
+            if self.deadband:
+                yield "deadband", f"{shown(self.deadband)} given, expected `high` or `low` beside it"
+            return
+        if self.tag is None:
+            yield "tag", "missing, expected the name of a signal, as `high` or `low` is given"
+        if self.high is not None and self.low is not None and self.low + self.deadband > self.high - self.deadband:
+            text = "less than `high`, by twice the deadband at least"
+            yield "low", f"{shown(self.low)} given, expected {text}: {shown(self.high - 2.0 * self.deadband)} at most"
+
+
+class Alarm(AlarmFields):
+    """An alarm of the scene: on a value that the line measures."""
+
+    tag: Text = quantity("Signal that it watches.")
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """The same, and no limit at all."""
+        if not self.measured:
+            yield "high", "missing, expected a limit, `high` or `low`"
+        yield from super().wrong()
