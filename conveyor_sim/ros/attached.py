@@ -33,6 +33,7 @@ from conveyor_sim.line.commands import CommandOutcome
 from conveyor_sim.ros.child import Process
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
+from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
@@ -128,9 +129,10 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         check_type(node, lines.topic_name, LINE, default_distro())
         lines.publish(_line(self._turns.simulation, self._turns.run_id))
         spinner = Spinner(context, died=self._died)
-        LockstepService(node, spinner.executor, self._turns, FRAME)
+        lockstep = LockstepService(node, self._turns, FRAME, died=self._died)
         spinner.start(node)
         stack.callback(spinner.close)
+        stack.callback(Intake(context, lockstep, died=self._died).close)
         return node.resolve_service_name("lockstep")
 
     def _require_going_on(self, inputs: Inputs, late: bool) -> None:

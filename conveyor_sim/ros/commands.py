@@ -16,6 +16,7 @@ from std_msgs.msg import Float64
 from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.gaps import Gaps
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE
 from conveyor_sim.ros.publishers import ros_qos
@@ -24,21 +25,27 @@ from conveyor_sim.ros.stepper import Stepper
 UNREADABLE = "not readable as {type}, expected its serialized form"
 
 
-def subscribe_commands(node: Node, stepper: Stepper) -> None:
-    """Pass every command on to the simulation, which judges it at the start of the next tick."""
+def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
+    """What passes commands on to the simulation, which judges them at the start of the next tick."""
     qos = TOPICS["commands"].qos
-    _Topic(node, stepper, "commands", Commands, qos, lambda message: (tuple(message.names), message.values))
-    for belt in stepper.session.simulation.model.belts:
-        name = speed_command(belt)
-        _Topic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
+    return [
+        CommandTopic(node, stepper, "commands", Commands, qos, lambda message: (tuple(message.names), message.values)),
+        *(
+            CommandTopic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
+            for name in map(speed_command, stepper.session.simulation.model.belts)
+        ),
+    ]
 
 
 def _speed(name: str, message: Any) -> tuple[tuple[str, ...], tuple[float, ...]]:
     return (name,), (message.data,)
 
 
-class _Topic:
-    """One subscription. Its messages are taken as bytes, and looked at before Python objects are made of them."""
+class CommandTopic:
+    """One subscription, for the thread of intake.py.
+
+    Messages are taken as bytes, and looked at before Python objects are made of them.
+    """
 
     def __init__(
         self, node: Node, stepper: Stepper, name: str, kind: Any, qos: Qos, read: Callable[[Any], tuple[Any, Any]]
@@ -48,19 +55,28 @@ class _Topic:
         self._kind = kind
         self._read = read
         self._gaps = Gaps()
-        with_info: Any = self._on_bytes  # rclpy looks at the arguments; its hints know of one only
-        self._subscription: Subscription = node.create_subscription(
+        self._most = qos.depth
+        self.subscription: Subscription = node.create_subscription(
             kind,
             name,
-            with_info,
+            lambda _: None,
             ros_qos(qos),
+            callback_group=Aside(),
             raw=True,
             event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
         )
 
-    def _on_bytes(self, data: bytes, info: dict[str, Any]) -> None:
+    def take_all(self) -> None:
+        """Hand over what has come; at most what DDS holds, for others wait too."""
+        for _ in range(self._most):
+            taken = take_message(self.subscription)
+            if taken is None:
+                return
+            self._hand_over(*taken)
+
+    def _hand_over(self, data: bytes, info: dict[str, Any]) -> None:
         inbox = self._stepper.inbox
-        missing = self._gaps.before(info["publication_sequence_number"], self._subscription.get_publisher_count)
+        missing = self._gaps.before(info["publication_sequence_number"], self.subscription.get_publisher_count)
         if missing:
             inbox.miss(self._name, missing)
         inbox.receive()
@@ -77,4 +93,4 @@ class _Topic:
 
     def _on_matched(self, status: Any) -> None:
         if status.current_count == 0:
-            self._gaps.forget()
+            self._gaps = Gaps()  # all publishers have left: numbers begin anew

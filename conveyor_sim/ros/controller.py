@@ -16,11 +16,11 @@ from conveyor_msgs.msg import Commands, Line, Signals
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
-from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
+from conveyor_sim.ros.lockstep_client import LockstepClient
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.ros.stop_request import StopRequest
@@ -28,6 +28,7 @@ from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LOOK = 0.01  # s of wall time between two looks for the simulation
+STOP_LOOK = 0.1  # s of wall time between two looks, while it waits for an answer, at whether it is to stop
 PATIENCE = 1.0  # s of wall time without an answer after which the same request is sent again
 
 Make = Callable[[Any], Controller]
@@ -86,19 +87,20 @@ class ControllerRun:
         self._has_line = threading.Event()
         self._alarms = Alarms(node)
         node.create_subscription(Line, "line", self._on_line, ros_qos(TOPICS["line"].qos))
-        self._lockstep = node.create_client(Lockstep, "lockstep", qos_profile=ros_qos(ANSWERS))
+        self._lockstep = LockstepClient(node)
         self._spinner = Spinner(died=self._died)
         self._spinner.start(node)
 
     def close(self) -> None:
         """Leave the domain."""
+        self._lockstep.close()
         self._spinner.close()
         self._node.destroy_node()
 
     def run_lockstep(self) -> None:
         """Scan to the end of the run. Raises ConveyorError if a scan is refused; Stopped if asked to."""
         log = self._node.get_logger()
-        self._find(self._lockstep.service_is_ready)
+        self._find(self._lockstep.is_ready)
         line, tick, last, values = None, 0, 0, list[float]()
         while line is None or tick < last:
             if self._line is not line:  # at the start, and after a reset
@@ -166,14 +168,15 @@ class ControllerRun:
             release=release,
             sim_run_id=line.run_id,
         )
+        numbers = set()
         while True:
-            self._require_going_on()
-            try:
-                response = self._lockstep.call(request, timeout_sec=PATIENCE)
-            except TimeoutError:  # as newer distributions tell it; Jazzy returns None
-                response = None
-            if response is not None:
-                return response
+            numbers.add(self._lockstep.send(request))
+            until = time.monotonic() + PATIENCE
+            while time.monotonic() < until:
+                self._require_going_on()
+                response = self._lockstep.response(numbers, STOP_LOOK)
+                if response is not None:
+                    return response
             self._node.get_logger().warning(f"no answer to the request for tick {target}; sent again")
 
     def _require_going_on(self) -> None:

@@ -11,14 +11,10 @@ from collections.abc import Callable
 
 
 class Gaps:
-    """The numbers of one topic's messages."""
+    """The numbers of one topic's messages, until all its publishers have left."""
 
     def __init__(self) -> None:
         self._last: list[int] = []  # of each publisher heard of; the one heard of last is at the end
-
-    def forget(self) -> None:
-        """All publishers have left; numbers begin anew."""
-        self._last.clear()
 
     def before(self, number: int | None, publishers: Callable[[], int]) -> int:
         """How many messages are missing before one with this number (None where the middleware has none).

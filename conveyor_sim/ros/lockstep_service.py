@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Protocol, TypeVar
@@ -12,16 +13,15 @@ import numpy.typing as npt
 from builtin_interfaces.msg import Time
 from conveyor_msgs.msg import CommandOutcome as OutcomeMessage
 from conveyor_msgs.srv import Lockstep
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import Executor
 from rclpy.node import Node
+from rclpy.service import Service
 
 from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.ros.direct import Aside, take_request
 from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.publishers import ros_qos
-from conveyor_sim.ros.services import settled
 from conveyor_sim.simulation import Simulation
 
 T = TypeVar("T")
@@ -52,17 +52,25 @@ class Stepped(Protocol):
 
 
 class LockstepService:
-    """Serves one controller's scans."""
+    """Serves one controller's scans: requests are taken by one thread (intake.py), answered by the one that steps."""
 
-    def __init__(self, node: Node, executor: Executor, stepper: Stepped, frame_id: str) -> None:
-        self._executor = executor
+    def __init__(self, node: Node, stepper: Stepped, frame_id: str, *, died: Callable[[Exception], None]) -> None:
+        """`died` is called, from the stepping thread, if an answer can't be sent."""
         self._stepper = stepper
         self._frame_id = frame_id
+        self._died = died
         self._waiting = 0
-        group = ReentrantCallbackGroup()
-        node.create_service(Lockstep, "lockstep", self._serve, qos_profile=ros_qos(ANSWERS), callback_group=group)
+        self._lock = threading.Lock()
+        self.service: Service = node.create_service(
+            Lockstep, "lockstep", _never, qos_profile=ros_qos(ANSWERS), callback_group=Aside()
+        )
 
-    async def _serve(self, request: Any, response: Any) -> Any:
+    def take(self) -> tuple[Any, Any] | None:
+        """The next request and the header of its answer; None if there is none."""
+        return take_request(self.service)
+
+    def serve(self, request: Any, header: Any) -> None:
+        """Have the stepping thread carry out a request, and answer it when that is done."""
         asked = LockstepRequest(
             request.run_id,
             request.target_tick,
@@ -71,43 +79,62 @@ class LockstepService:
             request.release,
             request.sim_run_id,
         )
-        if self._waiting >= MOST_WAITING:
-            response.reason = f"{MOST_WAITING} requests wait for their answers already"
-            return self._now(response)
-        self._waiting += 1
-        try:
-            return await self._answer(asked, response)
-        finally:
-            self._waiting -= 1
+        with self._lock:
+            full = self._waiting >= MOST_WAITING
+            self._waiting += not full
+        if full:
+            self._send(self._now(f"{MOST_WAITING} requests wait for their answers already"), header)
+            return
 
-    async def _answer(self, asked: LockstepRequest, response: Any) -> Any:
-
-        def advance() -> Future[LockstepAnswer]:
+        def advance() -> None:
             try:
-                return self._stepper.advance_lockstep(asked)
+                self._stepper.advance_lockstep(asked).add_done_callback(answer)
             except Refused as error:  # answered with what is now, which only the stepping thread may look at
-                response.reason = str(error)
-                present: Future[LockstepAnswer] = Future()
-                present.set_result(self._stepper.present())
-                return present
+                self._answer(self._filled(self._stepper.present(), str(error)), header)
 
+        def answer(advanced: Future[LockstepAnswer]) -> None:
+            error = advanced.exception()
+            if error is None:
+                self._answer(self._filled(advanced.result()), header)
+            else:
+                given_up(error)
+
+        def given_up(error: BaseException) -> None:
+            if isinstance(error, ConveyorError):
+                self._answer(self._now(str(error)), header)
+            else:
+                self._died(error if isinstance(error, Exception) else RuntimeError(str(error)))
+
+        def called(call: Future[None]) -> None:
+            if error := call.exception():
+                given_up(error)
+
+        self._stepper.call(advance).add_done_callback(called)
+
+    def _answer(self, response: Any, header: Any) -> None:
+        with self._lock:
+            self._waiting -= 1
+        self._send(response, header)
+
+    def _send(self, response: Any, header: Any) -> None:
         try:
-            coming = await settled(self._executor, self._stepper.call(advance))
-            answer = await settled(self._executor, coming)
-        except ConveyorError as error:
-            response.reason = str(error)
-            return self._now(response)
-        response.accepted = not response.reason
-        self._fill(response, answer)
-        return response
+            self.service.send_response(response, header)
+        except Exception as error:  # rclpy's errors have no common base; a future would swallow them
+            self._died(error)
 
-    def _now(self, response: Any) -> Any:
+    def _now(self, reason: str) -> Any:
+        """From any thread: a refusal without signals."""
+        response = Lockstep.Response()
+        response.reason = reason
         response.sim_run_id = self._stepper.run_id
         response.tick = self._stepper.simulation.tick
         response.time = to_time(self._stepper.simulation.stamp_ns)
         return response
 
-    def _fill(self, response: Any, answer: LockstepAnswer) -> None:
+    def _filled(self, answer: LockstepAnswer, reason: str = "") -> Any:
+        response = Lockstep.Response()
+        response.accepted = not reason
+        response.reason = reason
         response.sim_run_id = answer.sim_run_id  # not that of now: it may have been reset since
         response.tick = answer.tick
         response.time = to_time(answer.stamp_ns)
@@ -118,6 +145,12 @@ class LockstepService:
         response.state_hash = answer.state_hash
         tick_ns = self._stepper.simulation.model.tick_ns
         response.outcomes = [_outcome(outcome, tick_ns, self._frame_id) for outcome in answer.outcomes]
+        return response
+
+
+def _never(_: Any, response: Any) -> Any:
+    """No executor takes requests of a service that is aside."""
+    return response
 
 
 def to_time(stamp_ns: int) -> Time:

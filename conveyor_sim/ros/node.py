@@ -24,6 +24,7 @@ from conveyor_sim.ros.context import new_node, one_sentence
 from conveyor_sim.ros.diagnostics import Diagnostics
 from conveyor_sim.ros.fault_service import FaultService
 from conveyor_sim.ros.graph_watch import GraphWatch
+from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import RosSink
@@ -40,9 +41,9 @@ REPORT = 10.0  # s of wall time between two words about what is being compiled
 
 
 class SimNode:
-    """The node, with the threads that run it: one spins the executor, one steps the simulation.
+    """The node, with the threads that run it: one spins the executor, one takes commands and scans, one steps.
 
-    A third gets the kernels first, which may have to be compiled. Until they are there the node answers for its
+    Another gets the kernels first, which may have to be compiled. Until they are there the node answers for its
     parameters and its state; /clock, messages and all that is done with a run come when it starts.
     """
 
@@ -56,6 +57,7 @@ class SimNode:
         self.error: Exception | None = None
         self._on_stop = on_stop
         self._stepper: Stepper | None = None
+        self._intake: Intake | None = None
         self._spinner = Spinner(context, died=self._die)
         self._node = new_node("conveyor_sim", context=context, cli_args=list(arguments) if arguments else None)
         try:
@@ -74,6 +76,8 @@ class SimNode:
         self._starter.join()
         if self._stepper is not None:
             self._stepper.shutdown()
+        if self._intake is not None:
+            self._intake.close()
         self._spinner.close()
         self._node.destroy_node()
 
@@ -131,11 +135,12 @@ class SimNode:
             log=node.get_logger(),
         )
         with one_sentence():
-            subscribe_commands(node, stepper)
+            commands = subscribe_commands(node, stepper)
             self._services.serve(stepper)
             CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
             FaultService(node, executor, stepper)
-            LockstepService(node, executor, stepper, given.frame_id)
+            lockstep = LockstepService(node, stepper, given.frame_id, died=self._die)
+            self._intake = Intake(node.context, lockstep, commands, died=self._die)
             Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
         def on_set(changed: list[Parameter]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -14,8 +15,13 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 from ros.line_client import LineClient, until
 from std_srvs.srv import Trigger
 
+from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
+from conveyor_sim.ros.session import Session
+from conveyor_sim.ros.stepper import Stepper
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
 
 SMALL_LINE = Path(__file__).with_name("small_line.yaml")
 
@@ -73,3 +79,30 @@ def line(shared_node: Child, client: LineClient) -> LineClient:
     client.call(Trigger, "pause")
     client.reset()
     return client
+
+
+class Nobody:
+    """A sink to which nobody listens."""
+
+    def wants(self, topic: str) -> bool:
+        return False
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        raise AssertionError(topic)
+
+
+@pytest.fixture
+def stepper() -> Iterator[Stepper]:
+    """Paused, and not started."""
+    scene = load_scene(SMALL_LINE)
+    made = Stepper(
+        lambda runs, loaded: Session(Simulation(scene), Nobody(), None, "world", default_distro()),
+        real_time_factor=0.0,
+        playing=False,
+        lockstep_max_ticks=1,
+        beat=lambda stamp_ns, now: None,
+        died=lambda error: None,
+        log=logging.getLogger(__name__),
+    )
+    yield made
+    made.shutdown()

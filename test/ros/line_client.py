@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import rclpy
@@ -15,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.ros.child import Process
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
 
@@ -28,6 +32,16 @@ def until(condition: Callable[[], Any], what: str) -> Any:
         assert time.monotonic() < end, f"in vain: {what}"
         time.sleep(0.002)
     return value
+
+
+@contextmanager
+def halted(process: Process) -> Iterator[None]:
+    """It does nothing meanwhile."""
+    os.kill(process.pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
 
 
 ROWS = {

@@ -45,6 +45,11 @@ class Sender:
         self.line.step()
         return self.outcomes.messages
 
+    def another_alarm(self) -> bool:
+        """Let an alarm come and go."""
+        alarms = [Commands(names=["alarms/another"], values=[value]) for value in (1.0, 0.0)]
+        return all(self.outcome_of(self.commands, message).accepted for message in alarms)
+
     def speeds(self) -> tuple[list[float], list[float]]:
         """Commanded and actual, m/s, two ticks later: belts are told every other tick."""
         self.belts.messages.clear()
@@ -75,6 +80,7 @@ def test_a_command_changes_the_belts(sender: Sender) -> None:
 
 def test_an_alarm_is_in_the_events_at_its_tick_even_beside_a_refused_command(sender: Sender) -> None:
     with sender.line.listen(Events, "events") as events:
+        until(lambda: sender.another_alarm() and events.messages, "events")  # the node knows that somebody listens
         sent = [Commands(names=[ALARM, FEEDER], values=[1.0, 0.25]), Commands(names=[FEEDER, ALARM], values=[1e9, 0.0])]
         outcomes = [sender.outcome_of(sender.commands, message) for message in sent]
         assert [outcome.accepted for outcome in outcomes] == [True, False]
@@ -82,7 +88,7 @@ def test_an_alarm_is_in_the_events_at_its_tick_even_beside_a_refused_command(sen
             lambda: [row for message in events.messages for row in rows(message) if row[2] == ALARM][1:],
             "the alarm's end",
         )
-        (raised,) = [row for message in events.messages for row in rows(message) if row[1] == "alarm_raised"]
+        (raised,) = [row for message in events.messages for row in rows(message) if row[1:3] == ("alarm_raised", ALARM)]
     assert raised == (outcomes[0].tick, "alarm_raised", ALARM, -1, 1.0)
     assert found == [(outcomes[1].tick, "alarm_cleared", ALARM, -1, 0.0)]
 

@@ -11,7 +11,7 @@ import pytest
 from conveyor_msgs.msg import CommandOutcome, Signals
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros.conftest import SMALL_LINE
-from ros.line_client import LineClient, until
+from ros.line_client import LineClient, halted, until
 from rosbags.highlevel import AnyReader
 from std_srvs.srv import Trigger
 
@@ -116,6 +116,36 @@ def test_running_free_it_commands_as_signals_arrive(
         until(lambda: any(runs(outcome) for outcome in outcomes.messages), "a command")
         assert {(outcome.source, outcome.accepted) for outcome in outcomes.messages} == {("commands", True)}
         until(lambda: signals.messages[-1].values[0] == 0.7, "the feeder at its speed")
+    node.stop()
+
+
+def test_a_request_without_an_answer_is_sent_again_and_nothing_happens_twice(
+    start_controller: StartController, start_node: Callable[..., Child], client: LineClient
+) -> None:
+    state_hash, _ = in_process()
+    node = start_node(real_time_factor=2.0)
+    controller = start_controller()
+    until(lambda: client.lockstep(0, run_id="look").tick > 100, "some scans")
+    with halted(node):
+        until(lambda: "sent again" in controller.log.read_text(), "another request")
+    until(lambda: controller.exit_code is not None, "the end of the controller")
+    assert controller.exit_code == 0, controller.obituary()
+    end = client.lockstep(LAST + 1)
+    assert (end.tick, end.state_hash) == (LAST, state_hash)
+    node.stop()
+
+
+def test_it_ends_when_asked_to_while_it_waits_for_an_answer(
+    start_controller: StartController, start_node: Callable[..., Child], client: LineClient
+) -> None:
+    node = start_node(duration=1000.0)
+    controller = start_controller()
+    until(lambda: client.lockstep(0, run_id="look").tick > 100, "some scans")
+    with halted(node):
+        controller.stop()
+        assert controller.exit_code == 0, controller.obituary()
+    tick = client.lockstep(0, run_id="look").tick
+    assert client.lockstep(tick + 1, run_id="controller").accepted  # another one goes on under its name
     node.stop()
 
 

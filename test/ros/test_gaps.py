@@ -26,10 +26,3 @@ def missing(numbers: Sequence[int | None], publishers: int) -> list[int]:
 )
 def test_gaps_are_counted(numbers: list[int | None], publishers: int, expected: list[int]) -> None:
     assert missing(numbers, publishers) == expected
-
-
-def test_numbers_begin_anew_when_all_publishers_have_left() -> None:
-    gaps = Gaps()
-    gaps.before(10, lambda: 1)
-    gaps.forget()
-    assert gaps.before(50, lambda: 1) == 0

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -23,6 +26,17 @@ from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
 FEEDER = "belts/feeder/cmd_speed"
+KILLED_CLIENT = """
+import ast, sys, time
+import rclpy
+from conveyor_msgs.srv import Lockstep
+rclpy.init()
+node = rclpy.create_node("killed")
+client = node.create_client(Lockstep, "lockstep")
+client.wait_for_service()
+client.call_async(Lockstep.Request(**ast.literal_eval(sys.argv[1])))
+time.sleep(60)
+"""
 
 
 def test_a_scan_advances_and_answers_with_the_state_of_the_engine(line: LineClient) -> None:
@@ -68,7 +82,8 @@ def test_a_client_that_sleeps_while_another_scans_still_gets_its_answer(line: Li
         line.lockstep(target)
     spinner = Spinner(context)
     spinner.start(sleeper)
-    assert until(answer.result, "the answer").reason.startswith("stale: target_tick 0")
+    reason = until(answer.result, "the answer").reason  # whichever of the two participants was heard first
+    assert reason.startswith(("stale: target_tick 0", "the simulation is owned by run 'test'"))
     spinner.close()
     sleeper.destroy_node()
     rclpy.shutdown(context=context)
@@ -84,6 +99,22 @@ def test_what_a_reset_breaks_off_is_answered_with_the_new_run(line: LineClient) 
         response = until(answer.result, "the answer")
         assert (response.accepted, response.reason) == (False, "the simulation was reset")
         assert response.sim_run_id == line.lockstep(0).sim_run_id
+
+
+def test_what_a_client_asked_that_was_killed_is_carried_out_and_its_successor_gets_the_answer(
+    line: LineClient,
+) -> None:
+    asked = {"run_id": "plc", "target_tick": 20_000, "names": [FEEDER], "values": [0.25]}
+    with subprocess.Popen([sys.executable, "-c", KILLED_CLIENT, repr(asked)]) as process:
+        try:
+            until(lambda: line.lockstep(0).tick > 0, "the advance to begin")
+        finally:
+            process.kill()
+    successor = line.client(srv.Lockstep, "lockstep").call_async(srv.Lockstep.Request(**asked))
+    response = until(successor.result, "the answer")
+    assert (response.accepted, response.tick) == (True, 20_000)
+    assert [outcome.source for outcome in response.outcomes] == ["lockstep"]
+    assert line.lockstep(20_001, run_id="plc").accepted
 
 
 def test_a_stale_request_is_refused_and_tells_the_present_tick_and_signals(line: LineClient) -> None:
@@ -224,3 +255,16 @@ def test_a_request_is_refused_while_running_free_or_without_a_name(
     response = line.lockstep(10**5, run_id=run_id)
     assert not response.accepted
     assert ("the simulation is PLAYING, expected PAUSED" if run_id else "run_id is empty") in response.reason
+
+
+def test_a_node_that_ends_answers_what_it_will_not_carry_out(
+    start_node: Callable[..., Child], shared_node: Child, client: LineClient
+) -> None:
+    shared_node.stop()
+    node = start_node(duration=1000.0)
+    answer = client.client(srv.Lockstep, "lockstep").call_async(srv.Lockstep.Request(run_id="plc", target_tick=90_000))
+    until(lambda: client.lockstep(0).tick > 0, "the advance to begin")
+    node.stop()
+    response = until(answer.result, "the answer")
+    assert (response.accepted, response.reason) == (False, "the simulation is shutting down")
+    assert node.exit_code == 0, node.obituary()

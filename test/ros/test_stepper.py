@@ -2,53 +2,20 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from conveyor_msgs import srv
-from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient
 
 from conveyor_sim.bag.recover import recover
-from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.ros.calls import MOST_CALLS
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.lockstep import Refused
-from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.stepper import Stepper
-from conveyor_sim.scene import load_scene
-from conveyor_sim.simulation import Simulation
-
-
-class Nobody:
-    """A sink to which nobody listens."""
-
-    def wants(self, topic: str) -> bool:
-        return False
-
-    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        raise AssertionError(topic)
-
-
-@pytest.fixture
-def stepper() -> Iterator[Stepper]:
-    """Paused, and not started."""
-    scene = load_scene(SMALL_LINE)
-    made = Stepper(
-        lambda runs, loaded: Session(Simulation(scene), Nobody(), None, "world", default_distro()),
-        real_time_factor=0.0,
-        playing=False,
-        lockstep_max_ticks=1,
-        beat=lambda stamp_ns, now: None,
-        died=lambda error: None,
-        log=logging.getLogger(__name__),
-    )
-    yield made
-    made.shutdown()
 
 
 def test_so_many_requests_may_wait(stepper: Stepper) -> None:
