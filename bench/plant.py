@@ -15,9 +15,9 @@ from bench.measure import Effort, say
 from bench.packed import NO_OUTPUTS
 from bench.packed import table as dense_table
 from bench.rows import Row, Rows
+from conveyor_sim.runs.compilation import compile_kernels
 from conveyor_sim.runs.runner import run_scene
 from conveyor_sim.scene import Scene, load_scene
-from conveyor_sim.simulation import compile_kernels
 from conveyor_sim.support.resources import scene_path
 
 CASE = "plant"

@@ -16,8 +16,8 @@ from conveyor_sim.accounts.damage import DamageAccount
 from conveyor_sim.accounts.energy import EnergyAccount
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
-from conveyor_sim.line.commands import FAULT, CommandOutcome
-from conveyor_sim.line.line import ARRIVAL, WATCHDOG, Line
+from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, WriterKind
+from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
@@ -120,6 +120,11 @@ class Simulation:
         return max(1, self.tick * self.model.tick_ns)
 
     @property
+    def line(self) -> Line:
+        """All but the bottles' motion: to be looked at; what acts on it is given by `give`."""
+        return self._line
+
+    @property
     def process_image(self) -> ProcessImage:
         """Names, units and limits of signals and commands."""
         return self._line.image
@@ -157,48 +162,59 @@ class Simulation:
             self._line.close(passed)
             self._state.make_lists()
 
-    def command(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> None:
+    def give(self, given: Input) -> None:
+        """Queue an input; the next tick applies it, or refuses it with the reason (`take_outcomes`).
+
+        Raises ValueError for one of the kind "line": what the line does, it does by itself.
+        """
+        if given.by_line:
+            raise ValueError(f"writer_kind: line given by {given.source}, expected another: that is the line itself")
+        self._line.queue(given)
+
+    def command(
+        self,
+        names: Sequence[str],
+        values: Sequence[float],
+        source: str = "commands",
+        *,
+        writer: str = "",
+        writer_kind: WriterKind = "controller",
+    ) -> None:
         """Queue setpoints by name (`process_image.command_names`); the next tick applies or refuses them together.
 
-        `take_outcomes` returns what became of them. Raises ValueError for the sources that faults and the
-        line itself have.
+        writer: "" for the name of the source. Raises ValueError for the sources that faults and the line itself have.
         """
         if source in (FAULT, WATCHDOG, ARRIVAL):
             raise ValueError(
                 f"source: {source} given, expected another: {FAULT}, {WATCHDOG} and {ARRIVAL} are the line's"
             )
-        self._line.queue(names, values, source)
+        self.give(Input(source, writer or source, writer_kind, SET, tuple(names), tuple(values)))
 
-    def inject(self, name: str, value: float) -> None:
+    def inject(self, name: str, value: float, *, writer: str = FAULT) -> None:
         """Queue a fault by name (`process_image.fault_names`), as `command` does; its source is "fault"."""
-        self._line.queue((name,), (value,), FAULT)
+        self.give(Input(FAULT, writer, "test", INJECT, (name,), (value,)))
 
-    def refusal(self, names: Sequence[str], values: Sequence[float], source: str = "commands") -> str:
-        """Why the next tick would refuse inputs, "" if it would not. source: "fault" for faults."""
-        return self._line.refusal(names, values, source)
+    def refusal(self, given: Input) -> str:
+        """Why the next tick would refuse an input if nothing came before it, "" if it would not."""
+        return self._line.refusal(given)
 
     @property
-    def waiting(self) -> Sequence[tuple[tuple[str, ...], tuple[float, ...], str]]:
-        """Inputs that wait for the next tick, each with names, values and source."""
+    def waiting(self) -> Sequence[Input]:
+        """Inputs that wait for the next tick."""
         return self._line.waiting
 
-    def take_waiting(self) -> list[tuple[tuple[str, ...], tuple[float, ...], str]]:
+    def take_waiting(self) -> list[Input]:
         """The same, given up: they will not be applied."""
         return self._line.take_waiting()
 
     def take_outcomes(self) -> list[CommandOutcome]:
-        """What became of commands since the last call, in order."""
+        """What became of inputs since the last call, in order."""
         return self._line.take_outcomes()
 
     @property
     def happened(self) -> Sequence[Event]:
         """What has happened on the line since the tick before, in order."""
         return self._line.happened
-
-    @property
-    def happened_so_far(self) -> int:
-        """How many events there were since the start of the run."""
-        return self._line.happened_so_far
 
     @property
     def alarms(self) -> frozenset[str]:
@@ -317,10 +333,6 @@ class Simulation:
         """The process image's values, in the order of `process_image.signal_names`; float64."""
         return self._line.signals()
 
-    def photo_eyes(self) -> dict[str, bool]:
-        """Whether each photo-eye reports that it is blocked, by name ("photo_eyes/exit")."""
-        return self._line.photo_eyes()
-
     def state_hash(self) -> int:
         """64 bits over tick, bottles, belts and moving rails: equal if and (all but surely) only if the states are."""
         bottles = self.bottles()
@@ -331,6 +343,10 @@ class Simulation:
         if (moving := self._state.world.moving) is not None:
             digest.update(moving.position.tobytes() + moving.speed.tobytes())
         return int.from_bytes(digest.digest(), "little")
+
+    def rehearse(self) -> None:
+        """Call what the line may call of the engine in a later tick, so that it is compiled before a run begins."""
+        self._line.rehearse()
 
     def _snapshot(self) -> dict[str, Any]:
         """All that changes as it runs but the arrays of the World, as plain data."""
@@ -377,14 +393,3 @@ class Simulation:
         if self._line.feeds:
             with nullcontext() if self._account is None else self._account.feeding():
                 self._line.feed()
-
-
-def compile_kernels(scene: Scene) -> None:
-    """Have numba compile the kernels that a scene needs, or read them from its cache; nothing of it stays but that."""
-    rehearsal = Simulation(scene)
-    rehearsal.advance(1)
-    rehearsal.bottles()
-    rehearsal.contacts()
-    rehearsal.ledger()
-    rehearsal.signals()
-    rehearsal._line.rehearse()

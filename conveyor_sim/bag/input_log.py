@@ -1,9 +1,9 @@
 """A run's start and inputs, written as it goes: with both, the run can be simulated again (`rerun.py`).
 
 A file of JSON lines. The first holds the scene; a run that began from a checkpoint has a copy of it beside the file.
-`{"tick": t, "inputs": [[names, values, source], ...]}` gives what is applied at t and at every tick after it, until the
-next such line. `{"tick": t, "hash": h}` says that t was reached, with that state; with `"failed": true` the guard
-stopped the run there.
+`{"tick": t, "inputs": [[source, writer, writer_kind, operation, names, values, texts], ...]}` gives what is applied at
+t and at every tick after it, until the next such line. `{"tick": t, "hash": h}` says that t was reached, with that
+state; with `"failed": true` the guard stopped the run there.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FILE_NAME = "inputs.jsonl"
 START_NAME = "start.npz"
 """The checkpoint from which a run began, beside its inputs, and in the folder of a bag."""
 
-FORMAT = 1
+FORMAT = 2
 """Raised by one whenever the layout of the file changes."""
 
 FLUSH_INTERVAL = 1.0
@@ -71,7 +71,7 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         """Note what waits for the tick that is about to begin. Raises BagError if it can't be written."""
         if self._failed:
             return
-        tick, waiting = self._sim.tick, self._sim.waiting
+        tick, waiting = self._sim.tick, tuple(map(tuple, self._sim.waiting))
         now = repr(waiting)  # -0.0 and 0.0 are equal, but not the same bits
         if tick != self._next and self._last != _NONE:  # somebody else has stepped it meanwhile
             self._write({"tick": self._next, "inputs": []})

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.line.inputs import CommandOutcome, Input, recorded_input
 from conveyor_sim.observe.columns import BottleColumns
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 SIGNALS = "conveyor_msgs/msg/Signals"
 COMMANDS = "conveyor_msgs/msg/Commands"
 LINE = "conveyor_msgs/msg/Line"
+OUTCOME = "conveyor_msgs/msg/CommandOutcome"
 BOOL = "std_msgs/msg/Bool"
 SPEED = "std_msgs/msg/Float64"
 POSES = "geometry_msgs/msg/PoseArray"
@@ -84,12 +86,40 @@ class Outcome:
     values: tuple[float, ...]
     accepted: bool
     reason: str
+    writer: str
+    writer_kind: str
+    operation: str
+    texts: tuple[str, ...]
+
+    @staticmethod
+    def of(given: Input, accepted: bool, reason: str) -> Outcome:
+        """That of an input."""
+        source, writer, kind, operation, names, values, texts = given
+        return Outcome(source, names, values, accepted, reason, writer, kind, operation, texts)
+
+    @property
+    def input(self) -> Input:
+        """What was given."""
+        return Input(self.source, self.writer, self.writer_kind, self.operation, self.names, self.values, self.texts)
+
+
+def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
+    """conveyor_msgs/CommandOutcome."""
+    fields = {**outcome.input._asdict(), "accepted": outcome.accepted, "reason": outcome.reason}
+    texts = {name: list(fields[name]) for name in ("names", "texts")}
+    return _serialize(OUTCOME, header, {**fields, **texts})
 
 
 def to_outcome(message: Any) -> Outcome:
-    """The outcome that a CommandOutcome message holds."""
-    values = tuple(float(value) for value in message.values)
-    return Outcome(message.source, tuple(message.names), values, bool(message.accepted), message.reason)
+    """The outcome that a CommandOutcome message holds; of an older one, without a writer, as its source says."""
+    names, values = tuple(message.names), tuple(float(value) for value in message.values)
+    if hasattr(message, "operation"):
+        given = Input(
+            message.source, message.writer, message.writer_kind, message.operation, names, values, tuple(message.texts)
+        )
+    else:
+        given = recorded_input(message.source, names, values)
+    return Outcome.of(given, bool(message.accepted), message.reason)
 
 
 def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:

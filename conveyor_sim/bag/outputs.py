@@ -9,7 +9,7 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
 
 if TYPE_CHECKING:
-    from conveyor_sim.line.commands import CommandOutcome
+    from conveyor_sim.line.inputs import CommandOutcome
     from conveyor_sim.simulation import Simulation
     from conveyor_sim.stepping.guard import GuardEvent
 
@@ -72,7 +72,7 @@ class Outputs:
         self._hand_out("outcomes", OUTPUTS["outcomes"], self._header(outcome.tick), _itself, outcome)
 
     def _write_eyes(self) -> None:
-        eyes, row = self._sim.photo_eyes(), TOPICS["photo_eyes/<eye>"]
+        eyes, row = self._sim.line.photo_eyes(), TOPICS["photo_eyes/<eye>"]
         for name, blocked in eyes.items():
             if self._eyes.get(name) is not blocked:
                 self._hand_out(name, row, self._header(self._sim.tick), _itself, blocked)

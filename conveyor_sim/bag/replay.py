@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from conveyor_sim.bag.compare import Difference, first_difference, outcome_difference
 from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.messages import Header, Outcome, to_outcome
@@ -15,10 +18,10 @@ from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.commands import FAULT
-from conveyor_sim.line.line import ARRIVAL, WATCHDOG
+from conveyor_sim.line.inputs import ARRIVAL
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.printable import printable
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,7 @@ class _Replay:
         topics = [row.name for row in here if recorded.get(row.name) and types[row.name] == row.type]
         end_ns = simulation.scene.duration_ticks * simulation.model.tick_ns
         self._states = [_Messages(bag, topic, end_ns) for topic in topics]
+        self._signals = _signals_by_name(bag, simulation)
         self._outcomes = _Messages(bag, "outcomes", end_ns) if recorded.get("outcomes") else None
         self._compared = dict.fromkeys(topics, 0)
         self._last_tick = -1
@@ -136,10 +140,8 @@ class _Replay:
         while difference is None and any(state.next_tick is not None for state in self._states):
             commands = self._recorded_outcomes()
             for outcome in commands:
-                if outcome.source == FAULT:
-                    self._sim.inject(outcome.names[0], outcome.values[0])
-                elif outcome.source != WATCHDOG:  # those it brings about itself
-                    self._sim.command(outcome.names, outcome.values, outcome.source)
+                if not outcome.input.by_line:  # those it brings about itself
+                    self._sim.give(outcome.input)
             self._sim.advance(1)
             difference = self._compare_outcomes(commands) or self._compare_states()
             if self._progress is not None:
@@ -162,7 +164,7 @@ class _Replay:
         return [outcome for outcome in outcomes if outcome.source != ARRIVAL]  # the line never heard of those
 
     def _compare_outcomes(self, recorded: list[Outcome]) -> Difference | None:
-        replayed = [Outcome(o.source, o.names, o.values, o.accepted, o.reason) for o in self._sim.take_outcomes()]
+        replayed = [Outcome.of(o.input, o.accepted, o.reason) for o in self._sim.take_outcomes()]
         if self._outcomes is not None:
             self._compared["outcomes"] = self._compared.get("outcomes", 0) + len(recorded)
         else:
@@ -187,6 +189,8 @@ class _Replay:
         if (state := row.state(now)) is None:
             tick, time = self._sim.tick, self._bag.time(self._sim.tick)
             return Difference(tick, time, topic, "the number of messages", "1", "0")
+        if topic == "signals":
+            state = state[self._signals]
         replayed = self._bag.decode(topic, row.pack(state, header))
         return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
 
@@ -203,6 +207,15 @@ def _simulation(bag: Bag) -> Simulation:
                 f"signal {shape.name}/blocked: by this version it would be another run"
             )
     return simulation
+
+
+def _signals_by_name(bag: Bag, simulation: Simulation) -> NDArray[np.int64]:
+    """Where the recorded signals, in their order, are among those of this version, which may have more."""
+    index = {name: place for place, name in enumerate(simulation.process_image.signal_names)}
+    gone = [name for name in bag.line.signal_names if name not in index]
+    if gone:
+        raise BagError(f"{bag.path}: holds the signal {printable(gone[0])}, expected those that this version has")
+    return np.array([index[name] for name in bag.line.signal_names], dtype=np.int64)
 
 
 def _from_checkpoint(bag: Bag, start: Path) -> Simulation:

@@ -15,8 +15,7 @@ from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
-from conveyor_sim.line.commands import FAULT
-from conveyor_sim.line.line import ARRIVAL, WATCHDOG
+from conveyor_sim.line.inputs import Input
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.files import MB, FileError, read_file
@@ -24,8 +23,6 @@ from conveyor_sim.support.printable import printable
 
 MOST = 512 * MB
 """Bytes of a file of inputs."""
-
-_Input = tuple[tuple[str, ...], tuple[float, ...], str]
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ class _Run:
     scene: Scene
     from_checkpoint: bool
     environment: list[str]
-    inputs: dict[int, list[_Input]]
+    inputs: dict[int, list[Input]]
     """By the tick from which on they are applied."""
     hashes: dict[int, int]
     last: int
@@ -95,15 +92,12 @@ def _simulate(
     outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
     outputs.start()
     total = run.last * simulation.model.tick_ns * 1e-9
-    applied: list[_Input] = []
+    applied: list[Input] = []
     departure = _departure(run, simulation)
     while simulation.tick < run.last or run.failed:
         applied = run.inputs.get(simulation.tick, applied)
-        for names, values, source in applied:
-            if source == FAULT:
-                simulation.inject(names[0], values[0])
-            else:
-                simulation.command(names, values, source)
+        for given in applied:
+            simulation.give(given)
         try:
             simulation.advance()
         except SimulationError as error:
@@ -139,7 +133,7 @@ def _read(path: Path) -> _Run:
         text = read_file(path, MOST).decode("ascii", errors="replace")
     except FileError as error:
         raise BagError(f"{path}: {error}, expected the inputs of a run") from error
-    inputs: dict[int, list[_Input]] = {}
+    inputs: dict[int, list[Input]] = {}
     hashes: dict[int, int] = {}
     last, failed = 0, False
     lines = text.split("\n")[:-1]
@@ -166,8 +160,9 @@ def _read(path: Path) -> _Run:
     return _Run(scene, from_checkpoint, environment, inputs, hashes, last, failed)
 
 
-def _input(names: Any, values: Any, source: Any) -> _Input:
-    given = tuple(map(str, names)), tuple(map(float, values)), str(source)
-    if source in (WATCHDOG, ARRIVAL) or (source == FAULT and not len(given[0]) == len(given[1]) == 1):
+def _input(source: Any, writer: Any, kind: Any, operation: Any, names: Any, values: Any, texts: Any) -> Input:
+    who = str(source), str(writer), str(kind), str(operation)
+    given = Input(*who, tuple(map(str, names)), tuple(map(float, values)), tuple(map(str, texts)))
+    if given.by_line:
         raise ValueError("nobody gives such inputs")
     return given

@@ -1,14 +1,10 @@
-"""Commands: setpoints by name, applied together at a tick or refused together with the reason."""
+"""Why commands and faults are refused: by name, value and limits."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.support.printable import printable
-
-FAULT = "fault"
-"""Source of outcomes of faults."""
 
 ALARMS = "alarms/"
 """What the name of an input begins with that is an alarm of the controller, 0 or 1: it commands nothing."""
@@ -18,19 +14,6 @@ MOST_ALARMS = 1000
 
 LISTED = 20
 """Names that a refusal lists, of those there are."""
-
-
-@dataclass(frozen=True)
-class CommandOutcome:
-    """What became of one set of commands; the fields of conveyor_msgs/CommandOutcome."""
-
-    tick: int
-    """Applied at the start of the scan that leads from this tick to the next."""
-    source: str
-    names: tuple[str, ...]
-    values: tuple[float, ...]
-    accepted: bool
-    reason: str
 
 
 def refusal(table: Sequence[Tag], what: str, names: Sequence[str], values: Sequence[float]) -> str:

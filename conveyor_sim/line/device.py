@@ -113,6 +113,10 @@ class Device:
         """What can be made to go wrong with it."""
         return self._faults
 
+    def objection(self, name: str, value: float, now: ScanContext) -> str:
+        """Why a command of its own can't be taken as it stands now, though name and value are right; "" if it can."""
+        return ""
+
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
         raise NotImplementedError(f"{self.name} takes no commands")

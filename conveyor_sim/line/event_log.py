@@ -3,8 +3,9 @@
 import math
 from collections.abc import Sequence
 
-from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome, alarm_problem
+from conveyor_sim.line.commands import ALARMS, MOST_ALARMS, alarm_problem
 from conveyor_sim.line.device import Device, ScanContext
+from conveyor_sim.line.inputs import INJECT, SET, CommandOutcome
 from conveyor_sim.observe.events import Event, Kind
 from conveyor_sim.state.snapshot import Unchecked
 from conveyor_sim.support.printable import printable
@@ -52,9 +53,9 @@ class EventLog:
         if not outcome.accepted:
             value = values[0] if len(names) == len(values) == 1 else math.nan
             self.note(at, "command_refused", printable(", ".join(names)), value, text=outcome.reason)
-        elif outcome.source == FAULT:
+        elif outcome.operation == INJECT:
             self.note(at, "fault_injected" if values[0] else "fault_cleared", names[0], values[0])
-        if outcome.source != FAULT and len(names) == len(values):  # nobody injects an alarm
+        if outcome.operation == SET and len(names) == len(values):
             for name, value in zip(names, values, strict=True):
                 if name.startswith(ALARMS):
                     self._note_alarm(at, name, value)

@@ -1,7 +1,6 @@
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
 from collections.abc import Sequence
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -9,29 +8,23 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
-from conveyor_sim.line.commands import ALARMS, FAULT, MOST_ALARMS, CommandOutcome, refusal, shown
+from conveyor_sim.line.commands import ALARMS, MOST_ALARMS, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
+from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, WRITER_KINDS, CommandOutcome, Input, Operation
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
-from conveyor_sim.state.snapshot import Unchecked, entries, restore, snapshot, typed
-from conveyor_sim.support.printable import printable
+from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
+from conveyor_sim.support.printable import SENTENCE, printable
 
-WATCHDOG = "watchdog"
-"""Source of outcomes that the line itself brings about."""
-
-ARRIVAL = "arrival"
-"""Source of outcomes that report commands which never reached the line, many in one."""
-
-_Pending = tuple[tuple[str, ...], tuple[Unchecked, ...], str]
-_Outcome = tuple[int, str, tuple[str, ...], tuple[Unchecked, ...], bool, str]
+_Outcome = tuple[int, Input, bool, str]
 
 
 class Line:
@@ -59,8 +52,14 @@ class Line:
         """Whether any device puts bottles onto the line."""
         self.image = ProcessImage(tuple(tag for device in devices for tag in device.tags))
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
+        objecting = [device for device in devices if type(device).objection is not Device.objection]
+        self._objecting = {command.name: device for device in objecting for command in device.commands}
+        self._operations = {
+            SET: Operation(self._set_refusal, self._set),
+            INJECT: Operation(lambda given: refusal(self.image.faults, FAULT, given.names, given.values), self._set),
+        }
         self._surfaces = BeltSurfaces(state)
-        self._pending: list[_Pending] = []
+        self._pending: list[Input] = []
         self._outcomes: list[CommandOutcome] = []
         self._log = EventLog(devices, self.now)
         self.now.begin_scan()  # which its look at the devices began, before there are bottles
@@ -93,27 +92,44 @@ class Line:
         """Give the belts' surfaces the speeds that their drives have."""
         self._surfaces.move(self.now.speeds)
 
-    def queue(self, names: Sequence[str], values: Sequence[float], source: str) -> None:
-        """Have inputs applied, or refused, together as the next tick begins."""
+    def queue(self, given: Input) -> None:
+        """Have an input applied, or refused, as the next tick begins."""
+        source, writer, kind, operation, names, values, texts = given
         # Whoever names an alarm makes it up, so it is kept as it can be shown.
-        kept = tuple(printable(name) if name.startswith(ALARMS) else name for name in names)
-        self._pending.append((kept, tuple(float(value) for value in values), printable(source)))
+        kept = tuple([printable(name) if name.startswith(ALARMS) else name for name in names])
+        numbers = tuple([float(value) for value in values])
+        if texts:
+            texts = tuple(printable(text, SENTENCE) for text in texts)
+        self._pending.append(
+            Input(printable(source), printable(writer), printable(kind), printable(operation), kept, numbers, texts)
+        )
 
     @property
-    def waiting(self) -> Sequence[tuple[tuple[str, ...], tuple[float, ...], str]]:
-        """Inputs that wait for the next tick, each with names, values and source."""
+    def waiting(self) -> Sequence[Input]:
+        """Inputs that wait for the next tick."""
         return tuple(self._pending)
 
-    def take_waiting(self) -> list[tuple[tuple[str, ...], tuple[float, ...], str]]:
+    def take_waiting(self) -> list[Input]:
         """The same, given up: they will not be applied."""
         waiting, self._pending = self._pending, []
         return waiting
 
-    def refusal(self, names: Sequence[str], values: Sequence[float], source: str) -> str:
-        """Why a set of inputs can't be applied, "" if it can."""
-        table = self.image.faults if source == FAULT else self.image.commands
-        if reason := refusal(table, FAULT if source == FAULT else "command", names, values):
+    def refusal(self, given: Input) -> str:
+        """Why an input can't be applied as the line stands now, "" if it can."""
+        if given.writer_kind not in WRITER_KINDS:
+            return f"{printable(given.writer_kind)}: no such kind of writer, expected one of {', '.join(WRITER_KINDS)}"
+        operation = self._operations.get(given.operation)
+        if operation is None:
+            return f"{printable(given.operation)}: no such operation, expected one of {', '.join(self._operations)}"
+        return operation.refusal(given)
+
+    def _set_refusal(self, given: Input) -> str:
+        names, values = given.names, given.values
+        if reason := refusal(self.image.commands, "command", names, values):
             return reason
+        for name, value in zip(names, values, strict=True) if self._objecting else ():
+            if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):
+                return reason
         alarms = [(name, value) for name, value in zip(names, values, strict=True) if name.startswith(ALARMS)]
         standing = set(self._log.alarms) if alarms else set()
         for name, value in alarms:
@@ -122,6 +138,11 @@ class Line:
                 raised = sum(bool(value) for _, value in alarms)
                 return f"{raised} alarms given while {len(self._log.alarms)} stand, expected {MOST_ALARMS} at most"
         return ""
+
+    def _set(self, given: Input, now: ScanContext) -> None:
+        for name, value in zip(given.names, given.values, strict=True):
+            if name in self._owner:  # not an alarm
+                self._owner[name].command(name, value, now)
 
     def take_outcomes(self) -> list[CommandOutcome]:
         """What became of inputs since the last call, in order."""
@@ -133,18 +154,17 @@ class Line:
         self._at(tick)
         self._log.begin()
         pending, self._pending = self._pending, []
-        for names, values, source in pending:
-            reason = self.refusal(names, values, source)
+        for given in pending:
+            reason = self.refusal(given)
             if not reason:
-                for name, value in zip(names, values, strict=True):
-                    if name in self._owner:  # not an alarm
-                        self._owner[name].command(name, value, self.now)
-            kept = shown(names) if reason else names
-            self._outcomes.append(CommandOutcome(tick, source, kept, values, not reason, reason))
+                self._operations[given.operation].apply(given, self.now)
+            kept = given._replace(names=shown(given.names)) if reason else given
+            self._outcomes.append(CommandOutcome(tick, kept, not reason, reason))
             self._log.note_outcome(self._outcomes[-1])
         for belt in self._belts:
             if name := belt.watch(self.now):
-                self._outcomes.append(CommandOutcome(tick, WATCHDOG, (name,), (0.0,), True, ""))
+                stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
+                self._outcomes.append(CommandOutcome(tick, stopped, True, ""))
                 self._log.note(tick, "machine_state", name, 0.0, text="stopped: no command came for its watchdog")
         before = self.now.speeds.tolist()
         for device in self._beginning:
@@ -225,8 +245,8 @@ class Line:
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
         return {
-            "pending": self._pending,
-            "outcomes": [astuple(outcome) for outcome in self._outcomes],
+            "pending": [tuple(given) for given in self._pending],
+            "outcomes": [(made.tick, tuple(made.input), made.accepted, made.reason) for made in self._outcomes],
             "setpoints": self.now.setpoints.tolist(),
             "speeds": self.now.speeds.tolist(),
             "bad": sorted(self.now.bad),
@@ -238,7 +258,7 @@ class Line:
         """Stand as one of the same scene did at a tick. Raises ValueError for what is no memory of one."""
         entries(memory, self.snapshot(), "line")
         self.now.tick = tick
-        self._pending = typed(list[_Pending], memory["pending"], "line.pending")
+        self._pending = typed(list[Input], memory["pending"], "line.pending")
         self._outcomes = [
             CommandOutcome(*entry) for entry in typed(list[_Outcome], memory["outcomes"], "line.outcomes")
         ]

@@ -29,7 +29,7 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.inputs import CommandOutcome
 from conveyor_sim.ros.child import Process
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
@@ -68,6 +68,8 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
         Raises ConveyorError if there is no free domain or the message package won't do, OSError if the command can't
         be run.
         """
+        self.writer = ""
+        """The name of the run that its last request gave."""
         self._patience = patience
         self._turns = _Turns(simulation)
         self._process: Process | None = None
@@ -109,8 +111,9 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
             if turns.request is None:
                 self._require_going_on(inputs, time.monotonic() > end)
         request = turns.request
+        self.writer = request.run_id
         given = request.names or request.values
-        if given and (reason := turns.simulation.refusal(request.names, request.values)):
+        if given and (reason := turns.simulation.refusal(request.input)):
             raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
         return dict(zip(request.names, request.values, strict=True))
 

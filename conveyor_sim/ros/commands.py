@@ -15,6 +15,7 @@ from std_msgs.msg import Float64
 
 from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.topics import CMD_SPEED, TOPICS
+from conveyor_sim.line.inputs import SET, Input
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.gaps import Gaps
@@ -89,7 +90,8 @@ class CommandTopic:
             kind = f"{self._kind.__module__.split('.')[0]}/{self._kind.__name__}"
             inbox.turn_away(self._name, UNREADABLE.format(type=kind))
             return
-        self._stepper.command(names, tuple(values), self._name, len(data))
+        given = Input(self._name, self._name, "controller", SET, names, tuple(values))
+        self._stepper.give(given, len(data))
 
     def _on_matched(self, status: Any) -> None:
         if status.current_count == 0:

@@ -9,7 +9,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.inputs import FAULT, INJECT, Input
 from conveyor_sim.ros.inbox import size_of
 from conveyor_sim.ros.lockstep import Refused
 from conveyor_sim.ros.services import settled
@@ -26,13 +26,13 @@ class FaultService:
 
     async def _inject(self, request: Any, response: Any) -> Any:
         def between_ticks() -> None:
-            stepper, name, value = self._stepper, request.name, request.value
-            simulation, size = stepper.session.simulation, size_of([name], [value])
+            stepper = self._stepper
+            given = Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,))
+            simulation, size = stepper.session.simulation, size_of(given.names, given.values)
             response.tick = simulation.tick
-            response.message = stepper.standstill or simulation.refusal([name], [value], FAULT)
-            response.message = response.message or stepper.inbox.admit(size)
+            response.message = stepper.standstill or simulation.refusal(given) or stepper.inbox.admit(size)
             if not response.message:
-                stepper.reception.inject(stepper.session, name, value, size)
+                stepper.reception.hand_over(stepper.session, given, size)
                 response.success = True
 
         try:

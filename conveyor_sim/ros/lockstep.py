@@ -16,11 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.inputs import SET, CommandOutcome, Input
 from conveyor_sim.support.printable import MOST, printable
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
+
+
+LOCKSTEP = "lockstep"
+"""Source of its commands."""
 
 
 class Refused(ConveyorError):
@@ -41,6 +45,11 @@ class LockstepRequest:
     def same_as(self, other: LockstepRequest | None) -> bool:
         """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
         return other is not None and self._key() == other._key()
+
+    @property
+    def input(self) -> Input:
+        """Its commands."""
+        return Input(LOCKSTEP, self.run_id, "controller", SET, self.names, self.values)
 
     def _key(self) -> tuple[object, ...]:
         bits = struct.pack(f"<{len(self.values)}d", *self.values)

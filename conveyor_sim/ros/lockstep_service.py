@@ -18,7 +18,7 @@ from rclpy.service import Service
 
 from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.inputs import CommandOutcome
 from conveyor_sim.ros.direct import Aside, take_request
 from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.publishers import ros_qos
@@ -169,6 +169,10 @@ def _outcome(outcome: CommandOutcome, tick_ns: int, frame_id: str) -> OutcomeMes
     message.values = _doubles(np.asarray(outcome.values, dtype=np.float64))
     message.accepted = outcome.accepted
     message.reason = outcome.reason
+    message.writer = outcome.input.writer
+    message.writer_kind = outcome.input.writer_kind
+    message.operation = outcome.operation
+    message.texts = list(outcome.input.texts)
     return message
 
 

@@ -11,15 +11,11 @@ from conveyor_sim.bag.messages import Header, Outcome, to_outcome
 from conveyor_sim.bag.qos import EVENTS, LATCHED, Qos
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.commands import FAULT
-from conveyor_sim.line.line import ARRIVAL, WATCHDOG
+from conveyor_sim.line.inputs import SET
 from conveyor_sim.line.process_image import speed_command
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
 """What a node that plays back publishes of itself."""
-
-NOT_SENT = frozenset({WATCHDOG, FAULT, ARRIVAL})
-"""Sources of outcomes that nobody sent as a command."""
 
 WALL_CLOCK = 10**18
 """ns: later log times are dates (from 2001 on), not simulated times."""
@@ -165,7 +161,7 @@ class Playback:
         """The command of an outcome, if it was one and the bag does not hold it itself."""
         message = self._bag.decode("outcomes", data)
         outcome: Outcome = to_outcome(message)
-        if outcome.source in NOT_SENT:
+        if outcome.operation != SET or outcome.input.by_line:  # nobody sent it as a command
             return
         if outcome.source in self._made and outcome.names == (outcome.source,) and len(outcome.values) == 1:
             yield Message(outcome.source, messages.speed_message(outcome.values[0]))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conveyor_sim.line.commands import FAULT, CommandOutcome
-from conveyor_sim.line.line import ARRIVAL, WATCHDOG
+from conveyor_sim.line.inputs import INJECT, CommandOutcome, Input, arrival
 from conveyor_sim.ros.inbox import Inbox, size_of
 from conveyor_sim.ros.session import Session
 
@@ -33,36 +32,26 @@ class Reception:
         self._since = -PERIOD  # s of wall time, when lines were counted from 0
         self._told = -PERIOD
 
-    def hand_over(
-        self, session: Session, names: tuple[str, ...], values: tuple[float, ...], source: str, size: int
-    ) -> None:
-        """Have the next tick judge a command that was admitted with so many bytes."""
-        session.simulation.command(names, values, source)
+    def hand_over(self, session: Session, given: Input, size: int) -> None:
+        """Have the next tick judge an input that was admitted with so many bytes."""
+        session.simulation.give(given)
         self._handed += 1
         self._handed_bytes += size
 
-    def inject(self, session: Session, name: str, value: float, size: int) -> None:
-        """Likewise a fault."""
-        session.simulation.inject(name, value)
-        self._handed += 1
-        self._handed_bytes += size
-
-    def refuse(
-        self, session: Session, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str
-    ) -> None:
-        """Refuse a command for which there is no tick."""
-        self.refused += source != FAULT
-        self._log(f"{source} refused since {reason}")
-        session.refuse(names, values, source, reason)
+    def refuse(self, session: Session, given: Input, reason: str) -> None:
+        """Refuse an input for which there is no tick."""
+        self.refused += given.operation != INJECT
+        self._log(f"{given.source} refused since {reason}")
+        session.refuse(given, reason)
 
     def begin(self, session: Session) -> None:
         """Another run: what waits in it came from a checkpoint."""
         waiting = session.simulation.waiting
-        for _, _, source in waiting:
-            if source != FAULT:
+        for given in waiting:
+            if given.operation != INJECT:
                 self._inbox.receive()
         self._handed = len(waiting)
-        self._handed_bytes = sum(size_of(names, values) for names, values, _ in waiting)
+        self._handed_bytes = sum(size_of(given.names, given.values) for given in waiting)
         self._inbox.occupy(self._handed, self._handed_bytes)
 
     def take_account(self, outcomes: Sequence[CommandOutcome]) -> None:
@@ -70,15 +59,15 @@ class Reception:
         self._release()
         for outcome in outcomes:
             if not outcome.accepted:
-                self.refused += outcome.source != FAULT
+                self.refused += outcome.operation != INJECT
                 self._log(f"{outcome.source} refused at tick {outcome.tick}: {outcome.reason}")
-            elif outcome.source not in (WATCHDOG, FAULT):
+            elif outcome.operation != INJECT and not outcome.input.by_line:
                 self.applied += 1
 
     def give_up(self, session: Session, reason: str) -> None:
         """Refuse what waits for a tick that will not come; the recording is closed by then."""
-        for names, values, source in session.simulation.take_waiting():
-            self.refuse(session, names, values, source, reason)
+        for given in session.simulation.take_waiting():
+            self.refuse(session, given, reason)
         self._release()
 
     def notes(self, tick: int, now: float) -> list[CommandOutcome]:
@@ -89,7 +78,7 @@ class Reception:
         self._told = now
         for note in notes:
             self._warn(note)
-        return [CommandOutcome(tick, ARRIVAL, (), (), False, note) for note in notes]
+        return [arrival(note, tick) for note in notes]
 
     # For the answers of lockstep
 
@@ -104,7 +93,7 @@ class Reception:
         kept = self._kept
         if self._dropped:
             reason = f"{self._dropped} more outcomes were left out, expected at most {KEPT} between two answers"
-            kept.append(CommandOutcome(tick, ARRIVAL, (), (), False, reason))
+            kept.append(arrival(reason, tick))
         self.forget_kept()
         return tuple(kept)
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from conveyor_sim.bag.outputs import Outputs, Sink
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.line.commands import CommandOutcome, shown
+from conveyor_sim.line.commands import shown
+from conveyor_sim.line.inputs import CommandOutcome, Input
 from conveyor_sim.runs.force_check import PeakWatch, achieved
 from conveyor_sim.runs.stopped import keep_stopped
 from conveyor_sim.simulation import Simulation
@@ -78,12 +79,10 @@ class Session:
         """Write an outcome that no tick brought. Raises BagError."""
         self.outputs.tell(outcome)
 
-    def refuse(self, names: tuple[str, ...], values: tuple[float, ...], source: str, reason: str) -> None:
-        """Tell those who listen that a command came too late to be applied; the recording is closed by then."""
-        outcome = CommandOutcome(
-            self.simulation.tick, source, shown(names), values, accepted=False, reason=printable(reason, SENTENCE)
-        )
-        self.outputs.tell(outcome)
+    def refuse(self, given: Input, reason: str) -> None:
+        """Tell those who listen that an input came too late to be applied; the recording is closed by then."""
+        kept = given._replace(names=shown(given.names))
+        self.outputs.tell(CommandOutcome(self.simulation.tick, kept, False, printable(reason, SENTENCE)))
 
     def flush(self) -> None:
         """Hand what was recorded to the operating system. Raises BagError."""

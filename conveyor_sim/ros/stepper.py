@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.inputs import CommandOutcome, Input
 from conveyor_sim.ros.calls import Calls
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
@@ -114,21 +114,21 @@ class Stepper:
         """
         return self._calls.request(function)
 
-    def command(self, names: tuple[str, ...], values: tuple[float, ...], source: str, size: int) -> None:
-        """Hand a command of so many bytes to the simulation, which applies or refuses it as the next tick starts.
+    def give(self, given: Input, size: int) -> None:
+        """Hand an input of so many bytes to the simulation, which applies or refuses it as the next tick starts.
 
         One for which the queue has no room is turned away (inbox.py).
         """
         if reason := self.inbox.admit(size):
-            self.inbox.turn_away(source, reason)
+            self.inbox.turn_away(given.source, reason)
             return
 
         def hand_over() -> None:
             if reason := self.standstill:  # there is no next tick to refuse it
                 self.inbox.release(1, size)
-                self.reception.refuse(self.session, names, values, source, reason)
+                self.reception.refuse(self.session, given, reason)
             else:
-                self.reception.hand_over(self.session, names, values, source, size)
+                self.reception.hand_over(self.session, given, size)
 
         self._calls.put(hand_over)
 
@@ -225,7 +225,7 @@ class Stepper:
         if request.names or request.values:
             self.inbox.receive()
             self.inbox.occupy(1, size)  # even if the queue is full: the advance is what empties it
-            self.reception.hand_over(self.session, request.names, request.values, "lockstep", size)
+            self.reception.hand_over(self.session, request.input, size)
         self.pacer.catch_breath(time.monotonic())
 
         def done() -> None:

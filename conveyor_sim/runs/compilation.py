@@ -22,7 +22,7 @@ from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS
 from conveyor_sim.engine.compiler.kernel_cache import NotCached, cached_only
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.scene import Scene
-from conveyor_sim.simulation import compile_kernels
+from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.garbage import collected_later
 
 BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
@@ -32,6 +32,17 @@ BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
 atexit.register(gc.freeze)
 
 CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.runs.compilation import child; child()"
+
+
+def compile_kernels(scene: Scene) -> None:
+    """Have numba compile the kernels that a scene needs, or read them from its cache; nothing of it stays but that."""
+    rehearsal = Simulation(scene)
+    rehearsal.advance(1)
+    rehearsal.bottles()
+    rehearsal.contacts()
+    rehearsal.ledger()
+    rehearsal.signals()
+    rehearsal.rehearse()
 
 
 class Cancelled(Exception):

@@ -12,7 +12,7 @@ import numpy as np
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import FAULT, CommandOutcome
+from conveyor_sim.line.inputs import INJECT, SET, CommandOutcome
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import Kind
 
@@ -93,11 +93,13 @@ class History:
 
     def take(self, outcome: CommandOutcome, from_test: bool) -> None:
         """What was applied at the last tick. from_test: by the test itself, not by the controller."""
+        if outcome.operation not in (SET, INJECT):
+            return
         for name, value in zip(outcome.names, outcome.values, strict=True):
             if name.startswith(ALARMS):  # noted as the controller gave it
                 continue
             self._set(name, value)
-            if from_test or outcome.source == FAULT:
+            if from_test or outcome.operation == INJECT:
                 self.marks.append(Mark(self._times[-1], name, value))
 
     def alarms(self, alarms: Mapping[str, float]) -> None:

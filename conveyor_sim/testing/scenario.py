@@ -16,7 +16,7 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ON, AlarmChanges, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.commands import FAULT
+from conveyor_sim.line.inputs import FAULT, INJECT, SET, Input
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
@@ -185,13 +185,11 @@ class Scenario(AbstractContextManager["Scenario"]):
 
         Raises CommandError if it would be refused.
         """
-        self._require(name, value, TEST)
-        self.simulation.command((name,), (value,), TEST)
+        self._give(Input(TEST, TEST, "test", SET, (name,), (value,)))
 
     def inject(self, fault: str, value: float = 1.0) -> None:
         """Have a fault begin, or with value 0 end, at the next tick. Raises CommandError if it would be refused."""
-        self._require(fault, value, FAULT)
-        self.simulation.inject(fault, value)
+        self._give(Input(FAULT, TEST, "test", INJECT, (fault,), (value,)))
 
     def run_for(self, seconds: float) -> None:
         """Let time pass, rounded up to whole ticks.
@@ -272,8 +270,12 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _step(self) -> None:
         __tracebackhide__ = True
         if self._answer:
-            source = CONTROLLER if self._node is None else LOCKSTEP
-            self.simulation.command(tuple(self._answer), tuple(self._answer.values()), source)
+            names, values = tuple(self._answer), tuple(self._answer.values())
+            if self._node is None:
+                writer = type(self._controller).__name__
+                self.simulation.command(names, values, CONTROLLER, writer=writer)
+            else:
+                self.simulation.command(names, values, LOCKSTEP, writer=self._node.writer)
         if self._inputs is not None:
             self._inputs.before_tick()
         try:
@@ -330,9 +332,10 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _present(self, values: Mapping[str, float]) -> Present:
         return Present(values, self.time, self.simulation.tick, self.scene.tick)
 
-    def _require(self, name: str, value: float, source: str) -> None:
-        if reason := self.simulation.refusal((name,), (value,), source):
+    def _give(self, given: Input) -> None:
+        if reason := self.simulation.refusal(given):
             raise CommandError(reason)
+        self.simulation.give(given)
 
     def _ticks(self, seconds: float) -> int:
         if not (math.isfinite(seconds) and seconds >= 0.0):

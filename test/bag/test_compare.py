@@ -13,6 +13,7 @@ from conveyor_sim.bag.compare import Difference, first_difference, outcome_diffe
 from conveyor_sim.bag.messages import Outcome
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.line.inputs import Input
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 
 
@@ -112,7 +113,8 @@ def test_contact_is_named_by_its_bottles_or_rail() -> None:
         assert (found.field, found.part, found.bottle) == ("normal_force", name, entry)
 
 
-OUTCOME = Outcome("commands", ("belts/one/cmd_speed",), (math.nan,), False, "not a number")
+GIVEN = Input("commands", "plc", "controller", "set", ("belts/one/cmd_speed",), (math.nan,))
+OUTCOME = Outcome.of(GIVEN, False, "not a number")
 
 
 def test_equal_outcomes_have_no_difference_even_with_nan() -> None:

@@ -44,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int,
             sim.advance()
             outputs.after_tick()
             if sim.happened:
-                seen.append((sim.tick, tuple(sim.happened), sim.happened_so_far))
+                seen.append((sim.tick, tuple(sim.happened), sim.line.happened_so_far))
     return folder, seen
 
 

@@ -12,7 +12,7 @@ from bag.ros_decode import assert_same, deserialize
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
-from conveyor_sim.line.commands import CommandOutcome
+from conveyor_sim.line.inputs import CommandOutcome, Input
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.events import Event, event_columns
@@ -63,7 +63,13 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "outcome": (
         TOPICS["outcomes"].type,
         lambda: TOPICS["outcomes"].pack(
-            CommandOutcome(9, "commands", ("belts/a/cmd_speed",), (math.inf,), False, "not a number — really"), HEADER
+            CommandOutcome(
+                9,
+                Input("commands", "plc é", "operator", "shelve", ("belts/a/cmd_speed",), (math.inf,), ("why", "ü")),
+                False,
+                "not a number — really",
+            ),
+            HEADER,
         ),
     ),
 }

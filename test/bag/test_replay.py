@@ -18,6 +18,8 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, SceneError
+from conveyor_sim.line.devices.zone import ZoneDevice
+from conveyor_sim.line.tag import count
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import load_scene, parse_scene
 
@@ -304,3 +306,43 @@ def test_a_pusher_that_is_held_up_replays_bit_for_bit(tmp_path: Path) -> None:
     )
     with pytest.raises(BagError, match=expected):
         replay(edited(bag, tmp_path / "before", before))
+
+
+OLD = Path(__file__).parent / "old"
+"""Bags that earlier versions recorded."""
+
+
+def test_a_bag_from_before_tags_still_replays() -> None:
+    """Its outcomes say neither who gave an input nor what was done: their sources do."""
+    report = replay(OLD / "before_tags.mcap")
+    assert report.difference is None and not report.exact
+    assert (report.compared["outcomes"], report.compared["signals"], report.last_tick) == (4, 13, 60)
+    with open_bag(OLD / "before_tags.mcap") as bag:
+        given = [(frame.data.writer, frame.data.writer_kind, frame.data.operation) for frame in bag.outcomes()]
+    assert given == [
+        ("commands", "controller", "set"),
+        ("fault", "test", "inject"),
+        ("lockstep", "controller", "set"),
+        ("watchdog", "line", "set"),
+    ]
+
+
+def test_signals_are_compared_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So a version that has more of them replays a bag as well; one that lacks some says so."""
+    take_tags, values = ZoneDevice._take_tags, ZoneDevice.values
+    more = count("zones/end/more", "counter", "More.")
+    with monkeypatch.context() as patch:
+        patch.setattr(ZoneDevice, "_take_tags", lambda self, tags: take_tags(self, [more, *tags]))
+        patch.setattr(ZoneDevice, "values", lambda self, now: (-1.0, *values(self, now)))
+        patch.setattr(ZoneDevice, "classify", lambda self, kind: None)  # which would take its tags again
+        report = replay(OLD / "before_tags.mcap")
+        assert report.difference is None and report.compared["signals"] == 13
+        patch.setattr(ZoneDevice, "values", lambda self, now: (-1.0, *(value + 1.0 for value in values(self, now))))
+        found = replay(OLD / "before_tags.mcap").difference
+        assert found is not None and found.part == "signal zones/end/bottles"
+    monkeypatch.setattr(
+        ZoneDevice, "_take_tags", lambda self, tags: take_tags(self, [tag for tag in tags if tag.name[-1] != "l"])
+    )
+    monkeypatch.setattr(ZoneDevice, "values", lambda self, now: values(self, now)[:2])
+    with pytest.raises(BagError, match="holds the signal zones/end/full, expected those that this version has"):
+        replay(OLD / "before_tags.mcap")

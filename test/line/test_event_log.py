@@ -6,6 +6,7 @@ import pytest
 
 from conveyor_sim.control.scan import ALARMS as CONTROLLERS
 from conveyor_sim.line.commands import ALARMS, MOST_ALARMS
+from conveyor_sim.line.inputs import INJECT, SET, Input
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
@@ -14,6 +15,10 @@ from conveyor_sim.support.resources import scene_path
 REJECT = load_scene(scene_path("scenarios/reject_line"))
 FUNNEL = load_scene(scene_path("scenarios/funnel_mouth"))
 FIRE = "machines/rejecter/fire"
+
+
+def setting(name: str, value: float) -> Input:
+    return Input("test", "test", "test", SET, (name,), (value,))
 
 
 def run(sim: Simulation, ticks: int) -> list[Event]:
@@ -45,7 +50,7 @@ def test_bottles_fed_and_taken_are_those_that_come_and_go() -> None:
         assert (come, gone) == (now - present, present - now)
         assert {e.at for e in sim.happened} <= {sim.tick}
         present = now
-    assert sim.happened_so_far > 10
+    assert sim.line.happened_so_far > 10
 
 
 def test_the_value_counts_the_bottles_of_a_device() -> None:
@@ -119,8 +124,8 @@ def test_an_alarm_that_somebody_injects_is_refused_and_not_raised() -> None:
 @pytest.mark.parametrize("given", [0.5, float("nan"), -1.0, 2.0])
 def test_an_alarm_is_zero_or_one(given: float) -> None:
     sim = Simulation(REJECT)
-    assert sim.refusal(("alarms/full",), (given,)) == f"alarms/full: {given:g} given, expected 0 or 1"
-    assert sim.refusal(("alarms/full",), (1.0,), "fault")  # nobody injects one
+    assert sim.refusal(setting("alarms/full", given)) == f"alarms/full: {given:g} given, expected 0 or 1"
+    assert sim.refusal(setting("alarms/full", 1.0)._replace(operation=INJECT))  # nobody injects one
 
 
 @pytest.mark.parametrize(
@@ -136,12 +141,12 @@ def test_an_alarm_is_kept_as_it_can_be_shown(name: str, shown: str) -> None:
         assert outcome.accepted
         (name,) = outcome.names
         assert sim.alarms == {shown}
-    assert sim.happened_so_far == 2  # a bottle, and the alarm once
+    assert sim.line.happened_so_far == 2  # a bottle, and the alarm once
 
 
 def test_an_alarm_has_a_name() -> None:
     expected = "alarms/: given, expected the name of an alarm behind it"
-    assert Simulation(REJECT).refusal(("alarms/",), (1.0,)) == expected
+    assert Simulation(REJECT).refusal(setting("alarms/", 1.0)) == expected
 
 
 def test_the_alarms_that_stand_are_bounded() -> None:
@@ -174,9 +179,13 @@ def test_a_checkpoint_remembers_alarms_states_and_what_has_just_happened(scene: 
     sim.command(("alarms/late",), (1.0,))
     sim.save(tmp_path / "there")
     loaded = Simulation.load(tmp_path / "there")
-    assert (loaded.happened, loaded.happened_so_far, loaded.alarms) == (sim.happened, sim.happened_so_far, {"full"})
+    assert (loaded.happened, loaded.line.happened_so_far, loaded.alarms) == (
+        sim.happened,
+        sim.line.happened_so_far,
+        {"full"},
+    )
     for each in (sim, loaded):
         each.inject(trip, 0.0)
     assert run(loaded, 100) == run(sim, 100)
     assert loaded.alarms == {"full", "late"}
-    assert loaded.happened_so_far == sim.happened_so_far
+    assert loaded.line.happened_so_far == sim.line.happened_so_far

@@ -101,7 +101,7 @@ def test_a_photo_eye_has_a_topic_that_tells_changes_and_reaches_who_joins_late(l
     simulation, levels = Simulation(load_scene(SMALL_LINE)), [False]
     while simulation.tick < 200:
         simulation.advance()
-        levels.append(simulation.photo_eyes()["photo_eyes/entry"])
+        levels.append(simulation.line.photo_eyes()["photo_eyes/entry"])
     changes = [tick for tick in range(1, 201) if levels[tick] != levels[tick - 1]]
     assert len(changes) > 3
     now = 0

@@ -176,9 +176,12 @@ def test_of_another_version_the_versions_are_named(tmp_path: Path) -> None:
     [
         (lambda lines: [], "is damaged"),
         (lambda lines: ["{", *lines[1:]], "is damaged"),
-        (lambda lines: [lines[0].replace('"format": 1', '"format": 7'), *lines[1:]], "format 7 of inputs, expected 1"),
+        (lambda lines: [lines[0].replace('"format": 2', '"format": 1'), *lines[1:]], "format 1 of inputs, expected 2"),
         (lambda lines: [*lines, '{"tick": 50, "hash": 1}'], r"is damaged \(ticks out of order\)"),
-        (lambda lines: [*lines, '{"tick": 1000, "inputs": [[[], [], "fault"]]}'], "nobody gives such inputs"),
+        (
+            lambda lines: [*lines, '{"tick": 1000, "inputs": [["watchdog", "watchdog", "line", "set", [], [], []]]}'],
+            "nobody gives such",
+        ),
     ],
 )
 def test_inputs_that_make_no_sense(tmp_path: Path, change: Callable[[list[str]], list[str]], reason: str) -> None:

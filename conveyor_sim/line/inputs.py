@@ -1,0 +1,112 @@
+"""`Input`: the one record of whatever acts on a line from outside, and what became of it.
+
+An input belongs to a tick: the one at whose beginning it is applied, or refused with the reason, as a whole. Those of
+one tick are taken in the order in which they were given, and within one the names in their order: each is judged as the
+line stands after those before it. Watchdogs act after all inputs, devices after the watchdogs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
+
+from conveyor_sim.line.device import ScanContext
+from conveyor_sim.state.snapshot import Unchecked
+
+WriterKind = Literal["controller", "operator", "engineer", "test", "line"]
+"""Who acts; "line": the line itself, which replay and rerun bring about again without being given it."""
+
+WRITER_KINDS: tuple[WriterKind, ...] = get_args(WriterKind)
+
+SET = "set"
+"""Operation: commands by name, and alarms of a controller ("alarms/<name>", 0 or 1)."""
+
+INJECT = "inject"
+"""Operation: faults by name."""
+
+FAULT = "fault"
+"""Source of faults."""
+
+WATCHDOG = "watchdog"
+"""Source of what the line does for a controller that has gone silent."""
+
+ARRIVAL = "arrival"
+"""Source of outcomes that report inputs which never reached the line, many in one."""
+
+
+class Input(NamedTuple):
+    """Something that acts on a line."""
+
+    source: str
+    """By which way it came: "commands", "lockstep", "fault", "controller", ..."""
+    writer: str
+    """Who gave it, by name."""
+    writer_kind: str
+    """One of WriterKind."""
+    operation: str
+    """What is done: a row in the line's table of operations."""
+    names: tuple[str, ...]
+    """Of tags, alarms or devices, as the operation has it."""
+    values: tuple[Unchecked, ...]
+    """One for each name where the operation takes numbers."""
+    texts: tuple[str, ...] = ()
+    """Where it takes texts."""
+
+    @property
+    def by_line(self) -> bool:
+        """Whether the line itself brought it about."""
+        return self.writer_kind == "line"
+
+
+class Operation(NamedTuple):
+    """What can be done to a line."""
+
+    refusal: Callable[[Input], str]
+    """Why it can't be applied as the line stands, "" if it can."""
+    apply: Callable[[Input, ScanContext], None]
+    """Called only if there is no reason against it."""
+
+
+@dataclass(frozen=True)
+class CommandOutcome:
+    """What became of one input; conveyor_msgs/CommandOutcome."""
+
+    tick: int
+    """Applied at the start of the scan that leads from this tick to the next."""
+    input: Input
+    """With names fit to be repeated, if it was refused."""
+    accepted: bool
+    reason: str
+    """Empty if accepted."""
+
+    @property
+    def source(self) -> str:
+        """By which way it came."""
+        return self.input.source
+
+    @property
+    def operation(self) -> str:
+        """What was to be done."""
+        return self.input.operation
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of what it was about."""
+        return self.input.names
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """That were given."""
+        return self.input.values
+
+
+def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...]) -> Input:
+    """The input of an outcome from before writers and operations were recorded: its source says enough."""
+    if source == FAULT:
+        return Input(source, source, "test", INJECT, names, values)
+    kind = "line" if source in (WATCHDOG, ARRIVAL) else "controller"
+    return Input(source, source, kind, SET, names, values)
+
+
+def arrival(reason: str, tick: int) -> CommandOutcome:
+    """The report of inputs that never reached the line, before a tick."""
+    return CommandOutcome(tick, Input(ARRIVAL, ARRIVAL, "line", SET, (), ()), False, reason)
