@@ -139,10 +139,11 @@ METHODS: Mapping[str, Method] = {
         second_order=True,
         drag_limit=0.5,
     ),
-    # 1 - z + z^2 / 2 - z^3 / 6 + z^4 / 24 = 1 at z = 2.785.
+    # 1 - z + z^2 / 2 - z^3 / 6 + z^4 / 24 = 1 at z = 2.785. A jump within a step is missed by 1/6, RMS over phases, and
+    # by 1/3 at most; a scene of few impacts comes near the most, and so does what is expected.
     "rk4": Method(
         peak=0.55,
-        jump=0.2,
+        jump=0.3,
         touch=0.7,
         tsuji=0.11,
         viscoelastic=0.09,
