@@ -44,6 +44,8 @@ _typeof: Any = numba.typeof
 # Numba leaves this part of LLVM off: it joins neighbouring loads, sums and stores to packed ones, which gathers by row
 # of `Bottles.packed` live on.
 _config.SLP_VECTORIZE = 1
+# Level 3 compiles for an eighth longer, and no tick was faster for it.
+_config.OPT = type(_config.OPT)(2)
 # A loop over columns is vectorised only if they don't overlap, which LLVM tests as it enters the loop. By default it
 # gives up, silently, where that takes more than 8 comparisons, about four columns.
 llvm.set_option("conveyor_sim", "-runtime-memory-check-threshold=1000")

@@ -89,12 +89,6 @@ class _KernelLibrary(JITCodeLibrary):
         self._linking_libraries = list(reversed(self._callees_first(self, {})))[1:]
         super().finalize()
 
-    def _optimize_final_module(self) -> None:
-        super()._optimize_final_module()
-        # Once is for what parts are made of, twice for what they make together: a tenth of a tick, and of compiling.
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
-
     def _verify_declare_only_symbols(self) -> None:
         # What is missing would be called at address 0.
         missing = [
