@@ -30,29 +30,35 @@ class Mark:
 
 
 class History:
-    """Columns by name, one entry a tick from the scenario's first to its present one.
+    """Columns by name, one entry a tick from the scenario's first to its present one, or the last ones of them.
 
     A signal is what it was at the tick. A command is what was in force from the tick on, NaN until it was first given;
     a fault likewise, 0 until it was first injected. An alarm ("alarms/<name>") is 1 while it stood.
     """
 
-    def __init__(self, image: ProcessImage) -> None:
+    def __init__(self, image: ProcessImage, most: int | None = None) -> None:
+        """most: ticks to keep, at least one, those before are forgotten; None: all."""
         self._index = {name: column for column, name in enumerate(image.signal_names)}
         entries = (*image.signals, *image.commands, *image.faults)
         self._unit = {entry.name: entry.unit for entry in entries}
         self._kind = {entry.name: entry.kind for entry in entries}
-        self._rows = 0
+        self._rows, self._most = 0, most
         self._times = array("d")
-        self._signals = np.empty((_FIRST_ROWS, len(image.signals)))
+        self._signals = np.empty((_FIRST_ROWS if most is None else 2 * most, len(image.signals)))
         self._other_index = {name: column for column, name in enumerate((*image.command_names, *image.fault_names))}
         self._now: F8 = np.array([math.nan] * len(image.commands) + [0.0] * len(image.faults))
-        self._others = np.empty((_FIRST_ROWS, len(self._now)))
+        self._others = np.empty((len(self._signals), len(self._now)))
         self.marks: list[Mark] = []
         """Faults injected and commands given by the test, in order."""
 
     def __len__(self) -> int:
         """Ticks in it."""
-        return self._rows
+        return self._rows - self._first
+
+    @property
+    def _first(self) -> int:
+        """The first row that is kept."""
+        return 0 if self._most is None else max(self._rows - self._most, 0)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -62,14 +68,14 @@ class History:
     @property
     def time(self) -> F8:
         """Simulated time of each tick, (n,), s."""
-        return np.array(self._times)
+        return np.array(self._times[self._first :])
 
     def __getitem__(self, name: str) -> F8:
         """A column (n,), in the unit of the process image. Raises ConveyorError for a name that there is not."""
         if name in self._index:
-            return self._signals[: self._rows, self._index[name]].copy()
+            return self._signals[self._first : self._rows, self._index[name]].copy()
         if name in self._other_index:
-            return self._others[: self._rows, self._other_index[name]].copy()
+            return self._others[self._first : self._rows, self._other_index[name]].copy()
         raise ConveyorError(f"{name}: not in the history, expected one of {', '.join(self.names)}")
 
     def unit(self, name: str) -> str:
@@ -83,7 +89,11 @@ class History:
 
     def begin_tick(self, time: float, signals: F8) -> None:
         """A tick is reached; commands, faults and alarms go on as they are."""
-        if self._rows == len(self._signals):
+        if self._rows == len(self._signals) and self._most is not None:
+            for rows in (self._signals, self._others):
+                rows[: self._most] = rows[self._first :]
+            self._times, self._rows = self._times[self._first :], self._most
+        elif self._rows == len(self._signals):
             self._signals = np.concatenate([self._signals, np.empty_like(self._signals)])
             self._others = np.concatenate([self._others, np.empty_like(self._others)])
         self._signals[self._rows] = signals

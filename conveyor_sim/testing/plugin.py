@@ -41,6 +41,7 @@ class Lines:
         overrides: Mapping[str, Any] | None = None,
         *,
         start: str | PathLike[str] | None = None,
+        history: float | None = None,
     ) -> Scenario:
         """A Scenario; arguments and errors as there."""
         from conveyor_sim.testing.scenario import Scenario
@@ -49,7 +50,7 @@ class Lines:
         if self._folder is None:
             self._folder = make_folder(self._place)
         folder = _part(self._folder, len(self.made))
-        scenario = Scenario(scene, overrides, start=start, inputs=folder)
+        scenario = Scenario(scene, overrides, start=start, inputs=folder, history=history)
         self.made.append((scenario, folder))
         return scenario
 

@@ -72,18 +72,21 @@ class Scenario(AbstractContextManager["Scenario"]):
         start: str | PathLike[str] | None = None,
         bag: Path | None = None,
         inputs: Path | None = None,
+        history: float | None = None,
     ) -> None:
         """scene: one that was loaded, a scene file, or the name of a shipped one. overrides: laid over a file's fields.
         start: checkpoint of the same scene to begin from; None: its bottles are as the scene has them.
         bag: folder to record to from the start, new or empty; None: nothing is recorded.
         inputs: folder to write the inputs to as they come, of which `conveyor-sim recover` makes the bag; None: none.
+        history: s of the last signals, commands and alarms to keep, for runs of hours; None: all, from the start.
 
         Raises SceneError for a scene that can't be, CheckpointError for a start that is missing, damaged or of another
         scene, BagError if it can't be recorded, ValueError for overrides of a loaded scene.
         """
         self.scene = scene_of(scene, overrides)
         self.simulation = Simulation(self.scene) if start is None else Simulation.load(start, scene=self.scene)
-        self.history = History(self.simulation.process_image)
+        most = None if history is None else max(self._ticks(history), 1)
+        self.history = History(self.simulation.process_image, most)
         self.failed: Assertion | None = None
         """The condition that failed."""
         self.failure = ""

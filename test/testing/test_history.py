@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from testing.conftest import FEEDER, ON_TABLE, STOP, TAKEN
+from testing.conftest import FEEDER, ON_TABLE, STOP, TABLE, TAKEN
 from testing.test_scenario import Hold
 
 from conveyor_sim.errors import ConveyorError
@@ -67,3 +67,30 @@ def test_names_units_and_types(table: Scenario) -> None:
     assert (history.kind(FEEDER), history.kind(ON_TABLE), history.kind("alarms/full")) == ("number", "count", "bool")
     with pytest.raises(ConveyorError, match="belts/tabel/speed: not in the history, expected one of belts/feeder"):
         history["belts/tabel/speed"]
+
+
+def test_a_long_run_keeps_the_last_seconds_alone() -> None:
+    """What is kept is what a whole history ends with, at any tick, and takes no more room as time goes on."""
+    whole, last = (Scenario(TABLE, history=length) for length in (None, 0.5))
+    with whole, last:
+        for ticks in (20, 29, 1, 1, 48, 51, 100, 333):
+            for table in (whole, last):
+                table.command(SPEED, 0.1 + 1e-4 * ticks)
+                table.run_for(0.01 * ticks)
+            kept = min(len(whole.history), 50)
+            assert len(last.history) == kept
+            np.testing.assert_array_equal(last.history.time, whole.history.time[-kept:])
+            for name in (ON_TABLE, SPEED, STOP):
+                np.testing.assert_array_equal(last.history[name], whole.history[name][-kept:])
+        assert last.history._signals.nbytes < whole.history._signals.nbytes / 5
+        last.attach(Hold(1))
+        last.run_for(1.0)
+        assert len(last.history["alarms/full"]) == 50
+
+
+def test_a_history_of_no_time_keeps_the_present() -> None:
+    with Scenario(TABLE, history=0.0) as table:
+        table.run_for(0.05)
+        assert table.history.time.tolist() == pytest.approx([0.05])
+    with pytest.raises(ValueError, match="expected 0 s or more"):
+        Scenario(TABLE, history=-1.0)
