@@ -90,6 +90,23 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 
 @main.command()
 @click.argument("scene")
+@click.option("--csv", "as_csv", is_flag=True, help="As CSV, with all that is known of each tag.")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def tags(scene: str, as_csv: bool, outside_tables: bool) -> None:
+    """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
+    from conveyor_sim.runs.tags import tag_csv, tag_table
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
+
+    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    if as_csv:
+        click.echo(tag_csv(loaded), nl=False)
+    else:
+        _print(tag_table(loaded))
+
+
+@main.command()
+@click.argument("scene")
 @click.option(
     "--price",
     is_flag=True,

@@ -23,8 +23,9 @@ def pages() -> Iterator[tuple[Path, str]]:
         yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{name}.reference").reference()
     sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test")]
     with_parts = importlib.import_module("page_parts").with_parts
-    tables, page = importlib.import_module("conveyor_sim.bag.reference").tables(), DOCS / "ros.md"
-    yield page, with_parts(page, page.read_text(encoding="utf-8"), tables)
+    for package, name in (("bag", "ros"), ("line", "line")):
+        tables, page = importlib.import_module(f"conveyor_sim.{package}.reference").tables(), DOCS / f"{name}.md"
+        yield page, with_parts(page, page.read_text(encoding="utf-8"), tables)
     accuracy, promises, stability = (importlib.import_module(name) for name in ("accuracy", "promises", "stability"))
     text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
     yield DOCS / "accuracy.md", accuracy.page(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.inputs import CommandOutcome, Input, recorded_input
+from conveyor_sim.line.run_state import RunState
 from conveyor_sim.observe.columns import BottleColumns
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ SIGNALS = "conveyor_msgs/msg/Signals"
 COMMANDS = "conveyor_msgs/msg/Commands"
 LINE = "conveyor_msgs/msg/Line"
 OUTCOME = "conveyor_msgs/msg/CommandOutcome"
+RUN_STATE = "conveyor_msgs/msg/RunState"
 BOOL = "std_msgs/msg/Bool"
 SPEED = "std_msgs/msg/Float64"
 POSES = "geometry_msgs/msg/PoseArray"
@@ -134,6 +137,11 @@ def speed_message(speed: float) -> bytes:
     return writer.finish()
 
 
+def run_state_message(run: RunState, header: Header) -> bytes:
+    """conveyor_msgs/RunState."""
+    return _serialize(RUN_STATE, header, {"state": run.state, "text": run.text, "reason": run.reason})
+
+
 def poses_message(columns: BottleColumns, header: Header) -> bytes:
     """geometry_msgs/PoseArray of the bottles' axes, ordered by id, at the height of the belts (z = 0)."""
     writer = CdrWriter()
@@ -185,5 +193,20 @@ def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
         "versions": list(model.versions),
         "engine_hash": model.engine_hash,
         "machine": model.machine,
+        "where": scene.where,
+        "start_time": scene.start_time,
+        "tag_names": [tag.name for tag in image.tags],
+        "tag_kinds": [tag.kind for tag in image.tags],
+        "tag_roles": [tag.role for tag in image.tags],
+        "tag_units": [tag.unit for tag in image.tags],
+        "tag_unit_codes": [tag.unece.code for tag in image.tags],
+        "tag_min": [tag.low for tag in image.tags],
+        "tag_max": [tag.high for tag in image.tags],
+        "tag_initial": [tag.initial for tag in image.tags],
+        "tag_nominal": [math.nan if tag.nominal is None else tag.nominal for tag in image.tags],
+        "tag_texts": [tag.listed_texts for tag in image.tags],
+        "tag_descriptions": [tag.description for tag in image.tags],
+        "tag_devices": [tag.device for tag in image.tags],
+        "tag_classes": [tag.device_class for tag in image.tags],
     }
     return _serialize(LINE, header, values)

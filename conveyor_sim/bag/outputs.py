@@ -10,6 +10,7 @@ from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
 
 if TYPE_CHECKING:
     from conveyor_sim.line.inputs import CommandOutcome
+    from conveyor_sim.line.run_state import RunState
     from conveyor_sim.simulation import Simulation
     from conveyor_sim.stepping.guard import GuardEvent
 
@@ -34,12 +35,13 @@ class Outputs:
         self._frame_id = frame_id
         self._noticed: list[GuardEvent] = []
         self._eyes: dict[str, bool] = {}
+        self._run: RunState | None = None
 
     def start(self) -> None:
         """Writes what is latched (line, plant) and the state at the present tick."""
         header, now = self._header(self._sim.tick), Snapshot(self._sim, self._run_id)
         for topic in OUTPUTS.values():
-            if topic.state is not None and topic.qos.latched:
+            if topic.state is not None and topic.once:
                 self._hand_out(topic.name, topic, header, topic.state, now)
         self._write_state()
 
@@ -71,6 +73,12 @@ class Outputs:
         """Writes one outcome that belongs to no tick to come."""
         self._hand_out("outcomes", OUTPUTS["outcomes"], self._header(outcome.tick), _itself, outcome)
 
+    def show_run(self, run: RunState) -> None:
+        """Writes what the run is doing, if that has changed."""
+        if run != self._run:
+            self._run = run
+            self._hand_out("run_state", OUTPUTS["run_state"], self._header(self._sim.tick), _itself, run)
+
     def _write_eyes(self) -> None:
         eyes, row = self._sim.line.photo_eyes(), TOPICS["photo_eyes/<eye>"]
         for name, blocked in eyes.items():
@@ -84,7 +92,7 @@ class Outputs:
         self._write_eyes()
         header, now = self._header(self._sim.tick), Snapshot(self._sim, self._run_id)
         for topic in OUTPUTS.values():
-            if topic.state is None or topic.qos.latched:
+            if topic.state is None or topic.once:
                 continue
             if topic.rate is None or self._sim.due(topic.rate):
                 self._hand_out(topic.name, topic, header, topic.state, now)

@@ -16,10 +16,11 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, SimulationError
 from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.files import MB, FileError, read_file
-from conveyor_sim.support.printable import printable
+from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST = 512 * MB
 """Bytes of a file of inputs."""
@@ -91,6 +92,7 @@ def _simulate(
     """Run to the end; where it departs from the states that were noted, in words."""
     outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
     outputs.start()
+    outputs.show_run(RunState(RUNNING))
     total = run.last * simulation.model.tick_ns * 1e-9
     applied: list[Input] = []
     departure = _departure(run, simulation)
@@ -102,6 +104,7 @@ def _simulate(
             simulation.advance()
         except SimulationError as error:
             outputs.after_failure()
+            outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
             expected = run.failed and simulation.tick == run.last
             return departure or ("" if expected else f"the run stops at {simulation.time:.2f} s ({error})")
         outputs.after_tick()
@@ -110,6 +113,7 @@ def _simulate(
             return departure or f"the run goes on after {total:.2f} s, where it stopped"
         if progress is not None:
             progress(simulation.time, total)
+    outputs.show_run(RunState(ENDED))
     return departure
 
 

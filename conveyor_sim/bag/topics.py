@@ -11,10 +11,12 @@ from conveyor_sim.bag import messages
 from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header, Outcome
 from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
+from conveyor_sim.line.run_state import RunState
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.events import EventColumns, event_columns
 from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.scene.marks import marks_of
 
 if TYPE_CHECKING:
@@ -68,7 +70,7 @@ class Topic:
     """In words; "": as its rate says."""
     qos: Qos = DATA
     rate: str | None = None
-    """The key of Scene.outputs whose rate it has; None: latched at the start, or sent when there is something."""
+    """The key of Scene.outputs whose rate it has; None: sent at the start (`once`), or when there is something."""
     state: Callable[[Snapshot], Any] | None = None
     """What it shows of a tick; None: nothing, and no message is sent."""
     events: Callable[[Simulation], Sequence[Any]] | None = None
@@ -81,6 +83,8 @@ class Topic:
     """The same where it is not field by field."""
     recorded: bool = True
     """By default."""
+    once: bool = False
+    """Latched and sent at the start of a run only, though it has a `state`."""
     compare: Compare = NOT_COMPARED
     """By a replay."""
     subscribed: bool = False
@@ -124,6 +128,11 @@ def _contact_name(line: Any, message: Any, index: int) -> str:
     return f"the contact of bottle {message.a[index]} and rail {rail}"
 
 
+def _command_name(line: Any, message: Any, index: int) -> str:
+    names = line.command_names
+    return f"command {names[index]}" if index < len(names) else ""  # of the writers there may be more
+
+
 def _bin_name(line: Any, message: Any, index: int) -> str:
     return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"
 
@@ -138,6 +147,7 @@ _ROWS = (
         "names behind the indices, limits, scene text, seed, versions, time step",
         "once a run, latched",
         LATCHED,
+        once=True,
         state=lambda now: (now.sim, now.run_id),
         write=lambda data, header: messages.line_message(data[0], data[1], header),
     ),
@@ -147,6 +157,7 @@ _ROWS = (
         "belts, rails, directions of travel, and every device that has a place",
         "once a run, latched",
         LATCHED,
+        once=True,
         state=lambda now: (now.sim.model.belt_shapes, now.sim.model.rails_at_rest, marks_of(now.sim.scene)),
         write=lambda data, header: plant_markers(data[0], data[1], data[2], header),
     ),
@@ -270,6 +281,25 @@ _ROWS = (
         state=lambda now: event_columns(now.sim.happened, now.sim.line.happened_so_far),
         columns=EventColumns,
         compare=Compare(lambda line, message, index: f"{message.kind[index]} of {message.name[index]}"),
+    ),
+    Topic(
+        "readback",
+        "conveyor_msgs/msg/ReadBack",
+        "what each command is set to, who set it, and when",
+        "latched, each tick at which something of it changed",
+        LATCHED,
+        state=lambda now: now.sim.line.read_back.changes(),
+        columns=ReadBackColumns,
+        compare=Compare(_command_name, within={"value": 1e-9}),
+    ),
+    Topic(
+        "run_state",
+        "conveyor_msgs/msg/RunState",
+        "what the run is doing: running, paused, lockstep, ended, stopped with the reason, replaying",
+        "latched, when it changes",
+        LATCHED,
+        write=messages.run_state_message,
+        read=lambda message: RunState(int(message.state), message.reason),
     ),
     Topic(
         "photo_eyes/<eye>",

@@ -16,12 +16,16 @@ from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, WRITER_KINDS, CommandOutcome, Input, Operation
 from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.line.read_back import ReadBack
+from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import Adds
+from conveyor_sim.model import build_model
 from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
+from conveyor_sim.state.state import FIRST_SLOTS
 from conveyor_sim.support.printable import SENTENCE, printable
 
 _Outcome = tuple[int, Input, bool, str]
@@ -50,7 +54,9 @@ class Line:
         """Whether any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
         """Whether any device puts bottles onto the line."""
-        self.image = ProcessImage(tuple(tag for device in devices for tag in device.tags))
+        self.image = ProcessImage((*(tag for device in devices for tag in device.tags), *RUN_TAGS))
+        self.read_back = ReadBack(self.image.commands)
+        """What commands are set to, and who set them."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
@@ -143,6 +149,7 @@ class Line:
         for name, value in zip(given.names, given.values, strict=True):
             if name in self._owner:  # not an alarm
                 self._owner[name].command(name, value, now)
+        self.read_back.note(given, now.tick)
 
     def take_outcomes(self) -> list[CommandOutcome]:
         """What became of inputs since the last call, in order."""
@@ -153,6 +160,7 @@ class Line:
         """Apply what was queued and let the devices act before the steps from a tick."""
         self._at(tick)
         self._log.begin()
+        self.read_back.begin()
         pending, self._pending = self._pending, []
         for given in pending:
             reason = self.refusal(given)
@@ -165,6 +173,7 @@ class Line:
             if name := belt.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
                 self._outcomes.append(CommandOutcome(tick, stopped, True, ""))
+                self.read_back.note(stopped, tick)
                 self._log.note(tick, "machine_state", name, 0.0, text="stopped: no command came for its watchdog")
         before = self.now.speeds.tolist()
         for device in self._beginning:
@@ -241,6 +250,8 @@ class Line:
         self.now.bad = set(other.now.bad)
         self._restore_devices(snapshot(other._by_name()))
         restore(self._log, snapshot(other._log))
+        restore(self.read_back, snapshot(other.read_back))
+        self.read_back.wake()
 
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
@@ -252,6 +263,7 @@ class Line:
             "bad": sorted(self.now.bad),
             "devices": snapshot(self._by_name()),
             "log": snapshot(self._log),
+            "read_back": snapshot(self.read_back),
         }
 
     def restore(self, tick: int, memory: dict[str, Any]) -> None:
@@ -268,6 +280,8 @@ class Line:
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
         self._restore_devices(memory["devices"])
         restore(self._log, memory["log"], "line.log")
+        restore(self.read_back, memory["read_back"], "line.read_back")
+        self.read_back.wake()
 
     def _restore_devices(self, memory: Any) -> None:
         restore(self._by_name(), memory, "line.devices")
@@ -290,3 +304,8 @@ class Line:
     def _at(self, tick: int) -> None:
         self.now.tick = tick
         self.now.begin_scan()
+
+
+def image_of(scene: Scene) -> ProcessImage:
+    """The process image of a scene that is not run. Raises SceneError for a scene that can't be."""
+    return Line(scene, State(build_model(scene), FIRST_SLOTS)).image

@@ -63,6 +63,11 @@ class Tag:
         """Its unit in UNECE Recommendation 20."""
         return UNITS[self.unit]
 
+    @property
+    def listed_texts(self) -> str:
+        """Its values with what they stand for: "0 stopped, 4 idle"; empty if it is no enumeration."""
+        return ", ".join(f"{value} {text}" for value, text in self.texts.items())
+
 
 def switch(name: str, role: Role, description: str, initial: float = 0.0, adds_to: Adds = "") -> Tag:
     """A tag that is off (0) or on (1)."""

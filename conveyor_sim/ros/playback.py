@@ -13,9 +13,14 @@ from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.run_state import REPLAYING, RunState
+from conveyor_sim.support.printable import printable
 
 OWN = frozenset({"/clock", "/rosout", "/parameter_events"})
 """What a node that plays back publishes of itself."""
+
+RUN_STATE = "run_state"
+"""The topic that says of a playback that it is one; what was recorded of it is left out."""
 
 WALL_CLOCK = 10**18
 """ns: later log times are dates (from 2001 on), not simulated times."""
@@ -78,10 +83,10 @@ class Playback:
         recorded = [
             Topic(name, kind, qos[name], bag.type_hash(name))
             for name, kind in bag.types.items()
-            if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN
+            if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN and name != RUN_STATE
         ]
         known = {topic.name for topic in recorded}
-        made: list[Topic] = []
+        made = [Topic(RUN_STATE, messages.RUN_STATE, LATCHED, None)]
         if "outcomes" in known:
             made.append(Topic("commands", messages.COMMANDS, EVENTS, None))
             made += [Topic(speed_command(belt), messages.SPEED, EVENTS, None) for belt in bag.line.belts]
@@ -116,7 +121,9 @@ class Playback:
         self._due = self._last_before(after_ns + 1, self._states - now)
         self._stream = self._bag.raw(self._recorded, after_ns + 1)
         self._next = next(self._stream, None)
-        return list(latched.values())
+        header = Header(tick, self._cued_ns, "")
+        replaying = messages.run_state_message(RunState(REPLAYING, printable(self._bag.path)), header)
+        return [*latched.values(), Message(RUN_STATE, replaying)]
 
     def take(self, tick: int) -> Iterator[Message]:
         """What is left up to a tick, in the order of recording."""

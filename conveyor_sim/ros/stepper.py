@@ -11,18 +11,18 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import CommandOutcome, Input
+from conveyor_sim.ros.advance import Advance, refuse
 from conveyor_sim.ros.calls import Calls
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.pacing import Pacer
 from conveyor_sim.ros.reception import Reception
-from conveyor_sim.ros.run_state import Log, State
+from conveyor_sim.ros.run_state import Log, State, run_state_of
 from conveyor_sim.ros.session import Session
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
@@ -30,16 +30,6 @@ from conveyor_sim.support.printable import printable
 T = TypeVar("T")
 IDLE = 0.05  # s of wall time between two looks at the clock publisher while nothing happens
 REST = 1.0  # s of wall time without a tick after which the recording is flushed: no tick will do it
-
-
-@dataclass
-class _Advance:
-    """Ticks that were asked for by number; `paced` ones keep to the real-time factor."""
-
-    target: int
-    paced: bool
-    done: Callable[[], None]
-    failed: Callable[[Exception], None]
 
 
 class Stepper:
@@ -78,7 +68,7 @@ class Stepper:
         self.guard_events = 0
         self.lockstep = Lockstep(lockstep_max_ticks)
         self.pacer = Pacer(real_time_factor, self.session.simulation.model.tick_ns * 1e-9)
-        self._advance: _Advance | None = None
+        self._advance: Advance | None = None
         self._ended = False
         self._last_tick_at: float | None = None  # s of wall time; None once the recording has been flushed since
         self._calls = Calls()
@@ -168,7 +158,7 @@ class Stepper:
             self._fail(error)
             raise
         finally:
-            _refuse(broken_off, reason)
+            refuse(broken_off, reason)
         self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
 
     def save(self, path: Path, folder: Path | None = None) -> None:
@@ -187,7 +177,7 @@ class Stepper:
         broken_off = self._leave(reason)
         self._enter(session)
         self.state = State.PAUSED
-        _refuse(broken_off, reason)
+        refuse(broken_off, reason)
         tick = session.simulation.tick
         self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + _to_bag(session))
         if tick >= session.last_tick:
@@ -203,7 +193,7 @@ class Stepper:
         if tick + ticks > last:
             raise Refused(f"steps: {ticks} given, but the run ends in {last - tick} ticks, at tick {last}")
         future: Future[None] = Future()
-        self._advance = _Advance(
+        self._advance = Advance(
             tick + ticks, paced=False, done=lambda: future.set_result(None), failed=future.set_exception
         )
         return future
@@ -232,14 +222,14 @@ class Stepper:
             outcomes = self.reception.take_kept(simulation.tick)
             answer.set_result(LockstepAnswer.of(simulation, self.run_id, outcomes))
 
-        self._advance = _Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
+        self._advance = Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
 
     def present(self) -> LockstepAnswer:
         """What the simulation is now, without outcomes."""
         return LockstepAnswer.of(self.simulation, self.run_id)
 
-    def _leave(self, reason: str) -> _Advance | None:
+    def _leave(self, reason: str) -> Advance | None:
         """End this run; what it was asked for is to be refused once the next one is there, which the answer names."""
         broken_off, self._advance = self._advance, None
         self.lockstep.clear()
@@ -288,12 +278,16 @@ class Stepper:
             self._abandon("the simulation is shutting down")
             if not self._ended and self.session.simulation.tick > 0:
                 self._log.info(f"stopped, {self.session.account}" + _to_bag(self.session))
+            if not self.standstill:
+                self.failure = "the simulation is shutting down"
+                self._show_run()
             self._close_recording()
             self.reception.give_up(self.session, "the simulation is shutting down")
 
     def _loop(self) -> None:
         while not self._calls.ended:
             self._calls.take()
+            self._show_run()
             now = time.monotonic()
             self._tell_of_arrivals(now)
             wait = self._seconds_to_tick(now)
@@ -362,6 +356,7 @@ class Stepper:
 
     def _end(self) -> None:
         self.state, self._ended = State.PAUSED, True
+        self._show_run()
         self._close_recording()
         self._log.info(f"end of the run, {self.session.account}" + _to_bag(self.session))
 
@@ -372,11 +367,19 @@ class Stepper:
         self.state = State.PAUSED
         self._log.error(f"stopped: {self.failure}" if known else traceback.format_exc())
         self._abandon(f"the simulation has stopped: {self.failure}")
+        self._show_run()
         self._close_recording()
+
+    def _show_run(self) -> None:
+        try:
+            self.session.outputs.show_run(run_state_of(self.state, self.failure, self._ended, self.lockstep.owner))
+        except ConveyorError as error:
+            if not self.failure:
+                self._fail(error)
 
     def _abandon(self, reason: str) -> None:
         advance, self._advance = self._advance, None
-        _refuse(advance, reason)
+        refuse(advance, reason)
 
     def _close_recording(self) -> None:
         try:
@@ -384,11 +387,6 @@ class Stepper:
         except ConveyorError as error:
             self.failure = str(error)
             self._log.error(f"the recording may be incomplete: {error}")
-
-
-def _refuse(advance: _Advance | None, reason: str) -> None:
-    if advance is not None:
-        advance.failed(Refused(reason))
 
 
 def _to_bag(session: Session) -> str:

@@ -14,11 +14,13 @@ from pathlib import Path
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.runs.force_check import PeakWatch
 from conveyor_sim.runs.speed import Spent
 from conveyor_sim.runs.stopped import keep_stopped
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.signals import HandledOnce
 
 
@@ -57,6 +59,7 @@ def run_scene(
     with recorder or nullcontext(), _stop_request() as stop:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()
+        outputs.show_run(RunState(RUNNING))
         peaks = PeakWatch(simulation)
         stepping, start = 0.0, time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
@@ -65,12 +68,15 @@ def run_scene(
                 simulation.advance(1)
             except SimulationError as error:
                 outputs.after_failure()
+                outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
                 raise keep_stopped(simulation, bag, error) from error
             stepping += time.perf_counter() - began
             outputs.after_tick()
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)
+        asked = RunState(STOPPED, "on request") if simulation.tick < scene.duration_ticks else RunState(ENDED)
+        outputs.show_run(asked)
         if recorder is not None:
             recorder.close()
         wall = time.monotonic() - start

@@ -37,8 +37,10 @@ from conveyor_sim.scene.types import (
     Point,
     Positive,
     Seed,
+    StartTime,
     Text,
     Velocity,
+    Where,
     nanoseconds,
     quantity,
 )
@@ -169,6 +171,11 @@ class Scene(Part):
 
     name: Name = quantity("Name of the scene.")
     description: Text = quantity("What it shows.", default="")
+    where: Where = quantity("Where the line is in a plant: area/cell/unit.", default="")
+    start_time: StartTime = quantity(
+        "Date and time that simulated time 0 stands for. Nothing that is simulated depends on it.",
+        default="2000-01-01T00:00:00Z",
+    )
     seed: Seed = quantity("Seed of everything that is drawn at random.", "1", default=0)
     gravity: NotNegative = quantity("Acceleration of gravity g.", "m/s^2", default=9.81)
     duration: Positive = quantity("Simulated time, a whole number of ticks.", "s")

@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
+from datetime import datetime, timezone
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, Len
@@ -57,6 +58,18 @@ def parse_angle(value: Any) -> Any:
         return value
     number = float(match[1])
     return math.radians(number) if match[2] == "deg" else number
+
+
+def parse_start_time(value: Any) -> str:
+    """A date and time as text in UTC, from such a text or what YAML makes of one. Raises ValueError."""
+    if isinstance(value, str):
+        value = datetime.fromisoformat(re.sub(r"[zZ]\Z", "+00:00", value.strip()))
+    if not isinstance(value, datetime) or value.tzinfo is None:
+        raise ValueError("no date and time with a zone")
+    moment = value.astimezone(timezone.utc).replace(tzinfo=None)
+    if not 1970 <= moment.year <= 2099:
+        raise ValueError("out of bounds")
+    return f"{moment.isoformat()}Z"
 
 
 def _sized(value: float) -> float:
@@ -117,6 +130,16 @@ Name = Annotated[
     str,
     StringConstraints(pattern=r"\A[A-Za-z][A-Za-z0-9_]*\z", max_length=100),
     Says("a name of at most 100 letters, digits and underscores, beginning with a letter"),
+]
+Where = Annotated[
+    str,
+    StringConstraints(pattern=r"\A([A-Za-z][A-Za-z0-9_]{0,99}(/[A-Za-z][A-Za-z0-9_]{0,99}){0,2})?\z"),
+    Says("one to three names, area/cell/unit, such as packaging/line_1"),
+]
+StartTime = Annotated[
+    str,
+    BeforeValidator(parse_start_time),
+    Says("a date and time with its zone, from 1970 to 2099, such as 2026-03-01T06:00:00Z"),
 ]
 Pair = Annotated[tuple[Name, Name], Says("two names of materials [one, other]")]
 PointList = Annotated[tuple[Point, ...], Len(2), Holds("a list of two or more points [x, y]")]

@@ -32,7 +32,7 @@ from conveyor_sim.support.printable import printable
 FORMAT = 2
 """Raised by one whenever the layout of the file changes."""
 
-FREE = frozenset({"description", "duration"})
+FREE = frozenset({"description", "duration", "start_time", "where"})
 """Fields of a scene that may differ from those of the checkpoint."""
 
 MOST = 512 * MB

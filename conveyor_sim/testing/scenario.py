@@ -17,8 +17,10 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, ON, AlarmChanges, ControlError, Controller
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.inputs import FAULT, INJECT, SET, Input
+from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing.conditions import Condition, Present, text_of, values
 from conveyor_sim.testing.history import History
@@ -99,6 +101,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         if began is not None:
             forget_past(self.simulation)
         self._outputs.start()
+        self._outputs.show_run(RunState(RUNNING))
         self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
         self._controller: Controller | None = None
         self._node: AttachedNode | None = None
@@ -107,6 +110,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._changes = AlarmChanges()
         self._standing: list[Assertion] = []
         self._signals: dict[str, float] = {}
+        self._stopped = False  # by the guard
         self._look()
         if standing := {f"{ALARMS}{name}": 1.0 for name in sorted(self.simulation.alarms)}:
             self._alarms = self._changes.of(standing)
@@ -119,6 +123,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         """End an attached node, and the recording, if there is one; it can't run on then."""
         self._end_node()
         if self._recorder is not None:
+            if not self._stopped:
+                self._outputs.show_run(RunState(ENDED))
             self._recorder.close()
         if self._inputs is not None:
             self._inputs.close()
@@ -283,8 +289,10 @@ class Scenario(AbstractContextManager["Scenario"]):
             self._inputs.before_tick()
         try:
             self.simulation.advance()
-        except SimulationError:
+        except SimulationError as error:
             self._outputs.after_failure()
+            self._outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
+            self._stopped = True
             if self._inputs is not None:
                 self._inputs.after_failure()
             raise

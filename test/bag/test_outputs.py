@@ -58,6 +58,8 @@ def test_rates_are_those_of_the_scene(scene: Scene) -> None:
     every_other_tick = 21  # 50 Hz, tick 0 included
     assert counts == {
         "line": 1,
+        "readback": 3,
+        "run_state": 0,
         "plant": 1,
         "outcomes": 4,
         "bottles": every_other_tick,
@@ -75,7 +77,8 @@ def test_an_output_that_is_switched_off_is_not_written() -> None:
     scene = load_scene(SMALL_LINE, {"outputs": {"poses": 0, "contacts": 0}})
     sink = Collector(set(OUTPUTS))
     run(scene, [sink], 10)
-    assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - SILENT - {"poses", "markers", "contacts"}
+    off = {"poses", "markers", "contacts", "run_state"}  # the last is said by whoever steps it
+    assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - SILENT - off
 
 
 def test_stamps_are_simulated_time_above_zero_and_never_go_back(scene: Scene) -> None:

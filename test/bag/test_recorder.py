@@ -28,6 +28,7 @@ from conveyor_sim.scene import Scene
 
 COUNTS = {
     "/line": 1,
+    "/readback": 4,
     "/plant": 1,
     "/outcomes": 5,
     "/bottles": 51,

@@ -31,7 +31,15 @@ def test_recording_replays_bit_for_bit(bag: Path) -> None:
     assert report.exact
     assert report.environment == ()
     assert (report.first_tick, report.last_tick) == (0, 100)
-    assert report.compared == {"bottles": 51, "contacts": 51, "belts": 51, "signals": 101, "events": 8, "outcomes": 5}
+    assert report.compared == {
+        "bottles": 51,
+        "contacts": 51,
+        "belts": 51,
+        "signals": 101,
+        "events": 8,
+        "outcomes": 5,
+        "readback": 4,
+    }
     assert told[-1] == pytest.approx(1.0)
 
 

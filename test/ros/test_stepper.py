@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -12,10 +13,17 @@ from conveyor_msgs import srv
 from ros.line_client import LineClient
 
 from conveyor_sim.bag.recover import recover
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import default_distro, typestore
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.line.inputs import CommandOutcome
 from conveyor_sim.ros.calls import MOST_CALLS
 from conveyor_sim.ros.child import Child
-from conveyor_sim.ros.lockstep import Refused
+from conveyor_sim.ros.lockstep import LockstepRequest, Refused
+from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.stepper import Stepper
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
 
 
 def test_so_many_requests_may_wait(stepper: Stepper) -> None:
@@ -67,3 +75,86 @@ def test_a_flood_of_requests_is_refused_and_does_not_hold_up_the_end(
     bags = sorted(tmp_path.glob("bag*"))
     assert len(bags) < 100
     assert recover(bags[-1]).healthy
+
+
+class Watcher:
+    """Takes what is said of the run."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[int, str, str]] = []
+        """Tick, state and reason."""
+
+    def wants(self, topic: str) -> bool:
+        return topic == "run_state"
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        message = typestore().deserialize_cdr(data, TOPICS[topic].type)
+        self.seen.append((int(message.tick), message.text, message.reason))
+
+
+def test_what_the_run_is_doing_is_said_whenever_that_changes() -> None:
+    """Lockstep is a state of its own, so that a line that waits for its controller is not taken for a paused one."""
+    scene, watcher = load_scene(Path(__file__).with_name("small_line.yaml"), {"duration": 0.05}), Watcher()
+    stepper = Stepper(
+        lambda runs, loaded: Session(Simulation(scene), watcher, None, "world", default_distro()),
+        real_time_factor=0.0,
+        playing=False,
+        lockstep_max_ticks=10,
+        beat=lambda stamp_ns, now: None,
+        died=lambda error: None,
+        log=logging.getLogger(__name__),
+    )
+
+    def ask(target: int, release: bool = False) -> None:
+        request = LockstepRequest("plc", target, (), (), release)
+        stepper.call(lambda: stepper.advance_lockstep(request)).result(60.0).result(60.0)
+
+    def end() -> None:
+        stepper.call(stepper.play).result(60.0)
+        deadline = time.monotonic() + 60.0
+        while watcher.seen[-1][1] != "ended" and time.monotonic() < deadline:
+            time.sleep(0.01)
+
+    stepper.start()
+    ask(2)
+    ask(3)
+    ask(4, release=True)
+    end()
+    stepper.call(stepper.stop).result(60.0)
+    stepper.call(stepper.pause).result(60.0)
+    stepper.call(lambda: None).result(60.0)
+    stepper.shutdown()
+    assert watcher.seen == [
+        (0, "paused", ""),
+        (0, "lockstep", "plc"),
+        (3, "paused", ""),  # it releases the run with its last request
+        (4, "running", ""),
+        (5, "ended", ""),
+        (0, "stopped", "reset and stopped on request"),
+        (0, "paused", ""),
+        (0, "stopped", "the simulation is shutting down"),
+    ]
+
+
+def test_a_run_that_cant_go_on_says_why() -> None:
+    scene, watcher = load_scene(Path(__file__).with_name("small_line.yaml")), Watcher()
+
+    class Broken(Session):
+        def tick(self) -> list[CommandOutcome]:
+            raise SimulationError("it broke")
+
+    stepper = Stepper(
+        lambda runs, loaded: Broken(Simulation(scene), watcher, None, "world", default_distro()),
+        real_time_factor=0.0,
+        playing=True,
+        lockstep_max_ticks=10,
+        beat=lambda stamp_ns, now: None,
+        died=lambda error: None,
+        log=logging.getLogger(__name__),
+    )
+    stepper.start()
+    deadline = time.monotonic() + 60.0
+    while len(watcher.seen) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    stepper.shutdown()
+    assert watcher.seen == [(0, "running", ""), (0, "stopped", "it broke")]

@@ -20,6 +20,7 @@ from conveyor_sim.scene import (
 HERE = Path(__file__).parent
 CONFIG = HERE.parents[1] / "config"
 GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")
+SMALLEST = "name: a\nduration: 1\nbottle_types: {b: {radius: 0.1, mass: 2, material: c}}\n"
 SHIPPED = sorted(CONFIG.glob("*.yaml"))
 
 
@@ -230,3 +231,31 @@ def test_a_hexagonal_grid_of_touching_bottles_is_allowed() -> None:
         len(initial_bottles(parse_scene(text.replace("origin: [0.8, 0.3]", "origin: [20, 0.3], angle: 33 deg"))))
         == 1201
     )
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("2026-03-01T06:00:00Z", "2026-03-01T06:00:00Z"),
+        ("'2026-03-01T06:00:00+00:00'", "2026-03-01T06:00:00Z"),
+        ("2026-03-01T07:30:00+01:30", "2026-03-01T06:00:00Z"),
+        ("1970-01-01T00:00:00Z", "1970-01-01T00:00:00Z"),
+    ],
+)
+def test_start_time_is_kept_in_utc(given: str, kept: str) -> None:
+    scene = parse_scene(f"{SMALLEST}start_time: {given}\nwhere: packaging/line_1\n")
+    assert (scene.start_time, scene.where) == (kept, "packaging/line_1")
+    again = parse_scene(SMALLEST, overrides={"start_time": kept})
+    assert parse_scene(SMALLEST, overrides=parse_overrides(again.overrides_text)).start_time == kept
+
+
+@pytest.mark.parametrize("given", ["2026-03-01 06:00:00", "2026-03-01", "17", "1969-12-31T23:00:00Z", "soon", "[]"])
+def test_start_time_that_is_none(given: str) -> None:
+    with pytest.raises(SceneError, match="expected a date and time with its zone, from 1970 to 2099, such as 2026-"):
+        parse_scene(f"{SMALLEST}start_time: {given}\n")
+
+
+@pytest.mark.parametrize("given", ["a/b/c/d", "/a", "a//b", "1a", "a b", "a/", "7", "ü", f"{'a' * 101}"])
+def test_where_that_is_no_path(given: str) -> None:
+    with pytest.raises(SceneError, match=r"where: .* given, expected one to three names, area/cell/unit, such as"):
+        parse_scene(f"{SMALLEST}where: {given}\n")

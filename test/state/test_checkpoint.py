@@ -289,7 +289,7 @@ def with_arrays(path: Path, to: Path, **changes: Any) -> Path:
 
 
 def test_the_same_scene_may_be_given_and_last_longer(saved: Path) -> None:
-    longer = queue(duration=50.0, description="goes on")
+    longer = queue(duration=50.0, description="goes on", start_time="2026-03-01T06:00:00Z", where="hall/line_1")
     loaded = Simulation.load(saved, scene=longer)
     assert loaded.scene is longer
     assert loaded.state_hash() == Simulation.load(saved).state_hash()

@@ -1,0 +1,80 @@
+"""The tables of docs/line.md that list the tags of devices, from a scene that has one of each."""
+
+from collections.abc import Iterator
+
+from conveyor_sim.line.line import image_of
+from conveyor_sim.line.tag import Tag
+from conveyor_sim.scene import parse_scene
+
+EVERYTHING = """
+name: everything
+duration: 1.0
+bottle_types: {bottle: {radius: 0.03, mass: 0.3, material: glass}}
+contacts:
+  - {between: [glass, glass], stiffness: 5000}
+  - {between: [glass, rail], stiffness: 5000}
+base: [{between: [glass, chain], friction: 0.4}]
+belts:
+  b:
+    {kind: straight, start: [0, 0], angle: 0, length: 10, width: 1, material: chain,
+     drive: {acceleration: 1.0, pulses_per_metre: 1000}}
+gates:
+  g:
+    {kind: slide, from: [1, 0], to: [1, 1], direction: 90 deg, stroke: 1, max_speed: 1, acceleration: 5, material: rail}
+pushers:
+  p: {from: [2, 0], to: [3, 0], direction: 90 deg, stroke: 0.5, max_speed: 1, acceleration: 5, material: rail}
+diverters:
+  d: {from: [4, 0], to: [4.5, 0], angle: 45 deg, max_speed: 1, acceleration: 5, material: rail}
+infeeds: {i: {bottle: bottle, position: [0.1, 0.5], direction: 0, speed: 0.5, rate: 1}}
+outfeeds: {o: {region: [[9.5, 0], [10, 0], [10, 1]]}}
+machines:
+  source: {kind: source, bottle: bottle, position: [0.5, 0.2], direction: 0, speed: 0.5, rate: 1}
+  sink: {kind: sink, region: [[9, 0], [9.4, 0], [9.4, 1]], rate: 1}
+  inspection: {kind: inspection, from: [5, 0], to: [5, 1]}
+  reject: {kind: reject, region: [[6, 0], [6.1, 0], [6.1, 1]]}
+spills: {s: {bottle: bottle, position: [7, 0.5], count: 3}}
+photo_eyes: {e: {from: [8, 0], to: [8, 1]}}
+zones: {z: {region: [[8, 0], [8.5, 0], [8.5, 1]], full_at: 3}}
+counters: {c: {from: [8.5, 0], to: [8.5, 1]}}
+indicators: {i: {counter: c, zone: z, belt: b, backup: z, jam_time: 5}}
+"""
+"""A line with one device of each kind, and with all that each may have."""
+
+SECTIONS = {
+    "belts": ("belts",),
+    "feeds": ("infeeds", "outfeeds"),
+    "machines": ("machines",),
+    "movers": ("gates", "pushers", "diverters"),
+    "spills": ("spills",),
+    "photo_eyes": ("photo_eyes",),
+    "zones": ("zones",),
+    "counters": ("counters",),
+    "indicators": ("indicators",),
+    "run": ("run",),
+}
+"""By the part of the page, the fields of a scene whose devices it lists."""
+
+
+def tables() -> dict[str, str]:
+    """By the name of the part of the page that holds it."""
+    tags = image_of(parse_scene(EVERYTHING)).tags
+    return {
+        section: "\n".join(_rows([tag for tag in tags if tag.name.split("/")[0] in fields]))
+        for section, fields in SECTIONS.items()
+    }
+
+
+def _rows(tags: list[Tag]) -> Iterator[str]:
+    yield "| tag | role | kind, unit | at first | what |"
+    yield "|---|---|---|---|---|"
+    for tag in tags:
+        kind = tag.kind if tag.unit == "1" else tag.unit
+        texts = f" {tag.listed_texts}." if tag.texts else ""
+        yield f"| `{_pattern(tag)}` | {tag.role} | {kind} | {tag.initial:g} | {tag.description}{texts} |"
+
+
+def _pattern(tag: Tag) -> str:
+    """Its name with `<name>` for that of the device; machines are named by their kind."""
+    field, _, rest = tag.name.partition("/")
+    device, _, what = rest.partition("/")
+    return f"{field}/<{device}>/{what}" if what else tag.name
