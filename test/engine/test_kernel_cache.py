@@ -2,6 +2,8 @@
 
 import os
 import pickle
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -56,6 +58,25 @@ def flipped(content: bytes, place: float) -> bytes:
 def with_checksum(payload: bytes) -> bytes:
     return MAGIC + _checksum(payload) + payload
 
+
+LOADING = """
+import sys
+from pathlib import Path
+import numba
+import numpy
+from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
+
+def total(values):
+    summed = 0.0
+    for value in values:
+        summed += value
+    return summed
+
+sum_of = numba.njit(total)
+sum_of._cache = KernelCache(total, {}, KernelFolder(Path(sys.argv[1]), ""))
+found = sum_of(numpy.array([1.0, 2.0]))
+print(found, "numba.np.arraymath" in sys.modules, numba.njit(lambda values: values.max())(numpy.array([1.0, 2.0])))
+"""
 
 HEADER = len(MAGIC) + CHECKSUM
 
@@ -141,3 +162,13 @@ def test_what_is_not_cached_is_not_compiled_where_that_is_not_wanted(file: Path)
         with pytest.raises(NotCached, match="twice"):
             compiled(file.parent)(1.5)
     assert counts(compiled(file.parent)) == (0, 1)
+
+
+def test_a_process_that_loads_a_kernel_needs_no_compiler_and_can_compile_another(tmp_path: Path) -> None:
+    """A start that finds all kernels does without numba's tables of what it can compile."""
+    program = tmp_path / "loading.py"
+    program.write_text(LOADING)
+    command = [sys.executable, str(program), str(tmp_path / "kernels")]
+    (tmp_path / "kernels").mkdir()
+    said = [subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout for _ in range(2)]
+    assert said == ["3.0 True 2.0\n", "3.0 False 2.0\n"]

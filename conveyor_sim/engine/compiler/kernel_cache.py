@@ -24,6 +24,7 @@ import llvmlite
 import numba
 from numba.core import compiler, serialize
 from numba.core.caching import _Cache
+from numba.core.runtime.nrt import rtsys
 
 from conveyor_sim.engine.compiler.cache_folder import others_can_write
 
@@ -123,7 +124,8 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code for arguments of these types; None if it is not there. Raises NotCached."""
-        target_context.refresh()
+        # Not all of numba's tables, as numba does here: those are for compiling, which reads them itself.
+        rtsys.initialize(target_context)
         key = self._key(sig, target_context.codegen())
         name = self._name(key)
         payload = self._folder.read(name)
