@@ -39,7 +39,7 @@ COUNTS = {
     "/signals": 101,
     "/events": 8,
 }
-SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events"), 0)
+SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events", "/run_state"), 0)
 """Nothing was to be told, nothing asked for."""
 
 

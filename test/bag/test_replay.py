@@ -12,13 +12,16 @@ from physics.test_force_limits import press
 from rosbags.rosbag2 import StoragePlugin, Writer
 from scenes import NO_OUTPUTS
 
+from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.devices.zone import ZoneDevice
+from conveyor_sim.line.run_state import STOPPED, RunState
 from conveyor_sim.line.tag import count
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import load_scene, parse_scene
@@ -65,6 +68,7 @@ def test_a_recorded_ledger_is_compared_too(tmp_path: Path) -> None:
         ("bottles", "x", 0, 1, "bottle 1"),
         ("signals", "values", 77, 0, "signal belts/straight/speed"),
         ("belts", "actual", 18, 1, "belt turn"),
+        ("readback", "value", 21, 0, "command belts/straight/cmd_speed"),
         ("contacts", "tangential_force", 60, 0, None),
     ],
 )
@@ -97,6 +101,28 @@ def test_changed_command_is_found(bag: Path, tmp_path: Path) -> None:
     difference = replay(edited(bag, tmp_path / "changed", change)).difference
     assert difference is not None
     assert difference.tick == 4
+
+
+def test_what_the_run_was_doing_is_not_compared(bag: Path, tmp_path: Path) -> None:
+    """Of who set a command, who it was is: a replay gives each input in the name of its writer."""
+    folder = tmp_path / "told"
+    with open_bag(bag) as opened, Recorder(folder) as recorder:
+        run = TOPICS["run_state"].pack(RunState(STOPPED, "it was told so"), Header(0, 1, "hall"))
+        for number, (topic, log_time, data) in enumerate(opened.raw()):
+            recorder.write(topic, data, log_time)
+            if number == 0:
+                recorder.write("run_state", run, log_time)
+    assert replay(folder).difference is None
+    with open_bag(folder) as opened:
+        assert [frame.data for frame in opened.read("run_state")] == [RunState(STOPPED, "it was told so")]
+
+    def another(name: str, message: Any) -> None:
+        if name == "readback":
+            message.writers = ["somebody" if writer == "commands" else writer for writer in message.writers]
+
+    difference = replay(edited(bag, tmp_path / "another", another)).difference
+    assert difference is not None
+    assert (difference.topic, difference.field, difference.recorded) == ("readback", "writers", "'somebody'")
 
 
 def test_outcome_that_can_not_be_is_found(bag: Path, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from bag.small_line import SMALL_LINE, SPEED, TURN
 from conveyor_sim.bag import messages as types
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -46,6 +47,7 @@ def record(folder: Path) -> list[bytes]:
     with Recorder(folder) as recorder:
         outputs = Outputs(simulation, [recorder, eye], run_id="run", frame_id="hall")
         outputs.start()
+        outputs.show_run(RunState(RUNNING))
         while simulation.tick < TICKS:
             if simulation.tick in COMMANDS:
                 simulation.command(*COMMANDS[simulation.tick])

@@ -14,6 +14,7 @@ from conveyor_sim.bag import messages as types
 from conveyor_sim.bag.mcap_file import McapFile, Schema
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.errors import BagError
 from conveyor_sim.ros.lockstep import Refused
@@ -68,7 +69,7 @@ def recorded(bag: Bag, after_tick: int = -1) -> list[Message]:
     return [Message(topic, data) for topic, stamp, data in bag.raw() if stamp > after_ns and topic not in LATCHED]
 
 
-LATCHED = {"line", "plant"}
+LATCHED = {"line", "plant", "readback", "run_state"}
 
 
 def write(bag: Bag, folder: Path, messages: list[tuple[str, int]]) -> Path:
@@ -87,8 +88,23 @@ def test_all_is_published_once_in_order_latched_topics_first(bag: Bag) -> None:
     assert {message.topic for message in played.messages} == LATCHED
     played.pass_time(1.0)
     assert played.player.ended
-    assert [message for message in played.take()[2:] if message.topic not in MADE] == recorded(bag)
+    published = [message for message in played.take()[4:] if message.topic not in MADE]
+    assert [message for message in published if message.topic != "readback"] == recorded(bag)
+    later = [Message(topic, data) for topic, stamp, data in bag.raw({"readback"}) if stamp > 1]
+    assert [message for message in published if message.topic == "readback"] == later
+    assert len(later) == 4  # one command was refused; the watchdog has set one
     assert played.clock == [max(1, tick * 10_000_000) for tick in range(TICKS + 1)]
+
+
+def test_it_says_that_it_is_a_recording_and_not_what_the_run_was_doing_then(bag: Bag) -> None:
+    played = Played(bag, 0.0)
+    played.pass_time(1.0)
+    played.player.pause()
+    played.player.seek(0.3)
+    said = [message.data for message in played.take() if message.topic == "run_state"]
+    messages = [typestore().deserialize_cdr(data, TOPICS["run_state"].type) for data in said]
+    assert [(int(one.tick), one.state, one.text) for one in messages] == [(0, 6, "replaying"), (30, 6, "replaying")]
+    assert all(one.reason == str(bag.path) for one in messages)
 
 
 def test_commands_are_made_from_their_outcomes_and_come_before_them(bag: Bag) -> None:
@@ -160,9 +176,9 @@ def test_a_seek_tells_what_is_latched_and_the_state_then_goes_on_from_there(bag:
     played.player.pause()
     played.player.seek(tick * 0.01)
     told = played.take()
-    assert {message.topic for message in told[:2]} == LATCHED
+    assert {message.topic for message in told[:4]} == LATCHED
     state = {
-        message.topic: bag.decode(message.topic, message.data) for message in told[2:] if message.topic not in MADE
+        message.topic: bag.decode(message.topic, message.data) for message in told[4:] if message.topic not in MADE
     }
     assert {topic: state[topic].tick for topic in ("bottles", "contacts", "belts", "signals")} == {
         **dict.fromkeys(("bottles", "contacts", "belts"), tick - tick % 2),
@@ -171,7 +187,7 @@ def test_a_seek_tells_what_is_latched_and_the_state_then_goes_on_from_there(bag:
     assert {"poses", "markers"} < state.keys()
     played.player.resume()
     played.pass_time(1.0)
-    assert [message for message in played.take() if message.topic not in MADE] == recorded(bag, tick)
+    assert [one for one in played.take() if one.topic not in {*MADE, "readback"}] == recorded(bag, tick)
 
 
 def test_a_seek_finds_a_state_that_is_long_past(bag: Bag, tmp_path: Path) -> None:
@@ -224,7 +240,7 @@ def test_topics_outside_the_namespace_stay_there_and_the_clock_is_the_players_ow
         file.finish()
     with open_bag(tmp_path / "bag.mcap") as spaced:
         assert spaced.namespace == "/hall"
-        assert {topic.name for topic in Playback(spaced).topics} == {"line", "belts", "/diagnostics"}
+        assert {topic.name for topic in Playback(spaced).topics} == {"line", "belts", "run_state", "/diagnostics"}
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,16 @@ from bag.small_line import SMALL_LINE
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
+from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.runs.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
+
+
+def told_of_run(bag: Path) -> list[tuple[int, RunState]]:
+    """Ticks, and what the run was doing from them on."""
+    with open_bag(bag) as opened:
+        return [(frame.tick, frame.data) for frame in opened.read("run_state")]
 
 
 def test_run_records_the_whole_duration(tmp_path: Path) -> None:
@@ -26,6 +33,7 @@ def test_run_records_the_whole_duration(tmp_path: Path) -> None:
     report = replay(tmp_path / "run")
     assert report.difference is None
     assert report.last_tick == 100
+    assert told_of_run(tmp_path / "run") == [(0, RunState(RUNNING)), (100, RunState(ENDED))]
 
 
 def test_the_largest_force_is_that_of_the_recording(tmp_path: Path) -> None:
@@ -104,3 +112,4 @@ def test_interrupted_run_ends_with_a_whole_bag(tmp_path: Path, request_: signal.
     report = replay(folder)
     assert report.difference is None
     assert report.last_tick >= 20
+    assert told_of_run(folder) == [(0, RunState(RUNNING)), (report.last_tick, RunState(STOPPED, "on request"))]
