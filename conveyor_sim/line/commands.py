@@ -1,7 +1,7 @@
 """Why commands and faults are refused: by name, value and limits."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.support.printable import printable
@@ -16,13 +16,12 @@ LISTED = 20
 """Names that a refusal lists, of those there are."""
 
 
-def refusal(table: Sequence[Tag], what: str, names: Sequence[str], values: Sequence[float]) -> str:
-    """Why a set of inputs can't be applied, "" if it can. table: those there are; what: the word for one of them."""
+def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: Sequence[float]) -> str:
+    """Why a set of inputs can't be applied, "" if it can. known: those there are; what: the word for one of them."""
     if len(names) != len(values):
         return f"{len(names)} names and {len(values)} values given, expected as many of both"
     if not names:
         return f"no name and no value given, expected at least one {what}"
-    known = {command.name: command for command in table}
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
         if name.startswith(ALARMS) and what == "command":

@@ -58,11 +58,13 @@ class Line:
         self.read_back = ReadBack(self.image.commands)
         """What commands are set to, and who set them."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
+        self._commands = {tag.name: tag for tag in self.image.commands}
+        self._faults = {tag.name: tag for tag in self.image.faults}
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
-            INJECT: Operation(lambda given: refusal(self.image.faults, FAULT, given.names, given.values), self._set),
+            INJECT: Operation(lambda given: refusal(self._faults, FAULT, given.names, given.values), self._set),
         }
         self._surfaces = BeltSurfaces(state)
         self._pending: list[Input] = []
@@ -106,9 +108,9 @@ class Line:
         numbers = tuple([float(value) for value in values])
         if texts:
             texts = tuple(printable(text, SENTENCE) for text in texts)
-        self._pending.append(
-            Input(printable(source), printable(writer), printable(kind), printable(operation), kept, numbers, texts)
-        )
+        source = printable(source)
+        writer = source if writer == source else printable(writer)
+        self._pending.append(Input(source, writer, printable(kind), printable(operation), kept, numbers, texts))
 
     @property
     def waiting(self) -> Sequence[Input]:
@@ -131,7 +133,7 @@ class Line:
 
     def _set_refusal(self, given: Input) -> str:
         names, values = given.names, given.values
-        if reason := refusal(self.image.commands, "command", names, values):
+        if reason := refusal(self._commands, "command", names, values):
             return reason
         for name, value in zip(names, values, strict=True) if self._objecting else ():
             if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):

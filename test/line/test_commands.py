@@ -1,13 +1,14 @@
 """Commands: applied together at the next tick, or refused together with the reason."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from scenes import base, belt, bottle, simulation
 
 from conveyor_sim.line.commands import refusal, shown
-from conveyor_sim.line.tag import count, number, switch
+from conveyor_sim.line.tag import Tag, count, number, switch
 from conveyor_sim.simulation import Simulation
 
 COMMANDS = (
@@ -17,6 +18,10 @@ COMMANDS = (
 OTHERS = (switch("gate/open", "command", "Opens."), count("zone/offset", "fault", "Added.", -9.0, 9.0))
 
 UNKNOWN = "no such command, expected one of belts/one/cmd_speed, belts/two/cmd_speed"
+
+
+def named(tags: Sequence[Tag]) -> dict[str, Tag]:
+    return {tag.name: tag for tag in tags}
 
 
 def two_belts() -> Simulation:
@@ -59,7 +64,7 @@ def test_the_tables_of_the_process_image() -> None:
     ],
 )  # fmt: skip
 def test_switches_and_counts(name: str, value: float, reason: str) -> None:
-    assert refusal(OTHERS, "fault", [name], [value]) == reason
+    assert refusal(named(OTHERS), "fault", [name], [value]) == reason
 
 
 @pytest.mark.parametrize(
@@ -82,7 +87,7 @@ def test_switches_and_counts(name: str, value: float, reason: str) -> None:
 )  # fmt: skip
 def test_what_is_refused_and_why(names: list[str], values: list[float], reason: str) -> None:
     """And the belts keep their speeds, also the one whose own value was good."""
-    assert refusal(COMMANDS, "command", names, values) == reason
+    assert refusal(named(COMMANDS), "command", names, values) == reason
     sim = two_belts()
     if names and names != ["belts/two/cmd_speed"]:
         names, values = ["belts/two/cmd_speed", *names], [0.7, *values]
@@ -99,8 +104,8 @@ def test_what_is_refused_and_why(names: list[str], values: list[float], reason: 
 
 def test_the_limits_themselves_are_accepted() -> None:
     names = [command.name for command in COMMANDS]
-    assert refusal(COMMANDS, "command", names, [command.low for command in COMMANDS]) == ""
-    assert refusal(COMMANDS, "command", names, [command.high for command in COMMANDS]) == ""
+    assert refusal(named(COMMANDS), "command", names, [command.low for command in COMMANDS]) == ""
+    assert refusal(named(COMMANDS), "command", names, [command.high for command in COMMANDS]) == ""
 
 
 def test_a_command_takes_effect_at_the_next_tick_and_says_at_which() -> None:
@@ -141,7 +146,7 @@ def test_without_belts_there_is_nothing_to_command() -> None:
 
 def test_a_refusal_lists_some_of_many_names() -> None:
     many = [switch(f"gates/{index}/open", "command", "Opens.") for index in range(500)]
-    reason = refusal(many, "command", ["gates/500/open"], [1.0])
+    reason = refusal(named(many), "command", ["gates/500/open"], [1.0])
     assert reason.endswith("gates/19/open and 480 others")
 
 
