@@ -2,7 +2,7 @@
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest, ARGS="-m quick" is the inner loop)
 # make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about an hour (ARGS=funnel for one)
-# make promises  sets up the same, then holds all shipped scenes and ten unseen ones to the presets' promises, 5 to 25 minutes
+# make promises  sets up the same, then holds all shipped scenes and fifteen unseen ones to the presets' promises, 5 to 25 minutes
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)
 # make stability  sets up the same, then runs the hard cases of docs/stability.md in all settings, about 15 minutes
 # make lint    style and types

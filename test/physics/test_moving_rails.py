@@ -12,6 +12,7 @@ from scenes import MASS, RADIUS, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.timestep.presets import PRESETS
 
 INTEGRATORS = ("semi_implicit_euler", "velocity_verlet")
 SPEED = 0.5
@@ -105,6 +106,28 @@ def test_a_pusher_carries_the_friction_of_what_it_pushes_and_its_acceleration(in
     assert mean_force(50) == pytest.approx(friction + MASS * acceleration, rel=1e-3)
     sim.advance(60)
     assert mean_force(100) == pytest.approx(friction, rel=1e-3)
+
+
+@pytest.mark.parametrize("preset", ["standard", "fine"])
+@pytest.mark.parametrize("integrator", ["leapfrog", *INTEGRATORS])
+def test_what_a_pusher_presses_with_is_within_the_promise_of_the_preset(integrator: str, preset: Any) -> None:
+    """Resting load at a rail that moves: at constant speed over a floor at rest it bears mu m g."""
+    sim = plant(
+        bottle(RADIUS + 1e-4, 0.0),
+        floor={"friction": 0.4},
+        pushers={"p": pusher("steel", max_speed=0.1, acceleration=1.0)},
+        accuracy={"integrator": integrator, "preset": preset},
+    )
+    sim.command(["pushers/p/push"], [1])
+    sim.advance(150)
+    forces = []
+    for _ in range(100):
+        sim.advance(1)
+        contacts = sim.contacts()
+        forces.append(float(contacts.normal_force[contacts.a == 0].sum()))
+    assert sim.model.prediction.resting is not None
+    assert sim.model.prediction.resting <= PRESETS[preset]
+    assert float(np.mean(forces)) == pytest.approx(0.4 * MASS * 9.81, rel=PRESETS[preset])
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)

@@ -1,8 +1,7 @@
 """Forces at rest, by every integrator, against closed forms: the preset's promise for contacts that stay closed.
 
 On a turn-table that carries a bottle round along a smooth rim nothing slips, so the rim alone bends its way:
-N = m Omega^2 r. The same on a curved lane. A gate that pushes a bottle at constant speed over a belt at rest
-carries mu m g.
+N = m Omega^2 r. The same on a curved lane. test_moving_rails.py has what a rail bears that pushes a bottle.
 """
 
 import math
