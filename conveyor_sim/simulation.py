@@ -29,7 +29,7 @@ from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
 from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
-from conveyor_sim.state.state import FIRST_SLOTS, State
+from conveyor_sim.state.state import FIRST_SLOTS, Held, State
 from conveyor_sim.state.world_arrays import changing_arrays
 from conveyor_sim.stepping.guard import GuardEvent
 from conveyor_sim.stepping.tick import Integration
@@ -137,6 +137,7 @@ class Simulation:
             removed=self._line.removed,
             present=int((self._state.world.bottles.id >= 0).sum()),
             blocked_ticks=self._line.blocked_ticks,
+            held=len(self._state.held),
         )
 
     def advance(self, ticks: int = 1) -> None:
@@ -353,6 +354,7 @@ class Simulation:
         return {
             "tick": self.tick,
             "next_id": self._state.next_id,
+            "held": list(self._state.held.items()),
             "line": self._line.snapshot(),
             "account": None if self._account is None else snapshot(self._account),
             "damage": None if self._damage is None else snapshot(self._damage),
@@ -375,7 +377,10 @@ class Simulation:
                 else:
                     restore(account, memory[name], name)
             self._integration.restore(memory["integration"])
-            self._state.restore(checkpoint.arrays, typed(int, memory["next_id"], "next_id"))
+            held = typed(list[tuple[int, Held]], memory["held"], "held")
+            self._state.restore(checkpoint.arrays, typed(int, memory["next_id"], "next_id"), held)
+            if self._line.held != sorted(self._state.held):
+                raise ValueError("held has other bottles than the stations")
         except (ValueError, MemoryError) as error:
             raise damaged(checkpoint.path, error) from error
 

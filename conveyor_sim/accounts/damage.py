@@ -113,7 +113,8 @@ class DamageAccount:
         slots = np.flatnonzero((column > limit) & (bottles.id >= 0))
         slots = slots[np.argsort(bottles.id[slots])]
         before = self.beyond[kind]
-        self.beyond[kind] = bottles.id[slots].tolist()
+        away = [bottle for bottle in before if bottle in self._state.held]
+        self.beyond[kind] = [*bottles.id[slots].tolist(), *away]
         for slot in slots.tolist():
             # A load that lasts is reported once; each blow is one of its own.
             if kind == "impact_speed" or int(bottles.id[slot]) not in before:

@@ -60,7 +60,7 @@ def simulation_aside(
         {"grid": {"type": kind, "origin": [x + index * apart, y], "rows": PHASES, "columns": 1, "pitch": apart}}
         for index, kind in enumerate(types)
     ]
-    supply = {name: "off" for name, there in (("infeed", scene.entries()), ("outfeed", scene.exits())) if any(there)}
+    supply = {name: "off" for name, there in (("infeed", scene.givers()), ("outfeed", scene.exits())) if any(there)}
     error = FIXED if integrator == "dormand_prince" else None
     placed = {"tick": tick, "duration": tick, "bottles": grids, "floor": "none", "lever_arm": "radius", **fields}
     return variant(scene, Setting(integrator, steps, error=error), effects=supply, **placed)

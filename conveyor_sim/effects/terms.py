@@ -153,7 +153,7 @@ def impact_speed(scene: Scene) -> float:
     and a rail that comes against that.
     """
     speeds = [abs(belt.speed) for belt in scene.belts.values()]
-    speeds += [entry.heading[1] for _, entry in scene.entries()]
+    speeds += [giver.heading[1] for _, giver in scene.givers()]
     given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
     speeds.append(math.hypot(*np.ptp(given, axis=0)))
     rails = [shape.max_speed * shape.fastest_point for shape in moving_shapes(scene)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.support.footing import find_carriers
 from conveyor_sim.line.process_image import of_roles
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.scene.parts.station import BAD
 from conveyor_sim.state import State
 
 
@@ -31,6 +32,8 @@ class ScanContext:
     tick: int = 0
     bad: set[int] = field(default_factory=set)
     """Ids of the bottles that an inspection would object to."""
+    attributes: dict[str, dict[int, float]] = field(default_factory=dict)
+    """What stations have made of bottles, by the name of the attribute, then by id; 0 where nothing is said."""
     _carriers: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _carried: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _counts: list[int] | None = None  # None: nobody has looked since the bottles moved
@@ -40,6 +43,28 @@ class ScanContext:
     def time(self) -> float:
         """Simulated time, s."""
         return self.tick * self.state.model.tick_ns * 1e-9
+
+    def attribute(self, bottle: int, name: str) -> float:
+        """An attribute of a bottle, by its id."""
+        if name == BAD:
+            return float(bottle in self.bad)
+        return self.attributes.get(name, {}).get(bottle, 0.0)
+
+    def set_attribute(self, bottle: int, name: str, value: float) -> None:
+        """Make something of a bottle, by its id."""
+        if name != BAD:
+            self.attributes.setdefault(name, {})[bottle] = value
+        elif value:
+            self.bad.add(bottle)
+        else:
+            self.bad.discard(bottle)
+
+    def forget(self, bottles: Iterable[int]) -> None:
+        """These bottles are gone for good."""
+        self.bad.difference_update(bottles)
+        for values in self.attributes.values():
+            for bottle in bottles:
+                values.pop(bottle, None)
 
     def begin_scan(self) -> None:
         """Forget what was found out about the bottles before."""
@@ -123,6 +148,11 @@ class Device:
 
     def wake(self) -> None:
         """Forget what was only kept to save work: what it remembers was restored."""
+
+    @property
+    def held(self) -> Sequence[int]:
+        """Ids of the bottles that it has taken off the line and will give back."""
+        return ()
 
     def rehearse(self, now: ScanContext) -> None:
         """Call what of the engine it calls in some ticks only; nothing of it stays."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.line.device import ScanContext
+from conveyor_sim.scene.parts.bad import BadBottles
 from conveyor_sim.state import State
 
 CLEAR = 1e-9
@@ -27,12 +28,7 @@ class Entry:
 
     def has_room(self, state: State, x: float, y: float) -> bool:
         """Whether a bottle at (x, y) m would touch no other, nor a rail that moves and stands there now."""
-        bottles = state.world.bottles
-        near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + self.radius - CLEAR) ** 2
-        if bool((near & (bottles.id >= 0)).any()):
-            return False
-        place, moving = np.array([[x, y]]), [piece for rail in state.moving_rails() for piece in rail.pieces]
-        return all(float(piece.distance(place)[0]) >= self.radius - CLEAR for piece in moving)
+        return has_room(state, x, y, self.radius)
 
     def enter(self, state: State, x: float, y: float) -> int:
         """Put a bottle at (x, y) m; return its id."""
@@ -40,12 +36,21 @@ class Entry:
         return state.add(self.kind, x, y, 0.0, vx, vy, 0.0)
 
 
+def has_room(state: State, x: float, y: float, radius: float) -> bool:
+    """Whether a bottle of a radius at (x, y), m, would touch no other, nor a rail that moves and stands there now."""
+    bottles = state.world.bottles
+    near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + radius - CLEAR) ** 2
+    if bool((near & (bottles.id >= 0)).any()):
+        return False
+    place, moving = np.array([[x, y]]), [piece for rail in state.moving_rails() for piece in rail.pieces]
+    return all(float(piece.distance(place)[0]) >= radius - CLEAR for piece in moving)
+
+
 class Quality:
     """Which of the bottles that come from one place are bad."""
 
-    def __init__(self, share: float, every: int | None, random: np.random.Generator) -> None:
-        """share: of them are bad at random; every: so many-th is bad."""
-        self._share, self._every = share, every
+    def __init__(self, part: BadBottles, random: np.random.Generator) -> None:
+        self._share, self._every, self._at = part.bad_share, part.bad_every, frozenset(part.bad_at)
         self.random = random
         self.count = 0
 
@@ -55,6 +60,8 @@ class Quality:
         # Nothing is drawn where it would decide nothing.
         if self._every is not None:
             bad = self.count % self._every == 0
+        elif self._at:
+            bad = self.count in self._at
         else:
             bad = self._share > 0.0 and float(self.random.uniform()) < self._share
         if bad:

@@ -200,6 +200,7 @@ class Line:
             device.take(self.now)
             if removed := self.now.state.take_removed():
                 self._log.note_removed(device, removed, self.now)
+                self.now.forget(removed)
         self.now.begin_scan()
 
     def feed(self) -> None:
@@ -250,6 +251,7 @@ class Line:
         self.now.tick = other.now.tick
         self.now.setpoints[:], self.now.speeds[:] = other.now.setpoints, other.now.speeds
         self.now.bad = set(other.now.bad)
+        self.now.attributes = {name: dict(values) for name, values in other.now.attributes.items()}
         self._restore_devices(snapshot(other._by_name()))
         restore(self._log, snapshot(other._log))
         restore(self.read_back, snapshot(other.read_back))
@@ -263,6 +265,7 @@ class Line:
             "setpoints": self.now.setpoints.tolist(),
             "speeds": self.now.speeds.tolist(),
             "bad": sorted(self.now.bad),
+            "attributes": {name: list(values.items()) for name, values in self.now.attributes.items()},
             "devices": snapshot(self._by_name()),
             "log": snapshot(self._log),
             "read_back": snapshot(self.read_back),
@@ -280,10 +283,17 @@ class Line:
         restore(speeds, {name: memory[name] for name in speeds}, "line")
         self._surfaces.note(self.now.speeds)
         self.now.bad = set(typed(list[int], memory["bad"], "line.bad"))
+        attributes = typed(dict[str, list[tuple[int, float]]], memory["attributes"], "line.attributes")
+        self.now.attributes = {name: dict(values) for name, values in attributes.items()}
         self._restore_devices(memory["devices"])
         restore(self._log, memory["log"], "line.log")
         restore(self.read_back, memory["read_back"], "line.read_back")
         self.read_back.wake()
+
+    @property
+    def held(self) -> list[int]:
+        """Ids of the bottles that devices have taken off the line and will give back, in order."""
+        return sorted(bottle for device in self._devices for bottle in device.held)
 
     def _restore_devices(self, memory: Any) -> None:
         restore(self._by_name(), memory, "line.devices")

@@ -1,7 +1,7 @@
 """The PackML state model: 17 states, ten commands, and which leads from which to which.
 
-Numbers are those of StateCurrent and CntrlCmd in PackML (OPC 30050, Beckhoff Tc3_PackML_V3). Hold is taken not in
-Execute alone but also on the way to and from it and while Suspended, as in OPC 30050: a machine can break down there too.
+Numbers are those of StateCurrent and CntrlCmd in PackML (OPC 30050, Beckhoff Tc3_PackML_V3). As in OPC 30050, Hold is
+taken not in Execute alone but on the way to and from it and while Suspended too: a machine can break down there.
 """
 
 from collections.abc import Collection, Mapping

@@ -30,6 +30,9 @@ outfeeds: {o: {region: [[9.5, 0], [10, 0], [10, 1]]}}
 machines:
   source: {kind: source, bottle: bottle, position: [0.5, 0.2], direction: 0, speed: 0.5, rate: 1}
   sink: {kind: sink, region: [[9, 0], [9.4, 0], [9.4, 1]], rate: 1}
+  station:
+    {kind: station, region: [[3, 0.6], [3.2, 0.6], [3.2, 1]], position: [3.5, 0.8], direction: 0, speed: 0.5, rate: 1,
+     sets: {test: {to: 1}}, tests: {test: {low: 1}}}
   inspection: {kind: inspection, from: [5, 0], to: [5, 1]}
   reject: {kind: reject, region: [[6, 0], [6.1, 0], [6.1, 1]]}
 spills: {s: {bottle: bottle, position: [7, 0.5], count: 3}}

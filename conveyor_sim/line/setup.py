@@ -7,11 +7,15 @@ import numpy as np
 
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.entry import Entry
+from conveyor_sim.line.streams import random_stream
 from conveyor_sim.model import Model
 from conveyor_sim.scene.schema import Scene
 
-JITTER, QUALITY, MACHINES, PHOTO_EYES = (), (1,), (2,), (3,)
-"""Branches of random streams: what infeeds draw of places and of bad bottles, what machines draw, chatter."""
+JITTER, BAD, CHATTER = "jitter", "bad", "chatter"
+"""Purposes of random streams: what infeeds draw of times and places, which bottles are bad, when photo-eyes chatter."""
+
+BRANCHES = {(JITTER, "infeeds"): (), (BAD, "infeeds"): (1,), (BAD, "machines"): (2,), (CHATTER, "photo_eyes"): (3,)}
+"""Of streams before they had names, by purpose and field of the scene: the spawn key before the place in the field."""
 
 D = TypeVar("D", bound=Device)
 
@@ -54,7 +58,10 @@ class Setup:
         diameter = 2.0 * float(self.model.type_radius.min())
         return max(map(abs, shape.speed_limits)) / diameter * max(1, int(shape.width / diameter))
 
-    def random(self, branch: tuple[int, ...], index: int) -> np.random.Generator:
-        """A random stream of its own."""
-        seed = np.random.SeedSequence(self.scene.seed, spawn_key=(*branch, index))
-        return np.random.Generator(np.random.PCG64(seed))
+    def random(self, device: str, purpose: str) -> np.random.Generator:
+        """A random stream of a device's own, for a purpose of its own."""
+        if self.scene.streams_by_index:
+            field, _, name = device.partition("/")
+            key = (*BRANCHES[purpose, field], self.index(field, name))
+            return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self.scene.seed, spawn_key=key)))
+        return random_stream(self.scene.seed, device, purpose)

@@ -100,8 +100,9 @@ def seconds(name: str, role: Role, description: str) -> Tag:
     return number(name, role, description, "s", 0.0, LONGEST)
 
 
-def choice(name: str, role: Role, description: str, texts: Mapping[int, str], initial: int = 0) -> Tag:
+def choice(
+    name: str, role: Role, description: str, texts: Mapping[int, str], initial: int = 0, adds_to: Adds = ""
+) -> Tag:
     """A tag that is one of several states."""
-    return Tag(
-        name, "enumeration", role, description, low=min(texts), high=max(texts), initial=float(initial), texts=texts
-    )
+    low, high = min(texts), max(texts)
+    return Tag(name, "enumeration", role, description, "1", low, high, float(initial), texts=texts, adds_to=adds_to)

@@ -14,3 +14,5 @@ class Counts:
     present: int
     blocked_ticks: int
     """Ticks at which an infeed had a bottle to feed and no room."""
+    held: int = 0
+    """In stations: not on the line, and not removed. fed + at the start = removed + present + held."""

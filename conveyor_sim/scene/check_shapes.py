@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.check_machines import machine_problems
 from conveyor_sim.scene.geometry import (
     Array,
     RailShape,
@@ -19,6 +20,7 @@ from conveyor_sim.scene.geometry import (
 )
 from conveyor_sim.scene.moving import movers_of, moving_shape
 from conveyor_sim.scene.overlaps import near_pieces, overlapping
+from conveyor_sim.scene.parts.device_part import Entry
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.rails import PolylineRail, SegmentRail
 from conveyor_sim.scene.schema import Grid, Scene, Single
@@ -33,7 +35,8 @@ def shape_problems(scene: Scene) -> list[Problem]:
     belts = list(_curved_belts(scene))
     rails = list(_rails(scene))
     wrong = {problem.path[:2] for problem in belts + rails}
-    shapes = _sound_rails(scene, wrong)
+    resting = _sound_rails(scene, wrong)
+    shapes = [*resting, *_sound_moving(scene)]
     groups = list(_groups(scene))
     return [
         *belts,
@@ -42,6 +45,7 @@ def shape_problems(scene: Scene) -> list[Problem]:
         *_in_rails(groups, shapes),
         *_infeeds_in_rails(scene, shapes),
         *_in_each_other(groups),
+        *(() if wrong else machine_problems(scene, resting)),
     ]
 
 
@@ -100,7 +104,7 @@ def _rails(scene: Scene) -> Iterator[Problem]:
 
 
 def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
-    """The rails whose geometry can be, to go on checking with; those that move where they are at first."""
+    """The rails at rest whose geometry can be, to go on checking with."""
     shapes = [
         RailShape(name, rail.material, rail_pieces(rail))
         for name, rail in scene.rails.items()
@@ -109,8 +113,13 @@ def _sound_rails(scene: Scene, wrong: set[Path]) -> list[RailShape]:
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and ("belts", name) not in wrong:
             shapes.extend(rails_of_curved(curved_shape(name, belt), belt))
+    return shapes
+
+
+def _sound_moving(scene: Scene) -> list[RailShape]:
+    """Those that move, where they are at first."""
     moving = [moving_shape(path, mover) for path, mover in movers_of(scene) if not any(mover.shape_problems(path))]
-    return shapes + [shape.shape(shape.first) for shape in moving]
+    return [shape.shape(shape.first) for shape in moving]
 
 
 @dataclass(frozen=True)
@@ -193,13 +202,16 @@ def _in_rails(groups: list[_Group], rails: list[RailShape]) -> Iterator[Problem]
 
 
 def _infeeds_in_rails(scene: Scene, rails: list[RailShape]) -> Iterator[Problem]:
-    feeds = {path: feed for path, feed in scene.entries() if feed.bottle in scene.bottle_types}
-    groups = [
-        _Group((*path, "position"), np.array(feed.births()), scene.bottle_types[feed.bottle].radius)
-        for path, feed in feeds.items()
-    ]
+    radii = {name: kind.radius for name, kind in scene.bottle_types.items()}
+    feeds, groups = [], []
+    for path, feed in scene.givers():
+        # Any bottle may come to what gives others' bottles back.
+        radius = radii.get(feed.bottle) if isinstance(feed, Entry) else max(radii.values())
+        if radius is not None:
+            feeds.append(feed)
+            groups.append(_Group((*path, "position"), np.array(feed.births()), radius))
     for index, rail, _, apart in _inside(_All.of(groups), rails):
-        group, feed = groups[index], list(feeds.values())[index]
+        group, feed = groups[index], feeds[index]
         jitter = ", lateral_jitter included" if len(group.points) > 1 and np.ptp(group.points, axis=0).any() else ""
         yield Problem(
             group.path,

@@ -33,7 +33,7 @@ class FixedTimes(Part):
     """Times that are given."""
 
     kind: Literal["list"] = quantity("The kind of distribution.")
-    times: Annotated[tuple[Positive, ...], Len(1), Holds("a list of times, at least one")] = quantity(
+    times: Annotated[tuple[Positive, ...], Len(1), Holds("a list of numbers greater than 0, at least one")] = quantity(
         "They are taken in order, and from the first one again after the last.", "s"
     )
 
@@ -47,11 +47,14 @@ Times = Annotated[
 """Where times come from."""
 
 
+_Times = Annotated[Times, Holds('a mapping with kind "exponential", "weibull" or "list"')]
+
+
 class Failure(Part):
     """A way in which a machine fails, again and again."""
 
-    between: Times = quantity("From the end of one repair, or the start of the run, to the next failure.")
-    repair: Times = quantity("How long it is down.")
+    between: _Times = quantity("From the end of one repair, or the start of the run, to the next failure.")
+    repair: _Times = quantity("How long it is down.")
     counted: Literal["running", "clock"] = quantity(
         "What `between` counts. running: while it is in Execute, neither starved nor blocked; clock: all the time.",
         default="running",

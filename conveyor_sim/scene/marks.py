@@ -11,5 +11,5 @@ LOOKS: tuple[Look, ...] = get_args(Look)
 
 def marks_of(scene: Scene) -> list[Mark]:
     """Of every device that is drawn by a mark, by look, then in listing order."""
-    found = (part.mark(name) for (_, name), part in scene.devices())
-    return sorted((mark for mark in found if mark is not None), key=lambda mark: LOOKS.index(mark.look))
+    found = (mark for (_, name), part in scene.devices() for mark in part.marks(name))
+    return sorted(found, key=lambda mark: LOOKS.index(mark.look))

@@ -1,8 +1,23 @@
-"""Whether a polygon is simple: no side without length, no two sides that meet."""
+"""Polygons: which points are in them, and whether one is simple: no side without length, no two sides that meet."""
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from conveyor_sim.scene.types import TOUCH, XY
+
+
+def inside(points: NDArray[np.float64], corners: Sequence[XY] | NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether points (k, 2) are in a polygon (even-odd rule); (k,)."""
+    x, y = points.T
+    found = np.zeros(len(points), dtype=bool)
+    ends = np.asarray(corners, dtype=np.float64)
+    for (x1, y1), (x2, y2) in zip(ends.tolist(), np.roll(ends, -1, axis=0).tolist(), strict=True):
+        if y1 != y2:
+            found ^= ((y1 > y) != (y2 > y)) & (x < x1 + (x2 - x1) * (y - y1) / (y2 - y1))
+    return found
 
 
 def why_not_simple(corners: tuple[XY, ...]) -> str | None:

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from conveyor_sim.scene import accuracy, belts, contacts, drives, limits, schema
+from conveyor_sim.scene import accuracy, belts, contacts, drives, failures, limits, schema
+from conveyor_sim.scene.parts import machine, station
 from conveyor_sim.scene.words import expectation, field_names, in_yaml
 
 INTRODUCTION = """\
@@ -56,7 +57,17 @@ WITHIN: dict[str, list[tuple[str, type[BaseModel]]]] = {
 """Sections of fields that are no mappings of names to parts, by field."""
 
 BEHIND: dict[str, list[tuple[str, type[BaseModel]]]] = {
-    "belts": [("`rails` of a curved belt", belts.BeltRails), ("`drive` of a belt", drives.Drive)]
+    "belts": [("`rails` of a curved belt", belts.BeltRails), ("`drive` of a belt", drives.Drive)],
+    "machines": [
+        ("`acting_times` of a machine", machine.ActingTimes),
+        ("An entry of `failures` of a machine", failures.Failure),
+        ("Times of a failure: `kind: exponential`", failures.Exponential),
+        ("Times of a failure: `kind: weibull`", failures.Weibull),
+        ("Times of a failure: `kind: list`", failures.FixedTimes),
+        ("An entry of `planned_stops` of a machine", failures.PlannedStop),
+        ("An entry of `sets` of a station", station.Setting),
+        ("An entry of `tests` of a station", station.Acceptance),
+    ],
 }
 """Sections that follow those of a mapping's parts."""
 

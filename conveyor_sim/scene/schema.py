@@ -18,7 +18,7 @@ from conveyor_sim.scene.limits import Limits as DamageLimits
 from conveyor_sim.scene.machines import Machine
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.parts.counter import Counter
-from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit
+from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit, Giver
 from conveyor_sim.scene.parts.indicator import Indicator
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.scene.parts.movers import Diverter, Gate, Pusher
@@ -150,6 +150,8 @@ class Origin:
     """YAML of what was laid over the text."""
     overrides: str = field(default="", compare=False)
     """The same, and what was read from other files: with the text, it gives the scene again without them."""
+    streams_by_index: bool = False
+    """Random streams are keyed by places in lists: of recordings from before they were keyed by names."""
 
 
 def _bottle_tag(data: Any) -> str:
@@ -239,7 +241,7 @@ class Scene(Part):
     infeeds: Annotated[dict[Name, Infeed], _named("infeeds")] = quantity("Where bottles enter.", default={})
     outfeeds: Annotated[dict[Name, Outfeed], _named("outfeeds")] = quantity("Where bottles leave.", default={})
     machines: Annotated[dict[Name, Machine], _named("machines")] = quantity(
-        "Machines at the line: sources and sinks of bottles, inspections, rejects.", default={}
+        "Machines at the line: sources and sinks of bottles, stations, inspections, rejects.", default={}
     )
     spills: Annotated[dict[Name, Spill], _named("spills")] = quantity(
         "Where a test can have bottles dropped.", default={}
@@ -298,6 +300,10 @@ class Scene(Part):
         """All that bottles come from while it runs, with its path."""
         yield from ((path, part) for path, part in self.devices() if isinstance(part, Entry))
 
+    def givers(self) -> Iterator[tuple[tuple[str, str], Giver]]:
+        """All that puts bottles onto the line while it runs, new ones or not, with its path."""
+        yield from ((path, part) for path, part in self.devices() if isinstance(part, Giver))
+
     def exits(self) -> Iterator[tuple[tuple[str, str], Exit]]:
         """All by which bottles leave, with its path."""
         yield from ((path, part) for path, part in self.devices() if isinstance(part, Exit))
@@ -313,6 +319,11 @@ class Scene(Part):
         """Whether the effect behind an output is forced off."""
         behind: dict[str, EffectName] = {"contacts": "contact_arrays", "ledger": "energy_ledger"}
         return topic in behind and self.effects.get(behind[topic]) == "off"
+
+    @property
+    def streams_by_index(self) -> bool:
+        """Whether random streams are keyed by places in lists, as before they were keyed by the devices' names."""
+        return self._source.streams_by_index
 
     @property
     def source_text(self) -> str:

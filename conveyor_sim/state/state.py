@@ -1,13 +1,14 @@
 """State: the only thing that changes. Slots for bottles, the lists between them, the belts' speeds."""
 
 import heapq
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.contacts import PairSprings
-from conveyor_sim.engine.arrays.damage import bin_columns, slot_columns
+from conveyor_sim.engine.arrays.damage import bin_columns, lasting_columns, slot_columns
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
 from conveyor_sim.engine.arrays.moving import present
 from conveyor_sim.engine.lists.near import drop_near_springs
@@ -23,6 +24,9 @@ from conveyor_sim.state.world_checks import require_sound
 
 FIRST_SLOTS = 16
 
+Held = tuple[int, float, tuple[float, ...]]
+"""Of a bottle that a machine has: its type, its angle (rad), and the loads that it has borne."""
+
 
 class State:
     """Bottles in slots (free ones are reused, ids never), as the arrays of one `World`."""
@@ -34,9 +38,43 @@ class State:
         self.world = empty_world(self.model, max(1, room))
         self._free = list(range(max(1, room)))
         self._removed: list[int] = []
+        self.held: dict[int, Held] = {}
+        """Bottles that machines have taken and will give back, by id: they are not on the line."""
 
     def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
-        """Put a bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot; return its id."""
+        """Put a new bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot; return its id."""
+        self._put(self.next_id, kind, x, y, theta, vx, vy, omega)
+        self.next_id += 1
+        return self.next_id - 1
+
+    def hold(self, slot: int) -> int:
+        """Take the bottle in a slot off the line until it is given back (`give`); return its id."""
+        world = self.world
+        bottle, theta = int(world.bottles.id[slot]), 0.0 if world.spin is None else float(world.spin.theta[slot])
+        loads = tuple(float(column[slot]) for column in self._loads())
+        self.held[bottle] = int(world.bottles.type[slot]), theta, loads
+        self._free_slot(slot)
+        return bottle
+
+    def give(self, bottle: int, x: float, y: float, vx: float, vy: float) -> None:
+        """Put a bottle that was held back at (x, y) m, moving at m/s, with its id and what it has borne.
+
+        KeyError if it is not held.
+        """
+        kind, theta, loads = self.held.pop(bottle)
+        slot = self._put(bottle, kind, x, y, theta, vx, vy, 0.0)
+        for column, load in zip(self._loads(), loads, strict=True):
+            column[slot] = load
+
+    def _loads(self) -> Iterator[NDArray[np.float64]]:
+        """What is kept of a bottle while it is held, by slot."""
+        if self.world.peaks is not None:
+            yield from self.world.peaks
+        if self.world.damage is not None:
+            yield from lasting_columns(self.world.damage)
+
+    def _put(self, bottle: int, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
+        """Put a bottle of an id into the first free slot; return that."""
         if not self._free:
             slots = self.world.bottles.id.size
             # Free slots cost as much as bottles in every loop.
@@ -46,7 +84,7 @@ class State:
         bottles.x[slot], bottles.y[slot] = x, y
         bottles.vx[slot], bottles.vy[slot] = vx, vy
         bottles.type[slot] = kind
-        bottles.id[slot] = self.next_id
+        bottles.id[slot] = bottle
         if self.world.spin is not None:
             self.world.spin.theta[slot], self.world.spin.omega[slot] = theta, omega
         if self.world.static_friction is not None:
@@ -54,13 +92,15 @@ class State:
         self._equip(slice(slot, slot + 1))
         self._note_velocities(slice(slot, slot + 1))
         self.world.neighbourhood.stale[0] = 1
-        self.next_id += 1
-        return self.next_id - 1
+        return slot
 
     def remove(self, slot: int) -> None:
-        """Take the bottle in a slot away; the slot is free and at rest."""
+        """Take the bottle in a slot away for good; the slot is free and at rest."""
+        self._removed.append(int(self.world.bottles.id[slot]))
+        self._free_slot(slot)
+
+    def _free_slot(self, slot: int) -> None:
         world = self.world
-        self._removed.append(int(world.bottles.id[slot]))
         for group in (world.bottles, world.spin, world.peaks, world.ring, world.implicit):
             for name, column in zip(group._fields, group, strict=True) if group is not None else ():
                 if name != "packed":
@@ -92,6 +132,8 @@ class State:
         """
         slots = other.world.bottles.id.size
         self.world, self.next_id = empty_world(self.model, slots), other.next_id
+        none = tuple(0.0 for _ in self._loads())
+        self.held = {bottle: (kind, theta, none) for bottle, (kind, theta, _) in other.held.items()}
         bottles, spin, before = self.world.bottles, self.world.spin, other.world.spin
         for name in ("x", "y", "vx", "vy", "type", "id"):
             getattr(bottles, name)[:] = getattr(other.world.bottles, name)
@@ -108,14 +150,22 @@ class State:
         self._note_velocities(slice(None))
         self.make_lists()
 
-    def restore(self, arrays: Arrays, next_id: int) -> None:
+    def restore(self, arrays: Arrays, next_id: int, held: list[tuple[int, Held]]) -> None:
         """Take the arrays of another State of the same Model for its own (`changing_arrays`), lists included.
 
-        Raises ValueError where they are not those of such a State.
+        held: by id. Raises ValueError where they are not those of such a State.
         """
         world = with_arrays(self.world, arrays)
         require_sound(world, self.model, next_id)
-        self.world, self.next_id = world, next_id
+        self.world, self.next_id, self.held = world, next_id, dict(held)
+        loads = sum(1 for _ in self._loads())
+        sound = all(
+            0 <= bottle < next_id and 0 <= kind < len(self.model.bottle_types) and len(borne) == loads
+            for bottle, (kind, _, borne) in held
+        )
+        there = set(world.bottles.id.tolist())
+        if not sound or len(self.held) < len(held) or not there.isdisjoint(self.held):
+            raise ValueError("held has bottles that can't be, or that are on the line too")
         self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
 
     def _equip(self, slots: "slice | NDArray[np.int64]") -> None:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.scene import Scene
-from conveyor_sim.scene.parts.inspection import Inspection
 from conveyor_sim.scene.parts.reject import Reject
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.parts.source import Source
@@ -55,8 +54,7 @@ def faults_of(scene: Scene) -> Table:
     table = {f"belts/{name}/trip": Input() for name, belt in scene.belts.items() if belt.drive is not None}
     for field, _ in MOVERS:
         table |= {f"{field}/{name}/jammed": Input() for name in getattr(scene, field)}
-    machines = scene.machines.items()
-    table |= {f"machines/{name}/stop": Input() for name, machine in machines if not isinstance(machine, Inspection)}
+    table |= {f"machines/{name}/stop": Input() for name in scene.machines}
     table |= {f"spills/{name}/drop": Input() for name in scene.spills}
     for name in scene.photo_eyes:
         table |= {f"photo_eyes/{name}/{what}": Input() for what in ("stuck_on", "stuck_off")}

@@ -5,40 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import base, belt, contact, segment, simulation
+from line.machine_line import END, line, signals, sink, source
+from scenes import belt
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.simulation import Simulation
-
-END = [[1.75, -0.2], [2.0, -0.2], [2.0, 0.2], [1.75, 0.2]]
-"""Before the rail at the end of the belt."""
-
-
-def source(rate: float = 2.0, **more: Any) -> dict[str, Any]:
-    """At the beginning of the belt."""
-    return {"kind": "source", "bottle": "bottle", "position": [0.0, 0.0], "direction": 0.0, "speed": 0.5,
-            "rate": rate, **more}  # fmt: skip
-
-
-def sink(rate: float = 2.0, **more: Any) -> dict[str, Any]:
-    """At the end of the belt."""
-    return {"kind": "sink", "region": END, "rate": rate, **more}
-
-
-def line(**fields: Any) -> Simulation:
-    """A belt of 2 m at 0.5 m/s in single file, with a rail at its end."""
-    given = {
-        "accuracy": {"per_tick": 50},
-        "base": base(0.4),
-        "contacts": [contact(5e4, damping=("normal", 30.0)), contact(5e4, "steel", damping=("normal", 30.0))],
-        "belts": {"one": belt(0.5, (-0.2, -0.1), 2.2, 0.2)},
-        "rails": {"end": segment((2.0, 0.1), (2.0, -0.1))},
-    }
-    return simulation(**{**given, **fields})
-
-
-def signals(sim: Simulation) -> dict[str, float]:
-    return dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
 
 
 def test_a_source_keeps_its_rate_and_a_sink_takes_in_order() -> None:
@@ -210,6 +181,32 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> N
     assert loaded.take_outcomes() == sim.take_outcomes()
 
 
+def test_bad_bottles_are_those_that_the_scene_numbers() -> None:
+    """From 1 on, as they come; from an infeed and from a source alike."""
+    looking = {"kind": "inspection", "from": [0.3, -0.1], "to": [0.3, 0.1]}
+    feed = {
+        "bottle": "bottle",
+        "position": [0.0, 0.0],
+        "direction": 0.0,
+        "speed": 0.5,
+        "rate": 2.0,
+        "bad_at": [2, 3, 7],
+    }
+    for fields in (
+        {"machines": {"eye": looking}, "infeeds": {"in": feed}},
+        {"machines": {"eye": looking, "in": {"kind": "source", **feed}}},
+    ):
+        sim = line(**fields, outfeeds={"out": {"region": END}})
+        seen = []
+        for _ in range(600):
+            before = signals(sim)
+            sim.advance()
+            now = signals(sim)
+            if now["machines/eye/bad"] > before["machines/eye/bad"]:
+                seen.append(now["machines/eye/count"])
+        assert seen == [2, 3, 7]
+
+
 @pytest.mark.parametrize(
     ("machine", "says"),
     [
@@ -219,7 +216,7 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> N
         (source(bottle="can"), 'machines.it.bottle: "can" given, expected a name from bottle_types: bottle'),
         (sink(region=[[0, 0], [1, 1], [1, 0], [0, 1]]), "expected a simple polygon"),
         ({"kind": "inspection", "from": [0, 0], "to": [0, 0]}, "expected another point than from"),
-        ({"kind": "press"}, 'expected "source", "sink", "inspection" or "reject"'),
+        ({"kind": "press"}, 'expected "source", "sink", "station", "inspection" or "reject"'),
     ],
 )
 def test_what_is_refused_and_why(machine: dict[str, Any], says: str) -> None:

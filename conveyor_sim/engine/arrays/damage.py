@@ -163,6 +163,14 @@ def slot_columns(damage: Damage) -> Iterator[NDArray[Any]]:
         yield from (damage.tipping.mean_x, damage.tipping.mean_y)
 
 
+def lasting_columns(damage: Damage) -> Iterator[F8]:
+    """Every array by slot of what a bottle has borne until now, (S,): it keeps that while a machine has it."""
+    for worst in worst_columns(damage):
+        yield worst.output
+    if damage.scuffing is not None:
+        yield damage.scuffing.work
+
+
 def bin_columns(damage: Damage) -> Iterator[F8]:
     """Every array by bin of rails, (units, B)."""
     if damage.scuffing is not None and damage.scuffing.bins is not None:

@@ -16,6 +16,7 @@ from conveyor_sim.line.devices.reject import RejectDevice
 from conveyor_sim.line.devices.sink import SinkDevice
 from conveyor_sim.line.devices.source import SourceDevice
 from conveyor_sim.line.devices.spill import SpillDevice
+from conveyor_sim.line.devices.station import StationDevice
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.model import Model
@@ -30,6 +31,7 @@ DEVICES: Mapping[str, Callable[[str, Any, Setup], Device]] = {
     "outfeed": OutfeedDevice,
     "source": SourceDevice,
     "sink": SinkDevice,
+    "station": StationDevice,
     "inspection": InspectionDevice,
     "reject": RejectDevice,
     "spill": SpillDevice,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.entry import CLEAR, Quality
-from conveyor_sim.line.setup import JITTER, QUALITY, Setup
+from conveyor_sim.line.setup import BAD, JITTER, Setup
 from conveyor_sim.line.tag import count, switch
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.state import State
@@ -34,10 +34,9 @@ class InfeedDevice(Device):
         )
         self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
         self._radius = self._entry.radius
-        index = setup.index("infeeds", name.rpartition("/")[2])
         self._direction = (math.cos(infeed.direction), math.sin(infeed.direction))
-        self.random = setup.random(JITTER, index)
-        self.quality = Quality(infeed.bad_share, infeed.bad_every, setup.random(QUALITY, index))
+        self.random = setup.random(name, JITTER)
+        self.quality = Quality(infeed, setup.random(name, BAD))
         self.fed = 0
         self.blocked = False
         self.blocked_ticks = 0

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from conveyor_sim.engine.sensors.beams import ROUNDING
 from conveyor_sim.line.beam import Beams, Span
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.setup import PHOTO_EYES, Setup
+from conveyor_sim.line.setup import CHATTER, Setup
 from conveyor_sim.line.tag import count, number, seconds, switch
 from conveyor_sim.line.timer import Edge, Timer
 from conveyor_sim.scene.parts.photo_eye import PhotoEye
@@ -41,7 +41,7 @@ class PhotoEyeDevice(Device):
         )
         self._beams, self._index, self._debounce = beams, index, eye.debounce
         self._quiet = False  # nothing changes before the beam does
-        self.random = setup.random(PHOTO_EYES, index)
+        self.random = setup.random(name, CHATTER)
         self.stuck_on = self.stuck_off = False
         self.chatter = 0.0
         """Hz: full cycles a second."""

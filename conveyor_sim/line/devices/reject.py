@@ -20,6 +20,7 @@ class RejectDevice(Device):
         super().__init__(
             name,
             [
+                switch(f"{name}/running", "status", "It answers to fire, and nobody has stopped it.", 1.0, "state"),
                 count(f"{name}/rejected", "counter", "Bottles thrown out.", adds_to="rejected"),
                 count(f"{name}/rejected_bad", "counter", "Bad bottles thrown out."),
                 count(f"{name}/rejected_good", "counter", "Good bottles thrown out."),
@@ -67,6 +68,10 @@ class RejectDevice(Device):
                 left.append(stroke)
         self.strokes = tuple(left)
 
+    def states(self, now: ScanContext) -> Sequence[float]:
+        """Running."""
+        return (not self.stop,)
+
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Rejected, bad and good ones among them, and strokes that hit nothing."""
-        return self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed
+        """Running, rejected, bad and good ones among them, and strokes that hit nothing."""
+        return not self.stop, self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed

@@ -3,18 +3,15 @@
 from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
-from conveyor_sim.line.machine import MachineDevice
-from conveyor_sim.line.region import Region
+from conveyor_sim.line.devices.taking import TakingDevice
 from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.stop_reason import NONE, STARVED
 from conveyor_sim.line.tag import count, seconds, switch
 from conveyor_sim.scene.parts.sink import Sink
 
 
-class SinkDevice(MachineDevice):
+class SinkDevice(TakingDevice):
     """One sink while it runs. Starved: it would take a bottle, and none is in its region."""
-
-    waiting: tuple[int, ...]
-    """Ids of the bottles in the region, in the order of their arrival."""
 
     def __init__(self, name: str, sink: Sink, setup: Setup) -> None:
         signals = [
@@ -23,39 +20,35 @@ class SinkDevice(MachineDevice):
             switch(f"{name}/starved", "status", "It would take a bottle, and none is there.", adds_to="state"),
             seconds(f"{name}/starved_time", "counter", "For how long in all it was starved."),
         ]
-        super().__init__(name, sink.rate, sink.rate_limit, signals)
-        self._region = Region(sink.region)
-        self.waiting = ()
+        super().__init__(name, sink, setup, signals)
         self.removed = 0
         self.removed_bad = 0
-        self.starved = False
         self.starved_ticks = 0
 
     def take(self, now: ScanContext) -> None:
         """Take the bottle that has waited longest, if one is due."""
-        bottles = now.state.world.bottles
-        slots = self._region.inside(bottles)
-        slot_of = dict(zip(bottles.id[slots].tolist(), slots.tolist(), strict=True))
-        stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
-        if stayed != self.waiting or len(stayed) < len(slot_of):
-            self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
-        due = self.turn(now)
-        self.starved = due and not self.waiting
-        if self.starved:
-            self.starved_ticks += 1
-            self.wait()
-        elif due:
-            first, *others = self.waiting
-            now.state.remove(slot_of[first])
-            self.waiting = tuple(others)
-            self.removed += 1
-            self.removed_bad += first in now.bad
-            self.cycle -= 1.0
+        self.advance(now)
+        slot_of = self.queue(now)
+        cause = NONE
+        if self.turn(now):
+            if not self.waiting:
+                cause = STARVED
+                self.starved_ticks += 1
+                self.wait()
+            elif self.goes_on():
+                first, *others = self.waiting
+                now.state.remove(slot_of[first])
+                self.waiting = tuple(others)
+                self.removed += 1
+                self.removed_bad += first in now.bad
+                self.cycle -= 1.0
+        self.conclude(cause, now)
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """Running, taken, taken_bad, starved, starved_time (s)."""
-        return self.runs, self.removed, self.removed_bad, self.starved, self.starved_ticks * now.length
+        """As its signals are listed."""
+        starved, time = self.cause == STARVED, self.starved_ticks * now.length
+        return self.works, self.removed, self.removed_bad, starved, time, *self.status()
 
     def states(self, now: ScanContext) -> Sequence[float]:
-        """Running and starved."""
-        return self.runs, self.starved
+        """Running, starved, state, category and stop reason."""
+        return self.works, self.cause == STARVED, *self.condition

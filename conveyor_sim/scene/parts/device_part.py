@@ -1,7 +1,7 @@
 """`DevicePart`: what a part of a scene says of itself that becomes a device of the line."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -55,22 +55,21 @@ class DevicePart(Part):
         """What is drawn of it; None: nothing. name: its own."""
         return None
 
+    def marks(self, name: str) -> Sequence[Mark]:
+        """The same, where it may be more than one."""
+        mark = self.mark(name)
+        return () if mark is None else (mark,)
+
     def _mark(self, look: Look, name: str, points: tuple[XY, ...], direction: float = 0.0) -> Mark:
         corners = np.array(points, dtype=np.float64).reshape(-1, 2)
         return Mark(look, self.KIND, name, corners, direction, self.WORD or self.KIND.replace("_", " "))
 
 
-class Entry(DevicePart):
-    """A part that bottles come from; it has the fields `bottle`, their type, and `position`, where they appear."""
+class Giver(DevicePart):
+    """A part that puts bottles onto the line; it has the field `position`, where they appear."""
 
     if TYPE_CHECKING:
-        bottle: str
         position: XY
-
-    @property
-    def most(self) -> int | None:
-        """Bottles that can come from it; None: without end."""
-        return None
 
     @property
     def heading(self) -> tuple[float, float]:
@@ -80,6 +79,18 @@ class Entry(DevicePart):
     def births(self) -> tuple[XY, ...]:
         """Places (m) at which a bottle can appear, those farthest apart among them."""
         return (self.position,)
+
+
+class Entry(Giver):
+    """A part that new bottles come from; it has the field `bottle`, their type."""
+
+    if TYPE_CHECKING:
+        bottle: str
+
+    @property
+    def most(self) -> int | None:
+        """Bottles that can come from it; None: without end."""
+        return None
 
     def mark(self, name: str) -> Mark | None:
         """A triangle where bottles appear."""

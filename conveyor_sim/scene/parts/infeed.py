@@ -4,13 +4,14 @@ import math
 from collections.abc import Iterator
 from typing import ClassVar
 
+from conveyor_sim.scene.parts.bad import BadBottles
 from conveyor_sim.scene.parts.device_part import Entry, Others
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.types import XY, Angle, Count, Name, NotNegative, Point, Positive, Share, quantity
+from conveyor_sim.scene.types import XY, Angle, Count, Name, NotNegative, Point, Positive, quantity
 from conveyor_sim.scene.words import shown
 
 
-class Infeed(Entry):
+class Infeed(BadBottles, Entry):
     """A place where bottles enter, one behind the other."""
 
     KIND: ClassVar[str] = "infeed"
@@ -33,8 +34,6 @@ class Infeed(Entry):
     lateral_jitter: NotNegative = quantity(
         "Each bottle is to the left or right by up to this, drawn evenly from the seed.", "m", default=0.0
     )
-    bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
-    bad_every: Count | None = quantity("Every so many-th bottle is bad.", "1", default=None)
 
     @property
     def most(self) -> int | None:
@@ -57,8 +56,7 @@ class Infeed(Entry):
         if (self.gap is None) == (self.rate is None):
             given = "neither" if self.gap is None else "both"
             yield Problem(path, f"{given} of gap and rate given, expected one of them")
-        if self.bad_share and self.bad_every is not None:
-            yield Problem(path, "both of bad_share and bad_every given, expected at most one of them")
+        yield from self.bad_problems(path)
         if self.rate is not None and self.timing_jitter > 0.5 / self.rate:
             yield Problem(
                 (*path, "timing_jitter"),

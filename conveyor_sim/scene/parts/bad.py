@@ -1,0 +1,28 @@
+"""Which of the bottles that come from one place are bad."""
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from annotated_types import Len
+
+from conveyor_sim.scene.parts.device_part import DevicePart
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.types import Count, Holds, Share, quantity
+from conveyor_sim.scene.words import listed
+
+
+class BadBottles(DevicePart):
+    """A part that bottles come from, some of them bad."""
+
+    bad_share: Share = quantity("Share of bad bottles, drawn at random from the seed.", "1", default=0.0)
+    bad_every: Count | None = quantity("Every so many-th bottle is bad.", "1", default=None)
+    bad_at: Annotated[tuple[Count, ...], Len(0), Holds("a list of whole numbers, 1 or greater")] = quantity(
+        "The bottles that are bad, counted from 1 as they come: `[17, 60]`.", "1", default=()
+    )
+
+    def bad_problems(self, path: Path) -> Iterator[Problem]:
+        """Bad bottles given in more than one way."""
+        ways = {"bad_share": self.bad_share, "bad_every": self.bad_every, "bad_at": self.bad_at}
+        given = [name for name, value in ways.items() if value]
+        if len(given) > 1:
+            yield Problem(path, f"both of {listed(given).replace(' or ', ' and ')} given, expected at most one of them")

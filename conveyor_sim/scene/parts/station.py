@@ -1,0 +1,108 @@
+"""Stations of a scene file: machines that take a bottle, work on it, and give it again."""
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Len
+
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.parts.device_part import Giver, Mark, Others
+from conveyor_sim.scene.parts.machine import TakingPart
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.types import Angle, Count, Holds, Name, NotNegative, Number, Point, Share, quantity
+from conveyor_sim.scene.words import listed, shown
+
+BAD = "bad"
+"""The attribute that inspections, rejects and sinks know: 0 or 1."""
+
+MOST_ATTRIBUTES = 20
+
+
+class Setting(Part):
+    """What a station makes of one attribute of a bottle."""
+
+    to: Number = quantity("Its value, in what unit it may be. Attributes that nobody has set are 0.", "1")
+    deviation: NotNegative = quantity(
+        "Standard deviation of the value, normally distributed, drawn from the seed.", "1", default=0.0
+    )
+    share: Share = quantity("Share of the bottles to which it is done, drawn from the seed.", "1", default=1.0)
+    every: Count | None = quantity("It is done to every so many-th bottle alone.", "1", default=None)
+    at: Annotated[tuple[Count, ...], Len(0), Holds("a list of whole numbers, 1 or greater")] = quantity(
+        "It is done to these bottles alone, counted from 1 as they come.", "1", default=()
+    )
+
+    def problems(self, path: Path, attribute: str) -> Iterator[Problem]:
+        """Ways to choose bottles that exclude each other, and a bottle that is bad by a half."""
+        ways = {"share": self.share < 1.0, "every": self.every is not None, "at": bool(self.at)}
+        given = [name for name, is_given in ways.items() if is_given]
+        if len(given) > 1:
+            yield Problem(path, f"{' and '.join(given)} given, expected at most one of them")
+        if attribute == BAD and (self.to not in (0.0, 1.0) or self.deviation):
+            yield Problem(path, f"{BAD} set to {self.to:g} +- {self.deviation:g}, expected 0 or 1, and no deviation")
+
+
+class Acceptance(Part):
+    """What a station takes for good in one attribute; a bottle that it does not becomes bad."""
+
+    low: Number | None = quantity("Least value. Left out: there is none.", "1", default=None)
+    high: Number | None = quantity("Greatest value. Left out: there is none.", "1", default=None)
+    false_accept: Share = quantity(
+        "Share of the bottles beyond the limits that are taken for good, drawn from the seed.", "1", default=0.0
+    )
+    false_reject: Share = quantity(
+        "Share of the bottles within the limits that are not, drawn from the seed.", "1", default=0.0
+    )
+
+    def problems(self, path: Path) -> Iterator[Problem]:
+        """Limits that nothing, or all, is within."""
+        if self.low is None and self.high is None:
+            yield Problem(path, "neither low nor high given, expected one of them at least")
+        elif self.low is not None and self.high is not None and self.low > self.high:
+            yield Problem((*path, "low"), f"{shown(self.low)} given, expected at most {self.high:g}, as high is")
+
+
+class Station(TakingPart, Giver):
+    """A machine such as a capper, a labeller or a checkweigher: takes a bottle out of a region, keeps it for a cycle of
+    1 / rate, works on it, and puts it back onto the line elsewhere: the same one, with the loads that it has borne.
+
+    Those that wait press on whatever stands at the end of the region: a rail.
+    """
+
+    KIND: ClassVar[str] = "station"
+
+    kind: Literal["station"] = quantity("The kind of machine.")
+    position: Point = quantity("Where it gives a bottle's axis back. Without room there, it is blocked.", "m")
+    direction: Angle = quantity("Direction of the bottle's velocity then.", "rad")
+    speed: NotNegative = quantity("Its speed then, along `direction`.", "m/s")
+    sets: Annotated[
+        dict[Name, Setting],
+        Len(0, MOST_ATTRIBUTES),
+        Holds(f"a mapping of at most {MOST_ATTRIBUTES} names of attributes to settings"),
+    ] = quantity("What it does to attributes of a bottle, by their names: cap, label, fill_level, crooked.", default={})
+    tests: Annotated[
+        dict[Name, Acceptance],
+        Len(0, MOST_ATTRIBUTES),
+        Holds(f"a mapping of at most {MOST_ATTRIBUTES} names of attributes to tests"),
+    ] = quantity("What it looks at, after that; bottles that it finds defective become bad.", default={})
+
+    @property
+    def heading(self) -> tuple[float, float]:
+        """Direction (rad) and speed (m/s) with which bottles come back."""
+        return self.direction, self.speed
+
+    def marks(self, name: str) -> Sequence[Mark]:
+        """Where it takes bottles, and where it gives them."""
+        return self._mark("exit", name, self.region), self._mark("entry", name, (self.position,), self.direction)
+
+    def problems(self, path: Path, others: Others) -> Iterator[Problem]:
+        """What else is wrong with it, with its settings and tests, and tests of what nobody sets."""
+        yield from super().problems(path, others)
+        for name, setting in self.sets.items():
+            yield from setting.problems((*path, "sets", name), name)
+        stations = [machine for machine in others["machines"].values() if isinstance(machine, Station)]
+        known = sorted({BAD, *(name for station in stations for name in station.sets)})
+        for name, test in self.tests.items():
+            yield from test.problems((*path, "tests", name))
+            if name not in known:
+                text = f"no station sets {shown(name)}, expected {listed(known)}"
+                yield Problem((*path, "tests", name), text)
