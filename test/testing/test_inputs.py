@@ -113,7 +113,7 @@ def test_a_run_that_the_guard_stops(tmp_path: Path) -> None:
     assert rerun(tmp_path / "inputs", tmp_path / "made").departure == ""
     made = messages(tmp_path / "made")
     assert made == messages(tmp_path / "bag")
-    assert made[-1][0] == "guard"
+    assert [topic for topic, _, _ in made[-2:]] == ["guard", "run_state"]
 
 
 def test_a_command_that_is_refused(tmp_path: Path) -> None:
@@ -138,7 +138,8 @@ def test_a_file_that_was_cut_short_gives_the_run_up_to_there(tmp_path: Path) -> 
     last = max(json.loads(line).get("tick", 0) for line in text.splitlines()[:-1])
     made = rerun(tmp_path / "inputs", tmp_path / "made")
     assert made.departure == "" and made.end == pytest.approx(last * 0.01)
-    there = messages(tmp_path / "made")
+    *there, end = messages(tmp_path / "made")
+    assert end[0] == "run_state"
     assert there == messages(tmp_path / "bag")[: len(there)]
 
 
