@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -203,7 +202,7 @@ def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
         "tag_min": [tag.low for tag in image.tags],
         "tag_max": [tag.high for tag in image.tags],
         "tag_initial": [tag.initial for tag in image.tags],
-        "tag_nominal": [math.nan if tag.nominal is None else tag.nominal for tag in image.tags],
+        "tag_nominal": [tag.nominal or 0.0 for tag in image.tags],
         "tag_texts": [tag.listed_texts for tag in image.tags],
         "tag_descriptions": [tag.description for tag in image.tags],
         "tag_devices": [tag.device for tag in image.tags],
