@@ -7,7 +7,7 @@ import pytest
 from conveyor_sim.runs.force_check import HARDER
 from conveyor_sim.testing.plugin import Lines
 
-BEYOND = {"buffer_lane", "zoned_line"}
+BEYOND = {"buffer_lane", "two_stations", "zoned_line"}
 """Queues that close up: their scene files say why they press harder than their predicted error rests on."""
 
 
