@@ -331,8 +331,8 @@ class Simulation:
         return None if self._damage is None else self._damage.rail_wear()
 
     def signals(self) -> np.ndarray:
-        """The process image's values, in the order of `process_image.signal_names`; float64."""
-        return self._line.signals()
+        """The process image as controllers read it, in the order of `process_image.signal_names`; float64."""
+        return self._line.signals().values
 
     def state_hash(self) -> int:
         """64 bits over tick, bottles, belts and moving rails: equal if and (all but surely) only if the states are."""

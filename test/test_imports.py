@@ -39,8 +39,8 @@ MAY_IMPORT: Mapping[str, str] = {
     "explain": "effects errors model scene simulation support timestep | rich",
     "plot": "accuracy bag errors line observe scene support | matplotlib numpy",
     "runs": "bag engine errors line model observe plot scene simulation support timestep | click numpy rich",
-    "ros": "bag control errors explain line model runs scene simulation support version | builtin_interfaces click "
-    "conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
+    "ros": "bag control errors explain line model observe runs scene simulation support version | "
+    "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control engine errors line plot ros scene simulation support | numpy pytest",
     "cli": "accuracy bag errors explain model ros runs scene support version | click rich",
 }

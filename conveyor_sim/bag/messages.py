@@ -15,6 +15,7 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.inputs import CommandOutcome, Input, recorded_input
 from conveyor_sim.line.run_state import RunState
 from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.observe.image import NOTHING_FORCED, Image
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -74,9 +75,11 @@ def columns_message(type_name: str, columns: Any, header: Header) -> bytes:
     return _serialize(type_name, header, {**values, **texts})
 
 
-def signals_message(values: NDArray[np.float64], header: Header) -> bytes:
-    """conveyor_msgs/Signals: the process image, in the order of Line.signal_names."""
-    return _serialize(SIGNALS, header, {"values": values})
+def to_image(message: Any) -> Image:
+    """The process image that a Signals message holds; in an older one nothing is forced."""
+    if not hasattr(message, "forced"):
+        return Image(message.values, *NOTHING_FORCED)
+    return Image(message.values, message.forced, message.actual)
 
 
 @dataclass(frozen=True)

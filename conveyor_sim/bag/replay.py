@@ -17,8 +17,10 @@ from conveyor_sim.bag.outputs import forget_past
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
+from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.inputs import ARRIVAL
+from conveyor_sim.observe.image import NOTHING_FORCED, Image
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
@@ -190,8 +192,9 @@ class _Replay:
             tick, time = self._sim.tick, self._bag.time(self._sim.tick)
             return Difference(tick, time, topic, "the number of messages", "1", "0")
         if topic == "signals":
-            state = state[self._signals]
-        replayed = self._bag.decode(topic, row.pack(state, header))
+            state = Image(state.values[self._signals], *NOTHING_FORCED)
+        # By the definition of today: that of the bag may be an older one, with fewer fields.
+        replayed = typestore().deserialize_cdr(row.pack(state, header), row.type)
         return first_difference(topic, self._bag.line, recorded, replayed, exact=self._exact)
 
 

@@ -236,10 +236,9 @@ _ROWS = (
     Topic(
         "signals",
         "conveyor_msgs/msg/Signals",
-        "the process image, in the order of `line`",
+        "the process image, in the order of `line`; which signals are forced",
         rate="signals",
-        state=lambda now: now.sim.signals(),
-        write=messages.signals_message,
+        state=lambda now: now.sim.line.signals(),
         read=lambda message: message.values,
         compare=Compare(lambda line, _, index: f"signal {line.signal_names[index]}", within={"values": 1e-4}),
     ),

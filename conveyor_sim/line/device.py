@@ -146,6 +146,9 @@ class Device:
         """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
         raise NotImplementedError(f"{self.name} takes no commands")
 
+    def take_mode(self, mode: int, now: ScanContext) -> None:
+        """It is in other hands (authority.MODES) from this tick on; commands in force stay."""
+
     def wake(self) -> None:
         """Forget what was only kept to save work: what it remembers was restored."""
 

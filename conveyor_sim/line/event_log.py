@@ -50,6 +50,8 @@ class EventLog:
     def note_outcome(self, outcome: CommandOutcome) -> None:
         """Inputs were applied or refused as a tick began. Alarms command nothing, so they count either way."""
         at, names, values = outcome.tick, outcome.names, outcome.values
+        if outcome.repeated:
+            return
         if not outcome.accepted:
             value = values[0] if len(names) == len(values) == 1 else math.nan
             self.note(at, "command_refused", printable(", ".join(names)), value, text=outcome.reason)

@@ -23,6 +23,21 @@ SET = "set"
 INJECT = "inject"
 """Operation: faults by name."""
 
+MODE = "mode"
+"""Operation: devices by name, and the mode that each gets."""
+
+OWN = "own"
+"""Operation: a controller takes the line; texts: patterns of devices that it leaves to others."""
+
+DISOWN = "disown"
+"""Operation: it gives the line up."""
+
+FORCE = "force"
+"""Operation: signals by name, and what controllers read in place of their values."""
+
+UNFORCE = "unforce"
+"""Operation: signals by name; none: all that are forced."""
+
 FAULT = "fault"
 """Source of faults."""
 
@@ -77,6 +92,12 @@ class CommandOutcome:
     accepted: bool
     reason: str
     """Empty if accepted."""
+    without_control: bool = False
+    """Refused because its writer has no control there: the device is in other hands, or the line has another owner."""
+    part: bool = False
+    """It is what was taken out of an input for that; the rest has an outcome of its own."""
+    repeated: bool = False
+    """Such a refusal was reported before, since hands last changed."""
 
     @property
     def source(self) -> str:

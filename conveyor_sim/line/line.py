@@ -1,12 +1,13 @@
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
 from collections.abc import Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.line.authority import unauthorized
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import ALARMS, MOST_ALARMS, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
@@ -14,7 +15,9 @@ from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
-from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, WRITER_KINDS, CommandOutcome, Input, Operation
+from conveyor_sim.line.forcing import Forcing
+from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, Operation
+from conveyor_sim.line.modes import Modes
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.read_back import ReadBack
 from conveyor_sim.line.run_state import RUN_TAGS
@@ -22,13 +25,14 @@ from conveyor_sim.line.tag import Adds
 from conveyor_sim.model import build_model
 from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.observe.events import Event
+from conveyor_sim.observe.image import Image
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
 from conveyor_sim.state.state import FIRST_SLOTS
 from conveyor_sim.support.printable import SENTENCE, printable
 
-_Outcome = tuple[int, Input, bool, str]
+_Outcome = tuple[int, Input, bool, str, bool, bool, bool]
 
 
 class Line:
@@ -54,7 +58,15 @@ class Line:
         """Whether any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
         """Whether any device puts bottles onto the line."""
-        self.image = ProcessImage((*(tag for device in devices for tag in device.tags), *RUN_TAGS))
+        self._pending: list[Input] = []
+        self._outcomes: list[CommandOutcome] = []
+        self._log = EventLog(devices, self.now)
+        self.modes = Modes(devices, scene.where, lambda: self._pending, self._log.note)
+        """In whose hands devices are, and who owns the line."""
+        tags = (tag for device in devices for tag in device.tags)
+        self.image = ProcessImage((*tags, *self.modes.tags, *RUN_TAGS))
+        self.forcing = Forcing(self.image.signals, self._log.note)
+        """What controllers read otherwise than it is."""
         self.read_back = ReadBack(self.image.commands)
         """What commands are set to, and who set them."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
@@ -65,11 +77,10 @@ class Line:
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
             INJECT: Operation(lambda given: refusal(self._faults, FAULT, given.names, given.values), self._set),
+            **self.modes.operations(),
+            **self.forcing.operations(),
         }
         self._surfaces = BeltSurfaces(state)
-        self._pending: list[Input] = []
-        self._outcomes: list[CommandOutcome] = []
-        self._log = EventLog(devices, self.now)
         self.now.begin_scan()  # which its look at the devices began, before there are bottles
 
     @property
@@ -113,6 +124,11 @@ class Line:
         self._pending.append(Input(source, writer, printable(kind), printable(operation), kept, numbers, texts))
 
     @property
+    def operations(self) -> tuple[str, ...]:
+        """What can be done to it, by name."""
+        return tuple(self._operations)
+
+    @property
     def waiting(self) -> Sequence[Input]:
         """Inputs that wait for the next tick."""
         return tuple(self._pending)
@@ -124,12 +140,10 @@ class Line:
 
     def refusal(self, given: Input) -> str:
         """Why an input can't be applied as the line stands now, "" if it can."""
-        if given.writer_kind not in WRITER_KINDS:
-            return f"{printable(given.writer_kind)}: no such kind of writer, expected one of {', '.join(WRITER_KINDS)}"
-        operation = self._operations.get(given.operation)
-        if operation is None:
-            return f"{printable(given.operation)}: no such operation, expected one of {', '.join(self._operations)}"
-        return operation.refusal(given)
+        if reason := unauthorized(given, self._operations):
+            return reason
+        _, rest, reason = self.modes.divide(given)
+        return reason if rest is None else self._operations[given.operation].refusal(rest)
 
     def _set_refusal(self, given: Input) -> str:
         names, values = given.names, given.values
@@ -165,12 +179,15 @@ class Line:
         self.read_back.begin()
         pending, self._pending = self._pending, []
         for given in pending:
-            reason = self.refusal(given)
-            if not reason:
-                self._operations[given.operation].apply(given, self.now)
-            kept = given._replace(names=shown(given.names)) if reason else given
-            self._outcomes.append(CommandOutcome(tick, kept, not reason, reason))
-            self._log.note_outcome(self._outcomes[-1])
+            foreign, rest, objection = self.modes.divide(given)
+            if foreign is not None:
+                repeated = not self.modes.report(foreign)
+                self._note(CommandOutcome(tick, foreign, False, objection, True, rest is not None, repeated))
+            if rest is not None:
+                reason = self.refusal(rest)
+                if not reason:
+                    self._operations[rest.operation].apply(rest, self.now)
+                self._note(CommandOutcome(tick, rest, not reason, reason))
         for belt in self._belts:
             if name := belt.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
@@ -232,14 +249,18 @@ class Line:
         """Names of the alarms that stand, without what they begin with."""
         return frozenset(name.removeprefix(ALARMS) for name in self._log.alarms)
 
-    def signals(self) -> F8:
+    def signals(self) -> Image:
         """Values of all signals, in the order of the process image."""
         self.now.begin_scan()
-        return np.array([value for device in self._devices for value in device.values(self.now)], dtype=np.float64)
+        values = [value for device in self._devices for value in device.values(self.now)]
+        return self.forcing.image(np.array(values + self.modes.values, dtype=np.float64))
 
     def photo_eyes(self) -> dict[str, bool]:
-        """Whether each photo-eye is blocked, by the device's name."""
-        return {eye.name: eye.blocked for eye in self._eyes}
+        """Whether each photo-eye is blocked, as controllers read it, by the device's name."""
+        eyes = {eye.name: eye.blocked for eye in self._eyes}
+        if self.forcing.forces:
+            return {name: self.forcing.read(f"{name}/blocked", float(on)) != 0.0 for name, on in eyes.items()}
+        return eyes
 
     def carriers(self) -> NDArray[np.int32]:
         """Index of the belt that each slot stands on now, (slots,); -1 for the floor and for free slots."""
@@ -256,12 +277,16 @@ class Line:
         restore(self._log, snapshot(other._log))
         restore(self.read_back, snapshot(other.read_back))
         self.read_back.wake()
+        restore(self.modes, snapshot(other.modes))
+        self.modes.wake()
+        restore(self.forcing, snapshot(other.forcing))
+        self.forcing.wake()
 
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
         return {
             "pending": [tuple(given) for given in self._pending],
-            "outcomes": [(made.tick, tuple(made.input), made.accepted, made.reason) for made in self._outcomes],
+            "outcomes": [tuple(getattr(made, field.name) for field in fields(made)) for made in self._outcomes],
             "setpoints": self.now.setpoints.tolist(),
             "speeds": self.now.speeds.tolist(),
             "bad": sorted(self.now.bad),
@@ -269,6 +294,8 @@ class Line:
             "devices": snapshot(self._by_name()),
             "log": snapshot(self._log),
             "read_back": snapshot(self.read_back),
+            "modes": snapshot(self.modes),
+            "forcing": snapshot(self.forcing),
         }
 
     def restore(self, tick: int, memory: dict[str, Any]) -> None:
@@ -289,6 +316,10 @@ class Line:
         restore(self._log, memory["log"], "line.log")
         restore(self.read_back, memory["read_back"], "line.read_back")
         self.read_back.wake()
+        restore(self.modes, memory["modes"], "line.modes")
+        self.modes.wake()
+        restore(self.forcing, memory["forcing"], "line.forcing")
+        self.forcing.wake()
 
     @property
     def held(self) -> list[int]:
@@ -299,6 +330,12 @@ class Line:
         restore(self._by_name(), memory, "line.devices")
         for device in self._devices:
             device.wake()
+
+    def _note(self, outcome: CommandOutcome) -> None:
+        if not outcome.accepted:
+            outcome = replace(outcome, input=outcome.input._replace(names=shown(outcome.names)))
+        self._outcomes.append(outcome)
+        self._log.note_outcome(outcome)
 
     def _counted(self, *sums_of: Adds) -> dict[str, int]:
         """Sums of the signals that add to something, by the names of the devices that have such."""

@@ -46,14 +46,6 @@ class Command(IntEnum):
     COMPLETE = 10
 
 
-class Mode(IntEnum):
-    """Modes of a machine, as UnitModeCurrent has them: who commands it."""
-
-    PRODUCTION = 1
-    MAINTENANCE = 2
-    MANUAL = 3
-
-
 StateNumber = Literal[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
 """A State as a plain number, as checkpoints keep it."""
 
@@ -103,7 +95,6 @@ COMPLETES: Mapping[State, State] = {
 
 STATE_TEXTS: Mapping[int, str] = {0: "Undefined", **{state: state.name.capitalize() for state in State}}
 COMMAND_TEXTS: Mapping[int, str] = {0: "none", **{command: command.name.capitalize() for command in Command}}
-MODE_TEXTS: Mapping[int, str] = {mode: mode.name.capitalize() for mode in Mode}
 
 
 def objection(command: int, state: int) -> str:

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+from conveyor_sim.line.authority import MAY
+from conveyor_sim.line.inputs import WRITER_KINDS
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scene import parse_scene
@@ -61,10 +63,19 @@ SECTIONS = {
 def tables() -> dict[str, str]:
     """By the name of the part of the page that holds it."""
     tags = image_of(parse_scene(EVERYTHING)).tags
-    return {
+    sections = {
         section: "\n".join(_rows([tag for tag in tags if tag.name.split("/")[0] in fields]))
         for section, fields in SECTIONS.items()
     }
+    return {"authority": "\n".join(_rights()), **sections}
+
+
+def _rights() -> Iterator[str]:
+    kinds = [kind for kind in WRITER_KINDS if kind != "line"]
+    yield f"| operation | {' | '.join(kinds)} | what |"
+    yield "|---|" + "---|" * len(kinds) + "---|"
+    for operation, right in MAY.items():
+        yield f"| `{operation}` | {' | '.join('yes' * (kind in right.writers) for kind in kinds)} | {right.what} |"
 
 
 def _rows(tags: list[Tag]) -> Iterator[str]:

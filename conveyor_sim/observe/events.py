@@ -25,6 +25,10 @@ Kind = Literal[
     "fault_injected",
     "fault_cleared",
     "command_refused",
+    "mode_changed",
+    "owner_changed",
+    "signal_forced",
+    "signal_unforced",
     "limit_passed",
 ]
 
@@ -38,11 +42,13 @@ class Event(NamedTuple):
     kind: str
     """One of Kind."""
     name: str
-    """Of a bottle's event the device; of a machine's state the signal; else the alarm, fault, command or limit."""
+    """Of a bottle's event the device; of a machine's state the signal; else the alarm, fault, command, limit, signal
+    that is forced, device whose mode has changed, or controller that has taken the line or given it up."""
     bottle: int
     """Id; -1: none."""
     value: float
-    """Of the state, fault, alarm, limit or command; of a bottle's event, how many the device has fed or removed."""
+    """Of the state, fault, alarm, limit, command, force or mode; 1 for who takes the line, 0 for who gives it up; of a
+    bottle's event, how many the device has fed or removed."""
     text: str
     """The reason, or a sentence; empty: nothing to add."""
 

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.bag.messages import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
@@ -208,8 +209,9 @@ class Recording:
         shapes = moving_shapes(self.scene)
         names = list(self._bag.line.signal_names)
         columns = [names.index(f"{shape.name}/position") for shape in shapes]
-        frames = list(self._bag.signals()) if shapes else []
-        shares = np.array([frame.data[columns] for frame in frames], dtype=np.float64).reshape(len(frames), len(shapes))
+        frames = list(self._bag.messages("signals")) if shapes else []
+        found = [to_image(frame.data).truth[columns] for frame in frames]
+        shares = np.array(found, dtype=np.float64).reshape(len(frames), len(shapes))
         ticks = np.array([frame.tick for frame in frames], dtype=np.int64)
         return ticks, shares * np.array([shape.stroke for shape in shapes])
 

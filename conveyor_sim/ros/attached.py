@@ -112,8 +112,9 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
                 self._require_going_on(inputs, time.monotonic() > end)
         request = turns.request
         self.writer = request.run_id
-        given = request.names or request.values
-        if given and (reason := turns.simulation.refusal(request.input)):
+        # What it has no control of is refused as the tick begins, and is no error of the controller.
+        _, given, _ = turns.simulation.line.modes.divide(request.input)
+        if given and (given.names or given.values) and (reason := turns.simulation.refusal(given)):
             raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
         return dict(zip(request.names, request.values, strict=True))
 

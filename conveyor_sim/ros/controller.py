@@ -102,6 +102,7 @@ class ControllerRun:
         log = self._node.get_logger()
         self._find(self._lockstep.is_ready)
         line, tick, last, values = None, 0, 0, list[float]()
+        refusals = set[str]()
         while line is None or tick < last:
             if self._line is not line:  # at the start, and after a reset
                 line = self._line
@@ -122,9 +123,9 @@ class ControllerRun:
                 continue
             if not response.accepted:
                 raise ConveyorError(f"lockstep to tick {target} refused: {response.reason}")
-            for outcome in response.outcomes:
-                if not outcome.accepted:
-                    log.warning(f"{printable(', '.join(outcome.names))} refused: {printable(outcome.reason, SENTENCE)}")
+            before, refusals = refusals, {_refusal(outcome) for outcome in response.outcomes if not outcome.accepted}
+            for refusal in sorted(refusals - before):  # at every scan, for as long as an operator holds a device
+                log.warning(refusal)
             tick, values = response.tick, response.signals.values
         log.info(f"ends at tick {tick}")
 
@@ -225,6 +226,10 @@ class _FreeScans:
 def _alarms(answer: Mapping[str, float]) -> dict[str, bool]:
     """Alarms by their texts."""
     return {name.removeprefix(ALARMS): value != 0.0 for name, value in answer.items() if name.startswith(ALARMS)}
+
+
+def _refusal(outcome: Any) -> str:
+    return f"{printable(', '.join(outcome.names))} refused: {printable(outcome.reason, SENTENCE)}"
 
 
 def _last_tick(line: Any) -> int:

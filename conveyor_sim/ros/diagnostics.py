@@ -75,6 +75,7 @@ class Diagnostics:
             "received commands": counts_in.received,
             "applied commands": reception.applied,
             "refused commands": refusals,
+            "refusals for want of control": reception.without_control,
             "lost commands": counts_in.lost,
             "waiting commands": counts_in.waiting,
             "waiting commands (bytes)": counts_in.waiting_bytes,

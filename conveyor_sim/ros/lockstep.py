@@ -12,11 +12,9 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import SET, CommandOutcome, Input
+from conveyor_sim.observe.image import Image
 from conveyor_sim.support.printable import MOST, printable
 
 if TYPE_CHECKING:
@@ -63,7 +61,7 @@ class LockstepAnswer:
     sim_run_id: str
     tick: int
     stamp_ns: int
-    signals: npt.NDArray[np.float64]
+    signals: Image
     state_hash: int
     outcomes: tuple[CommandOutcome, ...]  # since the last answer
 
@@ -71,7 +69,7 @@ class LockstepAnswer:
     def of(simulation: Simulation, run: str, outcomes: tuple[CommandOutcome, ...] = ()) -> LockstepAnswer:
         """What a simulation is now, in a run (Line.run_id)."""
         return LockstepAnswer(
-            run, simulation.tick, simulation.stamp_ns, simulation.signals(), simulation.state_hash(), outcomes
+            run, simulation.tick, simulation.stamp_ns, simulation.line.signals(), simulation.state_hash(), outcomes
         )
 
 

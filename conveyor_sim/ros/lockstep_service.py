@@ -141,7 +141,10 @@ class LockstepService:
         response.signals.header.stamp = response.time
         response.signals.header.frame_id = self._frame_id
         response.signals.tick = answer.tick
-        response.signals.values = _doubles(answer.signals)
+        response.signals.values = _doubles(answer.signals.values)
+        if len(answer.signals.forced):
+            response.signals.forced = array.array("I", answer.signals.forced.tolist())
+            response.signals.actual = _doubles(answer.signals.actual)
         response.state_hash = answer.state_hash
         tick_ns = self._stepper.simulation.model.tick_ns
         response.outcomes = [_outcome(outcome, tick_ns, self._frame_id) for outcome in answer.outcomes]

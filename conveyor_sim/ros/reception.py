@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conveyor_sim.line.inputs import INJECT, CommandOutcome, Input, arrival
+from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, CommandOutcome, Input, arrival
 from conveyor_sim.ros.inbox import Inbox, size_of
 from conveyor_sim.ros.session import Session
 
@@ -24,7 +24,10 @@ class Reception:
         self._warn = warn
         self.applied = 0
         self.refused = 0
-        """Of those that reached the queue."""
+        """Of those that reached the queue, wholly."""
+        self.without_control = 0
+        """Refused because the device was in other hands or the line had another owner, wholly or in part."""
+        self._unmentioned = 0  # of these, since hands last changed
         self._handed = self._handed_bytes = 0
         self._kept: list[CommandOutcome] = []
         self._dropped = 0  # of those that would have been kept
@@ -40,7 +43,7 @@ class Reception:
 
     def refuse(self, session: Session, given: Input, reason: str) -> None:
         """Refuse an input for which there is no tick."""
-        self.refused += given.operation != INJECT
+        self.refused += given.operation == SET
         self._log(f"{given.source} refused since {reason}")
         session.refuse(given, reason)
 
@@ -48,7 +51,7 @@ class Reception:
         """Another run: what waits in it came from a checkpoint."""
         waiting = session.simulation.waiting
         for given in waiting:
-            if given.operation != INJECT:
+            if given.operation == SET:
                 self._inbox.receive()
         self._handed = len(waiting)
         self._handed_bytes = sum(size_of(given.names, given.values) for given in waiting)
@@ -59,9 +62,10 @@ class Reception:
         self._release()
         for outcome in outcomes:
             if not outcome.accepted:
-                self.refused += outcome.operation != INJECT
-                self._log(f"{outcome.source} refused at tick {outcome.tick}: {outcome.reason}")
-            elif outcome.operation != INJECT and not outcome.input.by_line:
+                self._count_refusal(outcome)
+            elif outcome.operation in (MODE, OWN, DISOWN):
+                self._mention()
+            elif outcome.operation == SET and not outcome.input.by_line:
                 self.applied += 1
 
     def give_up(self, session: Session, reason: str) -> None:
@@ -104,6 +108,20 @@ class Reception:
     def _release(self) -> None:
         self._inbox.release(self._handed, self._handed_bytes)
         self._handed = self._handed_bytes = 0
+
+    def _count_refusal(self, outcome: CommandOutcome) -> None:
+        self.refused += outcome.operation == SET and not outcome.part
+        self.without_control += outcome.without_control
+        if outcome.repeated:  # each scan of a controller, for as long as an operator holds a device
+            self._unmentioned += 1
+        else:
+            self._log(f"{outcome.source} refused at tick {outcome.tick}: {outcome.reason}")
+
+    def _mention(self) -> None:
+        """Hands have changed."""
+        if self._unmentioned:
+            self._warn(f"{self._unmentioned} more commands were refused for want of control; each outcome says why")
+            self._unmentioned = 0
 
     def _log(self, line: str) -> None:
         self._lines += 1

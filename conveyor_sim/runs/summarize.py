@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.bag.messages import to_image
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import TOPICS
@@ -75,7 +76,7 @@ class _Tally:
             self._forces.append(read.peak_force[read.peak_force > 0.0])
             self._unknown = self._unknown or bool(np.isnan(read.peak_force).any())
         elif topic == "signals":
-            self._signals = read
+            self._signals = to_image(message).truth
         elif topic == "guard":
             self._guard.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif topic == "damage":

@@ -16,6 +16,7 @@ from conveyor_sim.line.inputs import CommandOutcome, Input
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.events import Event, event_columns
+from conveyor_sim.observe.image import NOTHING_FORCED, Image
 from conveyor_sim.observe.ledger import balance
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -34,13 +35,14 @@ BORNE = DamageColumns(
     np.arange(4, dtype=np.uint64), np.zeros(4, np.uint16), *np.append(np.arange(31.0), math.nan).reshape(8, 4)
 )
 WEAR = RailWearColumns(np.arange(3, dtype=np.uint32), *np.arange(15.0).reshape(5, 3))
+IMAGE = Image(np.array([1.0, math.nan]), np.array([1], dtype=np.uint32), np.array([-0.5]))
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "bottles": (TOPICS["bottles"].type, lambda: TOPICS["bottles"].pack(bottles(5), HEADER)),
     "no bottles": (TOPICS["bottles"].type, lambda: TOPICS["bottles"].pack(bottles(0), HEADER)),
     "contacts": (TOPICS["contacts"].type, lambda: TOPICS["contacts"].pack(contacts(3), HEADER)),
     "no contacts": (TOPICS["contacts"].type, lambda: TOPICS["contacts"].pack(contacts(0), HEADER)),
     "belts": (TOPICS["belts"].type, lambda: TOPICS["belts"].pack(BeltColumns(np.arange(2.0), np.arange(2.0)), HEADER)),
-    "signals": (TOPICS["signals"].type, lambda: TOPICS["signals"].pack(np.array([1.0, math.nan]), HEADER)),
+    "signals": (TOPICS["signals"].type, lambda: TOPICS["signals"].pack(IMAGE, HEADER)),
     "ledger": (TOPICS["ledger"].type, lambda: TOPICS["ledger"].pack(LEDGER, HEADER)),
     "bool": (messages.BOOL, lambda: messages.bool_message(True, HEADER)),
     "damage": (TOPICS["damage"].type, lambda: TOPICS["damage"].pack(BORNE, HEADER)),
@@ -122,7 +124,7 @@ def test_pose_is_position_and_turn_about_the_vertical() -> None:
 
 def test_columns_of_another_type_or_layout_are_converted() -> None:
     """rosbags alone would copy an int64 array's bytes as if they were doubles, and refuse a strided one."""
-    data = TOPICS["signals"].pack(np.arange(6)[::2], HEADER)  # type: ignore[arg-type]
+    data = TOPICS["signals"].pack(Image(np.arange(6)[::2], *NOTHING_FORCED), HEADER)  # type: ignore[arg-type]
     assert typestore().deserialize_cdr(data, TOPICS["signals"].type).values.tolist() == [0.0, 2.0, 4.0]  # type: ignore[attr-defined]
 
 

@@ -49,6 +49,8 @@ def test_the_tables_of_the_process_image() -> None:
         ("belts/one/bottles", "1", "count"),
         ("belts/two/speed", "m/s", "number"),
         ("belts/two/bottles", "1", "count"),
+        ("belts/one/mode", "1", "enumeration"),
+        ("belts/two/mode", "1", "enumeration"),
     ]
     assert image.faults == ()
 

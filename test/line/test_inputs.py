@@ -29,7 +29,7 @@ def two_drives(watchdog: float | None = None) -> Simulation:
 
 def setting(writer: str, *given: tuple[str, float]) -> Input:
     names, values = zip(*given, strict=True)
-    return Input("commands", writer, "operator", SET, names, values)
+    return Input("commands", writer, "test", SET, names, values)
 
 
 def test_inputs_of_a_tick_are_taken_in_the_order_in_which_they_were_given() -> None:

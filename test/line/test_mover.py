@@ -23,7 +23,7 @@ def alone(*bottles: dict[str, Any], **more: Any) -> Simulation:
 def seen(sim: Simulation, name: str) -> tuple[float, ...]:
     """Position and both end switches."""
     signals = dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
-    position, home, away, _ = (value for signal, value in signals.items() if signal.startswith(f"{name}/"))
+    position, home, away, *_ = (value for signal, value in signals.items() if signal.startswith(f"{name}/"))
     return position, home, away
 
 
@@ -32,6 +32,7 @@ def test_the_process_image_has_them() -> None:
     assert tuple(name for name in image.signal_names if not name.startswith("belts/")) == (
         "gates/g/position", "gates/g/is_closed", "gates/g/is_open", "gates/g/blocked",
         "pushers/p/position", "pushers/p/retracted", "pushers/p/extended", "pushers/p/blocked",
+        "gates/g/mode", "pushers/p/mode",
     )  # fmt: skip
     assert image.command_names[1:] == ("gates/g/open", "pushers/p/push")
     assert image.fault_names == ("gates/g/jammed", "pushers/p/jammed")

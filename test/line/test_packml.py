@@ -5,7 +5,6 @@ import pytest
 from conveyor_sim.line.packml import (
     COMMAND_TEXTS,
     COMPLETES,
-    MODE_TEXTS,
     STATE_TEXTS,
     TO,
     Command,
@@ -50,7 +49,6 @@ def numbered(text: str) -> dict[int, str]:
 def test_the_numbers_are_those_of_packml() -> None:
     assert dict(STATE_TEXTS) == numbered(NUMBERS)
     assert dict(COMMAND_TEXTS) == numbered(COMMANDS)
-    assert dict(MODE_TEXTS) == {1: "Production", 2: "Maintenance", 3: "Manual"}
 
 
 @pytest.mark.parametrize("state", State, ids=lambda state: STATE_TEXTS[state])

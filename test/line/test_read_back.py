@@ -25,7 +25,7 @@ def line() -> Simulation:
     )
 
 
-def given(writer: str, name: str, value: float, kind: str = "operator") -> Input:
+def given(writer: str, name: str, value: float, kind: str = "test") -> Input:
     return Input("commands", writer, kind, SET, (name,), (value,))
 
 
@@ -53,9 +53,9 @@ def test_it_follows_what_is_accepted_and_only_a_change_is_told() -> None:
     sim = line()
     back = sim.line.read_back
     steps = [
-        (given("anna", TWO, 0.5), (0.5, "anna", "operator", 0), True),
-        (given("anna", TWO, 0.5), (0.5, "anna", "operator", 0), False),  # the same again
-        (given("anna", TWO, 99.0), (0.5, "anna", "operator", 0), False),  # refused
+        (given("anna", TWO, 0.5), (0.5, "anna", "test", 0), True),
+        (given("anna", TWO, 0.5), (0.5, "anna", "test", 0), False),  # the same again
+        (given("anna", TWO, 99.0), (0.5, "anna", "test", 0), False),  # refused
         (given("plc", TWO, 0.5, "controller"), (0.5, "plc", "controller", 3), True),  # the same value, another writer
         (given("plc", TWO, 0.6, "controller"), (0.6, "plc", "controller", 4), True),
         (Input(FAULT, "bob", "test", INJECT, ("belts/two/trip",), (1.0,)), (0.6, "plc", "controller", 4), False),
@@ -82,14 +82,14 @@ def test_it_goes_on_from_a_checkpoint_and_is_told_at_once(tmp_path: Path) -> Non
     sim.advance(3)
     sim.save(tmp_path / "kept")
     again = Simulation.load(tmp_path / "kept")
-    assert told(again.line.read_back.changes(), again, TWO) == (0.5, "anna", "operator", 0)
+    assert told(again.line.read_back.changes(), again, TWO) == (0.5, "anna", "test", 0)
     for run in (sim, again):
         run.give(given("plc", TWO, 0.5))
         run.advance()
     assert told(sim.line.read_back.columns(), sim, TWO) == told(again.line.read_back.columns(), again, TWO)
     other = line()
     other.restore_from(sim)
-    assert told(other.line.read_back.changes(), other, TWO) == (0.5, "plc", "operator", 3)
+    assert told(other.line.read_back.changes(), other, TWO) == (0.5, "plc", "test", 3)
 
 
 def test_more_writers_than_commands() -> None:

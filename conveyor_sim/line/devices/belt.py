@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from conveyor_sim.line.authority import AUTOMATIC
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.line.setup import Setup
@@ -53,6 +54,11 @@ class BeltDevice(Device):
         now.setpoints[self._index] = value
         if self.watchdog is not None:
             self.watchdog.command(now.tick)
+
+    def take_mode(self, mode: int, now: ScanContext) -> None:
+        """Have its watchdog wait for a controller in automatic only."""
+        if self.watchdog is not None:
+            self.watchdog.rest(now.tick, mode != AUTOMATIC)
 
     def watch(self, now: ScanContext) -> str:
         """The name of its setpoint if its controller has gone silent and it stops at this tick, "" if not."""

@@ -1,0 +1,71 @@
+"""Who may do what to a line: one table by operation, and one by mode for commands."""
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, WRITER_KINDS, Input, WriterKind
+from conveyor_sim.support.printable import printable
+
+PEOPLE: tuple[WriterKind, ...] = ("operator", "engineer")
+"""Those who act through the service `operate`."""
+
+
+class Right(NamedTuple):
+    """Who may use one operation."""
+
+    writers: tuple[WriterKind, ...]
+    what: str
+    """What it does, in a sentence for docs/line.md."""
+
+
+MAY: Mapping[str, Right] = {
+    SET: Right(("controller", *PEOPLE, "test"), "Sets commands, in the modes above; says alarms."),
+    INJECT: Right(("test",), "Has faults begin or end."),
+    MODE: Right((*PEOPLE, "test"), "Puts devices (names) into modes (values)."),
+    OWN: Right(("controller",), "Takes the line, but for the devices that texts name by patterns."),
+    DISOWN: Right(("controller",), "Gives it up."),
+    FORCE: Right((*PEOPLE, "test"), "Forces signals to values."),
+    UNFORCE: Right((*PEOPLE, "test"), "Ends that, without names for all."),
+    "acknowledge": Right((*PEOPLE, "test"), "Acknowledges alarms, without names all."),
+    "reset": Right((*PEOPLE, "test"), "Clears latched alarms, without names all."),
+    "shelve": Right((*PEOPLE, "test"), "Shelves alarms for so many seconds (values), or once."),
+    "unshelve": Right((*PEOPLE, "test"), "Ends that, without names for all."),
+    "remove_from_service": Right(("engineer", "test"), "Takes alarms out of service."),
+    "return_to_service": Right(("engineer", "test"), "Ends that."),
+    "declare": Right(("controller", "test"), "Declares a controller's alarms."),
+    "reset_counters": Right(("controller", *PEOPLE, "test"), "Counts of devices, or of all, begin at 0."),
+}
+"""By operation; what is not here, nobody may."""
+
+AUTOMATIC, MAINTENANCE, MANUAL = 1, 2, 3
+
+MODES: Mapping[int, str] = {AUTOMATIC: "Automatic", MAINTENANCE: "Maintenance", MANUAL: "Manual"}
+"""By the numbers of PackML's unit modes, where 1 is Production."""
+
+IN_CONTROL: Mapping[int, tuple[WriterKind, ...]] = {
+    AUTOMATIC: ("controller", "test"),
+    MAINTENANCE: ("engineer", "test"),
+    MANUAL: (*PEOPLE, "test"),
+}
+"""Whose commands a device takes, by its mode."""
+
+OPERATORS_MODES = (AUTOMATIC, MANUAL)
+"""Between which an operator may switch; engineers and tests between all."""
+
+
+def unauthorized(given: Input, operations: Collection[str]) -> str:
+    """Why nobody of this kind may do this, whatever to, "" if it may. operations: those that there are."""
+    if given.writer_kind not in WRITER_KINDS:
+        return f"{printable(given.writer_kind)}: no such kind of writer, expected one of {', '.join(WRITER_KINDS)}"
+    if given.operation not in operations:
+        return f"{printable(given.operation)}: no such operation, expected one of {', '.join(operations)}"
+    kinds = MAY[given.operation].writers if given.operation in MAY else ()
+    if given.writer_kind in kinds:
+        return ""
+    return f"{given.operation}: given by {who(given)}, expected one of the kind {' or '.join(kinds)}"
+
+
+def who(given: Input) -> str:
+    """Who gave an input, in words: "operator Jo"."""
+    name = printable(given.writer)
+    return given.writer_kind if name in ("", given.writer_kind) else f"{given.writer_kind} {name}"
