@@ -7,7 +7,6 @@ import numpy as np
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.observe.read_back import ReadBackColumns
-from conveyor_sim.state.snapshot import Unchecked
 
 SCENE = ("scene", "line")
 """Whose the values are that a run begins with."""
@@ -16,7 +15,7 @@ SCENE = ("scene", "line")
 class ReadBack:
     """One entry for each command. Public attributes are remembered in checkpoints."""
 
-    values: list[Unchecked]
+    values: list[float]
     since: list[int]
     """Ticks from which on they have these values from these writers: who gives the same again changes nothing."""
     writers: list[tuple[str, str]]
@@ -34,8 +33,13 @@ class ReadBack:
         """A tick begins."""
         self._changed = False
 
-    def wake(self) -> None:
-        """It was restored: whoever looks now has not seen it."""
+    def wake(self, tick: int) -> None:
+        """It was restored at a tick: whoever looks now has not seen it. Raises ValueError for what it can't be."""
+        commands = len(self._index)
+        if not len(self.values) == len(self.since) == len(self.writers) == commands:
+            raise ValueError(f"line.read_back has other commands than the {commands} of the scene")
+        if not all(0 <= since <= tick for since in self.since):
+            raise ValueError(f"line.read_back.since is not from 0 to {tick}")
         self._changed = True
 
     def note(self, given: Input, tick: int) -> None:

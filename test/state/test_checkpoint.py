@@ -305,7 +305,7 @@ def test_the_same_scene_may_be_given_and_last_longer(saved: Path) -> None:
         ({"effects": {}}, 'effects.peaks: "on", which is nothing'),
         (
             {"infeeds": {}, "outfeeds": {}},
-            'infeeds.packed: {"bottle": "bottle", "position": [-0.9, 0.03], "direction..., which is nothing',
+            'infeeds.packed: {"bad_share": 0.0, "bad_every": null, "bad_at": [], "bott..., which is nothing',
         ),
     ],
 )
@@ -388,7 +388,7 @@ def test_arrays_of_another_make_are_refused(saved: Path, tmp_path: Path) -> None
         ({"scene": {"text": 1, "name": "a", "overrides": ""}}, "header.scene.text is not of its type"),
         ({"scene": {"text": "a: [", "name": "a", "overrides": ""}}, "its scene is refused: a:1: not valid YAML"),
         ({"memory": []}, "header.memory is not of its type"),
-        ({"memory": {}}, "memory has other entries than tick, next_id, line"),
+        ({"memory": {}}, "memory has other entries than tick, next_id, held, line"),
         ({"extra": 1}, "header.extra should not be there"),
         ({"format": None}, "header.format is missing"),
         ({"format": "2"}, "header.format is not of its type"),
@@ -408,7 +408,10 @@ def test_a_header_with_odd_fields_is_refused(saved: Path, tmp_path: Path, change
         (("line", "speeds"), [0.6], "line.speeds has the shape (1,), expected (3,)"),
         (("line", "speeds"), [math.nan] * 3, "line.speeds[0] is not finite"),
         (("line", "bad"), ["one"], "line.bad[0] is not of its type"),
-        (("line", "pending"), [[["a"], [1.0]]], "line.pending[0][2] is missing"),
+        (("line", "pending"), [["plc", "plc", "test", "set", ["a"]]], "line.pending[0][5] is missing"),
+        (("line", "read_back", "values"), ["a"], "line.read_back.values[0] is not of its type"),
+        (("line", "read_back", "writers"), [], "line.read_back has other commands than the 3 of the scene"),
+        (("line", "read_back", "since"), [0, 11, 0], "line.read_back.since is not from 0 to 10"),
         (("line", "devices", "belts/feeder", "watchdog"), None, "watchdog has other entries than timeout_ticks"),
         (("line", "devices", "infeeds/packed", "due"), math.inf, "packed.due is not finite"),
         (("line", "devices", "infeeds/packed", "fed"), "two", "packed.fed is not of its type"),
@@ -452,7 +455,7 @@ def test_arrays_that_can_not_be_are_refused(saved: Path, tmp_path: Path) -> None
     for name, array in arrays.items():
         for wrong, reason in spoilt(name, array):
             with pytest.raises(ValueError, match=re.escape(reason)):
-                state.restore({**arrays, name: wrong}, state.next_id)
+                state.restore({**arrays, name: wrong}, state.next_id, [])
             assert state.world is world
             told[reason.split()[-1]] += 1
     assert all(told[word] > 5 for word in ("shape", "finite", "holds", "scene"))
