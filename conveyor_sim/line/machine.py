@@ -45,13 +45,17 @@ class MachineDevice(Device):
         """own: signals of its kind. conditional: acting states that are left only when it is `ready`."""
         rate, most = part.rate, part.rate if part.rate_limit is None else part.rate_limit
         reasons = reason_texts(part)
+        first = State.STARTING if State.STARTING in conditional else State.EXECUTE
+        time = CATEGORIES.index(category_of(first, NONE, NONE, False))
         super().__init__(
             name,
             [
                 switch(f"{name}/running", "status", "It runs, and nobody has stopped it.", 1.0, "state"),
                 *own,
-                choice(f"{name}/state", "status", "State of PackML.", STATE_TEXTS, EXECUTE, "state"),
-                choice(f"{name}/category", "status", "Where its time goes.", dict(enumerate(CATEGORIES)), 0, "state"),
+                choice(f"{name}/state", "status", "State of PackML.", STATE_TEXTS, first, "state"),
+                choice(
+                    f"{name}/category", "status", "Where its time goes.", dict(enumerate(CATEGORIES)), time, "state"
+                ),
                 choice(f"{name}/stop_reason", "status", "Why it stands, or last stood.", reasons, NONE, "state"),
                 switch(f"{name}/fault", "status", "Failed and not repaired, or aborted."),
                 count(f"{name}/failures", "counter", "How often it has failed."),
@@ -72,7 +76,7 @@ class MachineDevice(Device):
         self.stop = False
         self.cntrl_cmd = 0
         self.packml = StateMachine(
-            State.STARTING if State.STARTING in conditional else State.EXECUTE,
+            first,
             {State[field.upper()]: self._ticks(time) for field, time in part.acting_times},
             conditional,
         )
