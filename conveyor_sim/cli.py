@@ -70,12 +70,14 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     from conveyor_sim.model.remedies import step_limit
     from conveyor_sim.runs.report import plot_function
     from conveyor_sim.runs.speed import expected
+    from conveyor_sim.runs.tags import tag_rows
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
     path = scene_path(scene)
     checked = load_scene(path, outside_tables=outside_tables)
     model = build_model(checked)
+    tag_rows(checked)  # which finds alarms of tags that there are not
     _print(account(checked, model))
     for line in expected(step_limit(checked)):
         click.echo(line)

@@ -16,7 +16,7 @@ from conveyor_sim.accounts.damage import DamageAccount
 from conveyor_sim.accounts.energy import EnergyAccount
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
-from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, WriterKind
+from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, OPERATE, SET, WATCHDOG, CommandOutcome, Input, WriterKind
 from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.model import build_model
@@ -132,13 +132,8 @@ class Simulation:
     @property
     def counts(self) -> Counts:
         """Bottles fed, removed and present."""
-        return Counts(
-            fed=self._line.fed,
-            removed=self._line.removed,
-            present=int((self._state.world.bottles.id >= 0).sum()),
-            blocked_ticks=self._line.blocked_ticks,
-            held=len(self._state.held),
-        )
+        present, held = int((self._state.world.bottles.id >= 0).sum()), len(self._state.held)
+        return Counts(self._line.fed, self._line.removed, present, self._line.blocked_ticks, held)
 
     def advance(self, ticks: int = 1) -> None:
         """Let `ticks` ticks pass. Raises SimulationError, in one sentence, for a tick that the guard can't let pass;
@@ -160,7 +155,7 @@ class Simulation:
             self._line.end(self.tick)
             self._remove()
             self._feed()
-            self._line.close(passed)
+            self._line.close(passed, {} if self._clogging is None else self._clogging.clogged())
             self._state.make_lists()
 
     def give(self, given: Input) -> None:
@@ -195,6 +190,10 @@ class Simulation:
         """Queue a fault by name (`process_image.fault_names`), as `command` does; its source is "fault"."""
         self.give(Input(FAULT, writer, "test", INJECT, (name,), (value,)))
 
+    def operate(self, operation: str, names: Sequence[str] = (), values: Sequence[float] = (), *, writer: str) -> None:
+        """Queue what an operator does: `acknowledge`, `reset`, `shelve`, ... of alarms by their ids."""
+        self.give(Input(OPERATE, writer, "operator", operation, tuple(names), tuple(values)))
+
     def refusal(self, given: Input) -> str:
         """Why the next tick would refuse an input if nothing came before it, "" if it would not."""
         return self._line.refusal(given)
@@ -219,8 +218,8 @@ class Simulation:
 
     @property
     def alarms(self) -> frozenset[str]:
-        """The controllers' alarms that stand, by name: given as commands "alarms/<name>", 1 to raise, 0 to clear."""
-        return self._line.alarms
+        """Ids of the alarms that stand: active or latched, and neither shelved, suppressed nor out of service."""
+        return frozenset(alarm.id for alarm in self._line.alarms if alarm.stands)
 
     def take_guard_events(self) -> list[GuardEvent]:
         """What the guard has reported since the last call, in order."""

@@ -30,7 +30,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "model": "effects engine errors laws scene timestep version | llvmlite numpy",
     "state": "engine errors model scene support | numpy pydantic",
     "accounts": "engine model observe scene state | numpy",
-    "line": "engine model observe scene state support | numpy",
+    "line": "engine errors model observe scene state support | numpy",
     "stepping": "accounts engine errors model scene state | numpy",
     "simulation": "accounts engine line model observe scene state stepping | numpy",
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",

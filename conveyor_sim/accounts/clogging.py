@@ -38,6 +38,10 @@ class Clogging:
             self._look_at(tick, name, corners, removed[f"outfeeds/{name}"])
         return [DamageEvent(*event) for event in self.events[before:]]
 
+    def clogged(self) -> dict[str, bool]:
+        """Whether each outfeed is."""
+        return {name: bool(reported) for name, (_, _, reported) in self.passages.items()}
+
     def take_events(self) -> list[DamageEvent]:
         """Outfeeds that clogged since the last call, in order."""
         events, self.events = self.events, []

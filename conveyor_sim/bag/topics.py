@@ -12,6 +12,7 @@ from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header, Outcome
 from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
 from conveyor_sim.line.run_state import RunState
+from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.events import EventColumns, event_columns
@@ -290,6 +291,16 @@ _ROWS = (
         state=lambda now: now.sim.line.read_back.changes(),
         columns=ReadBackColumns,
         compare=Compare(_command_name, within={"value": 1e-9}),
+    ),
+    Topic(
+        "alarm_states",
+        "conveyor_msgs/msg/AlarmStates",
+        "all [alarms](alarms.md), with what was declared of them and their states by ISA-18.2",
+        "latched, each tick at which something of it changed",
+        LATCHED,
+        state=lambda now: now.sim.line.alarms.changes(),
+        columns=AlarmColumns,
+        compare=Compare(lambda line, message, index: f"alarm {message.id[index]}"),
     ),
     Topic(
         "run_state",

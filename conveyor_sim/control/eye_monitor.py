@@ -7,8 +7,9 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from conveyor_sim.control.alarm import Alarm
 from conveyor_sim.control.edges import EyeEdges
-from conveyor_sim.control.scan import ALARMS, Inputs, require, speed_signal
+from conveyor_sim.control.scan import ALARMS, Inputs, eye_signal, require, speed_signal
 
 
 @dataclass
@@ -78,6 +79,12 @@ class EyeMonitor:
         require(given, f"next_after: {self.next_after:g} m given, expected the distance to {self.next_eye}, above 0")
         self._here, self._next = EyeEdges(self.eye), EyeEdges(self.next_eye)
         self._chatter_here, self._chatter_next = (_Chatter(self.bottle, self.period) for _ in range(2))
+
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        """The three alarms."""
+        what, tag = ("stuck on", "stuck off", "chatters"), eye_signal(self.eye)
+        return tuple(Alarm(f"{self.eye} {one}", f"photo-eye {self.eye}: {one}", "error", tag=tag) for one in what)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """The three alarms, and while one of them stands what is to be held."""

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from conveyor_sim.control.alarm import Alarm
 from conveyor_sim.control.blocks import SR, TON
 from conveyor_sim.control.scan import ALARMS, Inputs, require, speed_command, speed_signal
 
@@ -48,6 +49,11 @@ class JamAlarm:
         require(bool(self.passages), "passages: none given, expected the name of a count or more")
         require(self.time > 0.0, f"time: {self.time:g} s given, expected more than 0")
         self._stuck = TON(self.time)
+
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        """The alarm."""
+        return (Alarm(f"jam at {self.name}", f"no bottle leaves {self.name}", "error", tag=self.waiting),)
 
     def jammed(self, inputs: Inputs) -> bool:
         """Whether there is a jam; once a scan."""
@@ -101,6 +107,13 @@ class JamClearing:
         signs = self.back_speed < 0.0 < self.jog_speed
         require(signs, f"back_speed, jog_speed: {given}, expected below 0 and above 0")
         require(self.tries >= 1, f"tries: {self.tries} given, expected 1 or more")
+
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        """Both alarms."""
+        name = self.alarm.name
+        text = f"{name} is jammed after {self.tries} tries to clear it, and waits for help"
+        return (*self.alarm.declared_alarms, Alarm(f"jam at {name} not cleared", text, "error", priority=900))
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Both alarms, and while it acts the belt's speed and what is held."""

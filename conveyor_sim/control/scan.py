@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from conveyor_sim.control.alarm import Alarm
+
 ALARMS = "alarms/"
 """What a key of an answer begins with that is an alarm (0 or 1), not a command."""
 
@@ -57,10 +59,25 @@ class Inputs(Mapping[str, float]):
 
 
 class Controller(Protocol):
-    """Anything with a scan."""
+    """Anything with a scan. One with an attribute `declared_alarms` (a sequence of Alarm) says by it what its alarms
+    are; the others are as by default.
+    """
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """One scan: commands by name, and alarms (keys that begin with ALARMS)."""
+
+
+def declared_alarms(controller: object) -> tuple[Alarm, ...]:
+    """What a controller declares of its alarms. Raises ControlError for what is no declaration, or one given twice."""
+    found = getattr(controller, "declared_alarms", ())
+    name = f"{type(controller).__name__}.declared_alarms"
+    if not (isinstance(found, (list, tuple)) and all(isinstance(one, Alarm) for one in found)):
+        raise ControlError(f"{name}: {found!r:.200} given, expected a list or tuple of Alarm")
+    ids = [one.id for one in found]
+    for id in ids:
+        if ids.count(id) > 1:
+            raise ControlError(f"{name}: {id} declared twice, expected once")
+    return tuple(found)
 
 
 class AlarmChanges:
@@ -93,6 +110,10 @@ class Constant:
 class _Together:
     controllers: tuple[Controller, ...]
 
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
+
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
         given_by: dict[str, Controller] = {}
@@ -109,6 +130,14 @@ class _Together:
 @dataclass(frozen=True)
 class _Priority:
     controllers: tuple[Controller, ...]
+
+    @property
+    def declared_alarms(self) -> tuple[Alarm, ...]:
+        found: dict[str, Alarm] = {}
+        for controller in self.controllers:
+            for alarm in declared_alarms(controller):
+                found.setdefault(alarm.id, alarm)
+        return tuple(found.values())
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}

@@ -4,13 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.support.printable import printable
 
-ALARMS = "alarms/"
+ALARMS = PREFIX
 """What the name of an input begins with that is an alarm of the controller, 0 or 1: it commands nothing."""
-
-MOST_ALARMS = 1000
-"""That stand at once."""
 
 LISTED = 20
 """Names that a refusal lists, of those there are."""
@@ -45,7 +43,7 @@ def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: S
 
 
 def alarm_problem(name: str, value: float) -> str:
-    """Why an alarm can't be noted, "" if it can."""
+    """Why an alarm can't be said, "" if it can."""
     if name == ALARMS:
         return f"{name}: given, expected the name of an alarm behind it"
     return "" if value in (0.0, 1.0) else f"{printable(name)}: {value:g} given, expected 0 or 1"

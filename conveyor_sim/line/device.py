@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.support.footing import find_carriers
+from conveyor_sim.line.alarms.declaration import Declared
 from conveyor_sim.line.process_image import of_roles
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.scene.parts.station import BAD
@@ -34,6 +35,8 @@ class ScanContext:
     """Ids of the bottles that an inspection would object to."""
     attributes: dict[str, dict[int, float]] = field(default_factory=dict)
     """What stations have made of bottles, by the name of the attribute, then by id; 0 where nothing is said."""
+    conditions: dict[str, bool] = field(default_factory=dict)
+    """Of alarms: those that have begun or ended, and nobody has taken yet."""
     _carriers: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _carried: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     _counts: list[int] | None = None  # None: nobody has looked since the bottles moved
@@ -65,6 +68,10 @@ class ScanContext:
         for values in self.attributes.values():
             for bottle in bottles:
                 values.pop(bottle, None)
+
+    def alarm(self, id: str, holds: bool) -> None:
+        """Say that the condition of an alarm (`Device.alarms`) has begun, or ended."""
+        self.conditions[id] = holds
 
     def begin_scan(self) -> None:
         """Forget what was found out about the bottles before."""
@@ -137,6 +144,11 @@ class Device:
     def faults(self) -> tuple[Tag, ...]:
         """What can be made to go wrong with it."""
         return self._faults
+
+    @property
+    def alarms(self) -> Sequence[Declared]:
+        """Those whose conditions it says by `ScanContext.alarm`, as they change; ids begin with its name."""
+        return ()
 
     def objection(self, name: str, value: float, now: ScanContext) -> str:
         """Why a command of its own can't be taken as it stands now, though name and value are right; "" if it can."""

@@ -3,9 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from conveyor_sim.line.commands import ALARMS, MOST_ALARMS, alarm_problem
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.inputs import INJECT, SET, CommandOutcome
+from conveyor_sim.line.inputs import INJECT, CommandOutcome
 from conveyor_sim.observe.events import Event, Kind
 from conveyor_sim.state.snapshot import Unchecked
 from conveyor_sim.support.printable import printable
@@ -16,8 +15,6 @@ class EventLog:
 
     events: list[tuple[int, str, str, int, Unchecked, str]]
     """Since the tick before, as Event has them."""
-    alarms: list[str]
-    """Those that stand, by their whole names, in the order in which they were raised."""
     bottles: dict[str, int]
     """By device, how many it has put onto the line or taken off it so far."""
     states: dict[str, list[Unchecked]]
@@ -34,7 +31,6 @@ class EventLog:
         self.events = []
         self.total = 0
         """Events so far."""
-        self.alarms = []
         self.bottles = {device.name: 0 for device in devices}
         self.states = {device.name: [float(value) for value in device.states(now)] for device, _ in self._machines}
 
@@ -48,7 +44,7 @@ class EventLog:
         self.total += 1
 
     def note_outcome(self, outcome: CommandOutcome) -> None:
-        """Inputs were applied or refused as a tick began. Alarms command nothing, so they count either way."""
+        """An input was applied or refused as a tick began."""
         at, names, values = outcome.tick, outcome.names, outcome.values
         if outcome.repeated:
             return
@@ -57,10 +53,10 @@ class EventLog:
             self.note(at, "command_refused", printable(", ".join(names)), value, text=outcome.reason)
         elif outcome.operation == INJECT:
             self.note(at, "fault_injected" if values[0] else "fault_cleared", names[0], values[0])
-        if outcome.operation == SET and len(names) == len(values):
-            for name, value in zip(names, values, strict=True):
-                if name.startswith(ALARMS):
-                    self._note_alarm(at, name, value)
+
+    def note_alarm(self, at: int, kind: Kind, name: str, value: float, text: str) -> None:
+        """Something has happened to an alarm."""
+        self.note(at, kind, name, value, text=text)
 
     def note_removed(self, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
         """A device has taken bottles, by their ids."""
@@ -85,14 +81,3 @@ class EventLog:
         for bottle in bottles:
             self.bottles[device.name] += 1
             self.note(now.tick, kind, device.name, float(self.bottles[device.name]), bottle)
-
-    def _note_alarm(self, at: int, name: str, value: float) -> None:
-        """Only what changes; what is no alarm, or one too many, was refused."""
-        if alarm_problem(name, value):
-            return
-        if value == 1.0 and name not in self.alarms and len(self.alarms) < MOST_ALARMS:
-            self.alarms.append(name)
-            self.note(at, "alarm_raised", name, value)
-        elif value == 0.0 and name in self.alarms:
-            self.alarms.remove(name)
-            self.note(at, "alarm_cleared", name, value)

@@ -38,8 +38,14 @@ FORCE = "force"
 UNFORCE = "unforce"
 """Operation: signals by name; none: all that are forced."""
 
+DECLARE = "declare"
+"""Operation: alarms of a controller, ids as names and a JSON object each as texts."""
+
 FAULT = "fault"
 """Source of faults."""
+
+OPERATE = "operate"
+"""Source of what an operator does."""
 
 WATCHDOG = "watchdog"
 """Source of what the line does for a controller that has gone silent."""

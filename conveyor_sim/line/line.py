@@ -1,22 +1,25 @@
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.line.alarms.alarms import Alarms
+from conveyor_sim.line.alarms.declaration import as_sent
+from conveyor_sim.line.alarms.system import AlarmSystem
 from conveyor_sim.line.authority import unauthorized
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
-from conveyor_sim.line.commands import ALARMS, MOST_ALARMS, refusal, shown
+from conveyor_sim.line.commands import ALARMS, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.forcing import Forcing
-from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, Operation
+from conveyor_sim.line.inputs import DECLARE, FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, Operation
 from conveyor_sim.line.modes import Modes
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.read_back import ReadBack
@@ -43,6 +46,9 @@ class Line:
         speeds = np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64)
         self.now = ScanContext(state, scene.tick, speeds, speeds.copy())
         devices = build_devices(scene, state.model)
+        self._log = EventLog(devices, self.now)
+        self._alarms = AlarmSystem(scene, devices, self._log.note_alarm)
+        devices = (*devices, self._alarms.device) if devices else devices
         self._devices = devices
         self._belts = [device for device in devices if isinstance(device, BeltDevice)]
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
@@ -60,7 +66,6 @@ class Line:
         """Whether any device puts bottles onto the line."""
         self._pending: list[Input] = []
         self._outcomes: list[CommandOutcome] = []
-        self._log = EventLog(devices, self.now)
         self.modes = Modes(devices, scene.where, lambda: self._pending, self._log.note)
         """In whose hands devices are, and who owns the line."""
         tags = (tag for device in devices for tag in device.tags)
@@ -79,6 +84,7 @@ class Line:
             INJECT: Operation(lambda given: refusal(self._faults, FAULT, given.names, given.values), self._set),
             **self.modes.operations(),
             **self.forcing.operations(),
+            **self._alarms.operations(),
         }
         self._surfaces = BeltSurfaces(state)
         self.now.begin_scan()  # which its look at the devices began, before there are bottles
@@ -118,7 +124,7 @@ class Line:
         kept = tuple([printable(name) if name.startswith(ALARMS) else name for name in names])
         numbers = tuple([float(value) for value in values])
         if texts:
-            texts = tuple(printable(text, SENTENCE) for text in texts)
+            texts = tuple(as_sent(text) if operation == DECLARE else printable(text, SENTENCE) for text in texts)
         source = printable(source)
         writer = source if writer == source else printable(writer)
         self._pending.append(Input(source, writer, printable(kind), printable(operation), kept, numbers, texts))
@@ -152,14 +158,7 @@ class Line:
         for name, value in zip(names, values, strict=True) if self._objecting else ():
             if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):
                 return reason
-        alarms = [(name, value) for name, value in zip(names, values, strict=True) if name.startswith(ALARMS)]
-        standing = set(self._log.alarms) if alarms else set()
-        for name, value in alarms:
-            (standing.add if value else standing.discard)(name)
-            if len(standing) > MOST_ALARMS:
-                raised = sum(bool(value) for _, value in alarms)
-                return f"{raised} alarms given while {len(self._log.alarms)} stand, expected {MOST_ALARMS} at most"
-        return ""
+        return self._alarms.said_problem(names, values)
 
     def _set(self, given: Input, now: ScanContext) -> None:
         for name, value in zip(given.names, given.values, strict=True):
@@ -177,6 +176,7 @@ class Line:
         self._at(tick)
         self._log.begin()
         self.read_back.begin()
+        self._alarms.begin()
         pending, self._pending = self._pending, []
         for given in pending:
             foreign, rest, objection = self.modes.divide(given)
@@ -188,6 +188,8 @@ class Line:
                 if not reason:
                     self._operations[rest.operation].apply(rest, self.now)
                 self._note(CommandOutcome(tick, rest, not reason, reason))
+            if given.operation == SET:  # whatever became of the commands beside them
+                self._alarms.say(tick, given.names, given.values)
         for belt in self._belts:
             if name := belt.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
@@ -197,6 +199,7 @@ class Line:
         before = self.now.speeds.tolist()
         for device in self._beginning:
             device.begin(self.now)
+        self._alarms.take(self.now)
         if before != self.now.speeds.tolist():
             self.move_belts()
 
@@ -205,6 +208,8 @@ class Line:
         self._at(tick)
         for device in self._ending:
             device.end(self.now)
+        if tick == 0:
+            self._alarms.take(self.now)
 
     def rehearse(self) -> None:
         """Call what devices may call of the engine in a later tick, so that it is compiled before a run begins."""
@@ -228,11 +233,13 @@ class Line:
             self._log.note_fed(device, first, self.now)
         self.now.begin_scan()
 
-    def close(self, passed: Sequence[DamageEvent]) -> None:
-        """A tick has ended, in which these limits were passed: what happened in it is complete."""
+    def close(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> None:
+        """A tick has ended, in which these limits were passed; whether outfeeds are clogged, where that is watched."""
         for limit in passed:
             self._log.note(limit.tick, "limit_passed", limit.kind, limit.value, limit.bottle, limit.text)
         self._log.note_states(self.now)
+        forced = {name: value for name, value, _ in self.forcing.forces} if self.forcing.forces else {}
+        self._alarms.close(self.now, passed, clogged, forced)
 
     @property
     def happened(self) -> Sequence[Event]:
@@ -245,9 +252,9 @@ class Line:
         return self._log.total
 
     @property
-    def alarms(self) -> frozenset[str]:
-        """Names of the alarms that stand, without what they begin with."""
-        return frozenset(name.removeprefix(ALARMS) for name in self._log.alarms)
+    def alarms(self) -> Alarms:
+        """All of them."""
+        return self._alarms.alarms
 
     def signals(self) -> Image:
         """Values of all signals, in the order of the process image."""
@@ -281,6 +288,7 @@ class Line:
         self.modes.wake()
         restore(self.forcing, snapshot(other.forcing))
         self.forcing.wake()
+        self._alarms.restore(self.now.tick, other._alarms.snapshot())
 
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
@@ -296,6 +304,7 @@ class Line:
             "read_back": snapshot(self.read_back),
             "modes": snapshot(self.modes),
             "forcing": snapshot(self.forcing),
+            "alarms": self._alarms.snapshot(),
         }
 
     def restore(self, tick: int, memory: dict[str, Any]) -> None:
@@ -320,6 +329,7 @@ class Line:
         self.modes.wake()
         restore(self.forcing, memory["forcing"], "line.forcing")
         self.forcing.wake()
+        self._alarms.restore(tick, memory["alarms"])
 
     @property
     def held(self) -> list[int]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from types import SimpleNamespace
 
+from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.failures import Draws, FailureClock, PlannedTimes
 from conveyor_sim.line.packml import COMMAND_TEXTS, STATE_TEXTS, Command, State, StateMachine, objection
@@ -109,6 +110,11 @@ class MachineDevice(Device):
         )
         self._clocks: list[FailureClock] = list(vars(self.clocks).values())
         self.wake()
+
+    @property
+    def alarms(self) -> Sequence[Declared]:
+        """It has failed, or was aborted."""
+        return (error(f"{self.name}/fault", f"{self.name} has failed", f"{self.name}/fault"),)
 
     @property
     def state(self) -> int:
@@ -287,9 +293,11 @@ class MachineDevice(Device):
             self.waited = 0
         if cause != self.cause or self._changed:
             self.cause = cause
-            shown = self._category, self._shown[2]
+            shown, failed = (self._category, self._shown[2]), self._shown[3]
             self._category = category_of(self.state, self.reason, cause, bool(self._failed))
             self._show()
+            if failed != self._shown[3]:
+                now.alarm(f"{self.name}/fault", self._shown[3])
             if shown != (self._category, self.reason):
                 for watcher in self._watchers:
                     watcher(now.tick, self._category, self.reason)

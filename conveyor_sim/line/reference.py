@@ -7,6 +7,7 @@ from conveyor_sim.line.inputs import WRITER_KINDS
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene.parts.alarm import PREFIX
 
 EVERYTHING = """
 name: everything
@@ -55,6 +56,7 @@ SECTIONS = {
     "zones": ("zones",),
     "counters": ("counters",),
     "indicators": ("indicators",),
+    "alarms": ("alarm_counts", "alarms"),
     "run": ("run",),
 }
 """By the part of the page, the fields of a scene whose devices it lists."""
@@ -89,6 +91,7 @@ def _rows(tags: list[Tag]) -> Iterator[str]:
 
 def _pattern(tag: Tag) -> str:
     """Its name with `<name>` for that of the device; machines are named by their kind."""
-    field, _, rest = tag.name.partition("/")
+    before, name = (PREFIX, tag.name.removeprefix(PREFIX)) if tag.name.startswith(PREFIX) else ("", tag.name)
+    field, _, rest = name.partition("/")
     device, _, what = rest.partition("/")
-    return f"{field}/<{device}>/{what}" if what else tag.name
+    return before + (f"{field}/<{device}>/{what}" if what else name)

@@ -29,7 +29,7 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.inputs import DECLARE, CommandOutcome
 from conveyor_sim.ros.child import Process
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
@@ -112,10 +112,13 @@ class AttachedNode(AbstractContextManager["AttachedNode"]):
                 self._require_going_on(inputs, time.monotonic() > end)
         request = turns.request
         self.writer = request.run_id
-        # What it has no control of is refused as the tick begins, and is no error of the controller.
-        _, given, _ = turns.simulation.line.modes.divide(request.input)
-        if given and (given.names or given.values) and (reason := turns.simulation.refusal(given)):
-            raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
+        for given in request.inputs:
+            # What it has no control of is refused as the tick begins, and is no error of the controller.
+            _, own, _ = turns.simulation.line.modes.divide(given)
+            if own is not None and (reason := turns.simulation.refusal(own)):
+                raise CommandError(f"at {inputs.time:.2f} s a command was refused: {reason}")
+            if given.operation == DECLARE:
+                turns.simulation.give(given)
         return dict(zip(request.names, request.values, strict=True))
 
     def note(self, outcomes: Sequence[CommandOutcome]) -> None:

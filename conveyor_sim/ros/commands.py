@@ -20,6 +20,7 @@ from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.gaps import Gaps
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE
+from conveyor_sim.ros.lockstep import inputs_of, is_empty
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.stepper import Stepper
 
@@ -30,7 +31,7 @@ def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
     """What passes commands on to the simulation, which judges them at the start of the next tick."""
     qos = TOPICS["commands"].qos
     return [
-        CommandTopic(node, stepper, "commands", Commands, qos, lambda message: (tuple(message.names), message.values)),
+        CommandTopic(node, stepper, "commands", Commands, qos, _commands),
         *(
             CommandTopic(node, stepper, name, Float64, CMD_SPEED.qos, partial(_speed, name))
             for name in map(speed_command, stepper.session.simulation.model.belts)
@@ -38,8 +39,17 @@ def subscribe_commands(node: Node, stepper: Stepper) -> list[CommandTopic]:
     ]
 
 
-def _speed(name: str, message: Any) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    return (name,), (message.data,)
+def _commands(message: Any) -> list[Input]:
+    """Its commands, after what it declares of alarms; if it has neither, the empty commands, to be refused."""
+    name = "commands"
+    declared, given = inputs_of(name, name, message.alarm_ids, message.alarms, message.names, message.values)
+    if is_empty(declared):
+        return [given]
+    return [declared] if is_empty(given) else [declared, given]
+
+
+def _speed(name: str, message: Any) -> list[Input]:
+    return [Input(name, name, "controller", SET, (name,), (message.data,))]
 
 
 class CommandTopic:
@@ -49,7 +59,7 @@ class CommandTopic:
     """
 
     def __init__(
-        self, node: Node, stepper: Stepper, name: str, kind: Any, qos: Qos, read: Callable[[Any], tuple[Any, Any]]
+        self, node: Node, stepper: Stepper, name: str, kind: Any, qos: Qos, read: Callable[[Any], list[Input]]
     ) -> None:
         self._stepper = stepper
         self._name = name
@@ -80,18 +90,21 @@ class CommandTopic:
         missing = self._gaps.before(info["publication_sequence_number"], self.subscription.get_publisher_count)
         if missing:
             inbox.miss(self._name, missing)
-        inbox.receive()
         if len(data) > MESSAGE_BYTES:
+            inbox.receive()
             inbox.turn_away(self._name, TOO_LARGE)
             return
         try:
-            names, values = self._read(deserialize_message(data, self._kind))
+            inputs = self._read(deserialize_message(data, self._kind))
         except Exception:  # rclpy's errors have no common base, and what was sent may be anything
             kind = f"{self._kind.__module__.split('.')[0]}/{self._kind.__name__}"
+            inbox.receive()
             inbox.turn_away(self._name, UNREADABLE.format(type=kind))
             return
-        given = Input(self._name, self._name, "controller", SET, names, tuple(values))
-        self._stepper.give(given, len(data))
+        for given in inputs:
+            if given.operation == SET:  # commands are counted
+                inbox.receive()
+            self._stepper.give(given, len(data))
 
     def _on_matched(self, status: Any) -> None:
         if status.current_count == 0:

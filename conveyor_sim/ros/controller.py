@@ -17,7 +17,7 @@ from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs
+from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs, declared_alarms
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.lockstep_client import LockstepClient
@@ -51,6 +51,15 @@ class Scanner:
         self._tick_ns: int = line.tick_ns
         self._alarms = alarms
         self._changes = AlarmChanges()
+        try:
+            self._declared = declared_alarms(controller)
+        except ControlError as error:
+            raise ConveyorError(str(error)) from error
+
+    def take_declared(self) -> dict[str, list[str]]:
+        """The alarms that it declares, as fields of a message; none after the first time."""
+        declared, self._declared = self._declared, ()
+        return {"alarm_ids": [one.id for one in declared], "alarms": [one.as_text() for one in declared]}
 
     def scan(self, values: Sequence[float], tick: int, ticks: int) -> dict[str, float]:
         """Commands by name, and alarms that come or go, for the scan at a tick that is so many ticks long.
@@ -117,7 +126,7 @@ class ControllerRun:
                 continue
             target = min(tick + self._scan_ticks, last)
             commands = scanner.scan(values, tick, target - tick)
-            response = self._call(line, target, commands, release=target == last)
+            response = self._call(line, target, commands, scanner.take_declared(), release=target == last)
             if not response.accepted and self._left(line, response):
                 line = None
                 continue
@@ -157,7 +166,14 @@ class ControllerRun:
             time.sleep(LOOK)
         return True
 
-    def _call(self, line: Any, target: int, commands: Mapping[str, float], release: bool = False) -> Any:
+    def _call(
+        self,
+        line: Any,
+        target: int,
+        commands: Mapping[str, float],
+        declared: Mapping[str, list[str]] | None = None,
+        release: bool = False,
+    ) -> Any:
         """The answer to a request in the run of a line, sent again for as long as there is none: it is safe to repeat,
         for it names its run and its tick.
         """
@@ -168,6 +184,7 @@ class ControllerRun:
             values=list(commands.values()),
             release=release,
             sim_run_id=line.run_id,
+            **(declared or {}),
         )
         numbers = set()
         while True:
@@ -217,8 +234,10 @@ class _FreeScans:
             return
         self._last = message.tick
         commands = self._scanner.scan(message.values, message.tick, ticks)
-        if commands:
-            answer = Commands(tick=message.tick, names=list(commands), values=list(commands.values()))
+        declared = self._scanner.take_declared()
+        if commands or declared["alarm_ids"]:
+            names, values = list(commands), list(commands.values())
+            answer = Commands(tick=message.tick, names=names, values=values, **declared)
             answer.header = message.header
             self._commands.publish(answer)
 

@@ -28,7 +28,7 @@ class FaultService:
         def between_ticks() -> None:
             stepper = self._stepper
             given = Input(FAULT, "inject_fault", "test", INJECT, (request.name,), (request.value,))
-            simulation, size = stepper.session.simulation, size_of(given.names, given.values)
+            simulation, size = stepper.session.simulation, size_of(given)
             response.tick = simulation.tick
             response.message = stepper.standstill or simulation.refusal(given) or stepper.inbox.admit(size)
             if not response.message:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
+
+from conveyor_sim.line.inputs import Input
 
 MESSAGE_BYTES = 256 * 1024
 """Of one command as it is sent: thousands of names. What a PLC sends in a scan has some hundred bytes."""
@@ -112,9 +113,10 @@ class Inbox:
         return notes
 
 
-def size_of(names: Sequence[str], values: Sequence[float]) -> int:
-    """Bytes of a command, about as it is sent."""
-    return sum(map(len, names)) + VALUE_BYTES * max(len(names), len(values))
+def size_of(given: Input) -> int:
+    """Bytes of an input, about as it is sent."""
+    words = sum(map(len, given.names)) + sum(map(len, given.texts))
+    return words + VALUE_BYTES * max(len(given.names), len(given.values))
 
 
 def _many(count: int) -> str:

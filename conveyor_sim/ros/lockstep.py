@@ -8,12 +8,13 @@ the reason. No rule looks at wall time.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import SET, CommandOutcome, Input
+from conveyor_sim.line.inputs import DECLARE, SET, CommandOutcome, Input
 from conveyor_sim.observe.image import Image
 from conveyor_sim.support.printable import MOST, printable
 
@@ -23,6 +24,24 @@ if TYPE_CHECKING:
 
 LOCKSTEP = "lockstep"
 """Source of its commands."""
+
+
+def inputs_of(
+    source: str,
+    writer: str,
+    alarm_ids: Sequence[str],
+    alarms: Sequence[str],
+    names: Sequence[str],
+    values: Sequence[float],
+) -> tuple[Input, Input]:
+    """What a message of a controller gives the line: alarms that it declares, then commands; either may be empty."""
+    declared = Input(source, writer, "controller", DECLARE, tuple(alarm_ids), (), tuple(alarms))
+    return declared, Input(source, writer, "controller", SET, tuple(names), tuple(values))
+
+
+def is_empty(given: Input) -> bool:
+    """Whether there is nothing in it."""
+    return not (given.names or given.values or given.texts)
 
 
 class Refused(ConveyorError):
@@ -39,19 +58,31 @@ class LockstepRequest:
     values: tuple[float, ...]
     release: bool
     sim_run_id: str = ""
+    alarm_ids: tuple[str, ...] = ()
+    alarms: tuple[str, ...] = ()
 
     def same_as(self, other: LockstepRequest | None) -> bool:
         """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
         return other is not None and self._key() == other._key()
 
     @property
-    def input(self) -> Input:
-        """Its commands."""
-        return Input(LOCKSTEP, self.run_id, "controller", SET, self.names, self.values)
+    def inputs(self) -> list[Input]:
+        """What it gives the line: alarms that it declares, then its commands; neither where there is none."""
+        given = inputs_of(LOCKSTEP, self.run_id, self.alarm_ids, self.alarms, self.names, self.values)
+        return [one for one in given if not is_empty(one)]
 
     def _key(self) -> tuple[object, ...]:
         bits = struct.pack(f"<{len(self.values)}d", *self.values)
-        return self.run_id, self.target_tick, self.names, bits, self.release, self.sim_run_id
+        return (
+            self.run_id,
+            self.target_tick,
+            self.names,
+            bits,
+            self.release,
+            self.sim_run_id,
+            self.alarm_ids,
+            self.alarms,
+        )
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,8 @@ class LockstepService:
             tuple(request.values),
             request.release,
             request.sim_run_id,
+            tuple(request.alarm_ids),
+            tuple(request.alarms),
         )
         with self._lock:
             full = self._waiting >= MOST_WAITING

@@ -54,7 +54,7 @@ class Reception:
             if given.operation == SET:
                 self._inbox.receive()
         self._handed = len(waiting)
-        self._handed_bytes = sum(size_of(given.names, given.values) for given in waiting)
+        self._handed_bytes = sum(size_of(given) for given in waiting)
         self._inbox.occupy(self._handed, self._handed_bytes)
 
     def take_account(self, outcomes: Sequence[CommandOutcome]) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import CommandOutcome, Input
+from conveyor_sim.line.inputs import SET, CommandOutcome, Input
 from conveyor_sim.ros.advance import Advance, refuse
 from conveyor_sim.ros.calls import Calls
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
@@ -208,14 +208,15 @@ class Stepper:
         if self._advance is not None and not self.lockstep.owner:
             raise Refused(f"an advance to tick {self._advance.target} is still under way")
         simulation = self.session.simulation
-        size = size_of(request.names, request.values)
-        if size > MESSAGE_BYTES:
+        sizes = [size_of(given) for given in request.inputs]
+        if sum(sizes) > MESSAGE_BYTES:
             raise Refused(f"its commands are {TOO_LARGE}")
         answer = self.lockstep.accept(request, self.session.run_id, simulation.tick, self.session.last_tick)
-        if request.names or request.values:
-            self.inbox.receive()
+        for given, size in zip(request.inputs, sizes, strict=True):
+            if given.operation == SET:
+                self.inbox.receive()
             self.inbox.occupy(1, size)  # even if the queue is full: the advance is what empties it
-            self.reception.hand_over(self.session, request.input, size)
+            self.reception.hand_over(self.session, given, size)
         self.pacer.catch_breath(time.monotonic())
 
         def done() -> None:

@@ -19,6 +19,7 @@ from conveyor_sim.line.tag import Adds
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import StepLimit, step_limit
 from conveyor_sim.model.step_choice import choose_steps
+from conveyor_sim.observe.alarm_figures import AlarmTally
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
@@ -29,10 +30,8 @@ from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 
 GUARD_TEXTS = 3
-TAKEN = {
-    TOPICS[name].type: TOPICS[name]
-    for name in ("bottles", "signals", "ledger", "damage", "damage_events", "outcomes", "guard")
-}
+SUMMED = ("bottles", "signals", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states")
+TAKEN = {TOPICS[name].type: TOPICS[name] for name in SUMMED}
 """What is summed up, by message type: the topics may have been renamed."""
 
 
@@ -59,6 +58,7 @@ class _Tally:
         self._guard: list[tuple[str, str]] = []
         self._borne: LoadHistory | None = None
         self._passed: list[tuple[str, str]] = []
+        self._alarms = AlarmTally()
         self._pressing = PressWatch()
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
@@ -85,6 +85,11 @@ class _Tally:
             self._passed.append((printable(message.kind), printable(message.text, SENTENCE)))
         elif topic == "ledger":
             self._ledger = read
+        elif topic == "events":
+            for at, kind, name in zip(read.at, read.kind, read.name, strict=True):
+                self._alarms.event(self._bag.time(int(at)), kind, printable(name))
+        elif topic == "alarm_states":
+            self._alarms.states = read
         else:
             self._outcomes[bool(message.accepted)] += 1
 
@@ -94,10 +99,11 @@ class _Tally:
         peak = None if self._unknown else float(forces.max(initial=0.0))
         line, model = self._bag.line, _model(self._bag.line)
         roles = None if model is None else _roles(line, model)
+        seconds = self._bag.time(max(0, self._last_tick - int(line.tick)))
         return Summary(
             scene=printable(line.scene_name),
             bag=printable(self._bag.path, SENTENCE),
-            simulated=self._bag.time(max(0, self._last_tick - int(line.tick))),
+            simulated=seconds,
             wall=wall,
             fed=self._counted(roles, "fed"),
             removed=self._counted(roles, "removed", "rejected"),
@@ -119,6 +125,7 @@ class _Tally:
             borne=self._borne,
             damage_events=dict(Counter(kind for kind, _ in self._passed)),
             damage_texts=[text for _, text in self._passed[:GUARD_TEXTS]],
+            alarms=self._alarms.figures(seconds, int(line.tick_ns) * 1e-9) if "events" in self._bag.counts else None,
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
             topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model.remedies import StepLimit
+from conveyor_sim.observe.alarm_figures import AlarmFigures
 from conveyor_sim.observe.load_history import LoadHistory
 from conveyor_sim.runs.force_check import ForceCheck, Pressed
 
@@ -127,6 +128,8 @@ class Summary:
     """How often a limit was passed, by limit."""
     damage_texts: list[str]
     """What was said of it, the first times."""
+    alarms: AlarmFigures | None
+    """None if events were not recorded."""
     commands: int
     refused: int
     """Of the commands."""

@@ -58,6 +58,7 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         ("guard", _told(summary.guard, summary.guard_texts)),
         *([] if summary.borne is None else [("damage", summary.borne.sentence)]),
         *([("limits passed", _told(summary.damage_events, summary.damage_texts))] if summary.damage_events else []),
+        *([("alarms", summary.alarms.sentence)] if summary.alarms is not None and summary.alarms.any else []),
         *([] if summary.energy is None else [("energy", summary.energy.sentence)]),
         ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
     ]

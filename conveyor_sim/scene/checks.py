@@ -32,6 +32,7 @@ def problems_of(scene: Scene) -> list[Problem]:
         *_unknown_types(scene),
         *_rail_names(scene),
         *_devices(scene),
+        *_alarms(scene),
         *_moving_rails(scene),
         *limit_problems(scene),
         *shape_problems(scene),
@@ -132,6 +133,11 @@ def _devices(scene: Scene) -> Iterator[Problem]:
     others = scene.named()
     for path, part in scene.devices():
         yield from part.problems(path, others)
+
+
+def _alarms(scene: Scene) -> Iterator[Problem]:
+    for name, alarm in scene.alarms.items():
+        yield from (Problem(("alarms", name, field), text) for field, text in alarm.wrong())
 
 
 def _moving_rails(scene: Scene) -> Iterator[Problem]:

@@ -13,6 +13,7 @@ from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Frame, Plant
 from conveyor_sim.plot.moment import Event, Trace, moment_figure
 from conveyor_sim.plot.recording import contact_lines
+from conveyor_sim.testing.history import History
 from conveyor_sim.testing.scenario import Scenario
 
 PICTURE = "line.png"
@@ -70,9 +71,15 @@ def traced(scenario: Scenario) -> list[str]:
     """What to trace: what the last conditions read, the alarms, the commands in force, what the controller reads."""
     history = scenario.history
     commands = [name for name in scenario.simulation.process_image.command_names if np.isfinite(history[name][-1])]
-    alarms = [name for name in history.names if name.startswith(ALARMS)]
+    alarms = came(history)
     wanted = dict.fromkeys([*scenario.read_by_conditions, *alarms, *commands, *scenario.read_by_controller])
     return list(wanted)[:_MOST_ROWS]
+
+
+def came(history: History) -> list[str]:
+    """Names of the alarms that stood at any time, in the order in which they came."""
+    columns = {name: history[name] for name in history.names if name.startswith(ALARMS)}
+    return sorted((name for name, column in columns.items() if column.any()), key=lambda name: columns[name].argmax())
 
 
 def _frame(scenario: Scenario) -> Frame:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from conveyor_sim.bag.input_log import InputLog
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import ALARMS, ON, AlarmChanges, ControlError, Controller
+from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import FAULT, INJECT, SET, Input
+from conveyor_sim.line.inputs import DECLARE, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
@@ -112,9 +112,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._signals: dict[str, float] = {}
         self._stopped = False  # by the guard
         self._look()
-        if standing := {f"{ALARMS}{name}": 1.0 for name in sorted(self.simulation.alarms)}:
-            self._alarms = self._changes.of(standing)
-            self.history.alarms(self._alarms)
+        # Those of a controller before a checkpoint: one that is attached now and does not have them clears them.
+        self._changes.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in self.simulation.line.alarms if alarm.is_said})
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -137,13 +136,13 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     @property
     def signals(self) -> Present:
-        """The present signals by name, alarms among them ("alarms/<name>")."""
+        """The present signals by name, alarms among them ("alarms/<id>"), 1 while they stand."""
         return self._present({**self._signals, **self._alarms})
 
     @property
     def alarms(self) -> frozenset[str]:
-        """Names of the alarms that stand, as of the controller's last scan."""
-        return frozenset(name.removeprefix(ALARMS) for name, value in self._alarms.items() if value >= ON)
+        """Ids of the alarms that stand."""
+        return self.simulation.alarms
 
     @property
     def read_by_conditions(self) -> tuple[str, ...]:
@@ -159,6 +158,9 @@ class Scenario(AbstractContextManager["Scenario"]):
         """Have a controller scan at this tick and every one to come, in place of the one before."""
         self._end_node()
         self._controller = controller
+        if declared := declared_alarms(controller):
+            ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
+            self._give(Input(CONTROLLER, type(controller).__name__, "controller", DECLARE, ids, (), texts))
         self._scan(controller)
 
     def attach_node(
@@ -325,6 +327,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         now = self.simulation.signals()
         self.history.begin_tick(self.time, now)
         self._signals = dict(zip(self.simulation.process_image.signal_names, now.tolist(), strict=True))
+        alarms = self.simulation.line.alarms
+        if alarms.changed:
+            self._alarms |= alarms.said()
+            self.history.alarms(self._alarms)
 
     def _scan(self, controller: Controller) -> None:
         inputs = self._present(self._signals)
@@ -337,8 +343,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         alone = self._node is None
         changes = self._changes.of(answer if alone else {})
         self._answer = {**commands, **changes} if alone else {**changes, **answer}
-        self._alarms |= {name: value for name, value in self._answer.items() if name.startswith(ALARMS)}
-        self.history.alarms(self._alarms)
+        # The line is given them as the next tick begins; until then they are there, and don't stand.
+        if new := {name: 0.0 for name in self._answer if name.startswith(ALARMS) and name not in self._alarms}:
+            self._alarms |= new
+            self.history.alarms(new)
 
     def _present(self, values: Mapping[str, float]) -> Present:
         return Present(values, self.time, self.simulation.tick, self.scene.tick)

@@ -59,6 +59,7 @@ def test_rates_are_those_of_the_scene(scene: Scene) -> None:
     assert counts == {
         "line": 1,
         "readback": 3,
+        "alarm_states": 1,
         "run_state": 0,
         "plant": 1,
         "outcomes": 4,

@@ -29,6 +29,7 @@ from conveyor_sim.scene import Scene
 COUNTS = {
     "/line": 1,
     "/readback": 4,
+    "/alarm_states": 2,
     "/plant": 1,
     "/outcomes": 5,
     "/bottles": 51,
@@ -82,7 +83,7 @@ def test_metadata_tells_rosbag2_what_is_there(bag: Path) -> None:
             assert connection.msgtype == output.type
             assert connection.digest == type_hash(output.type)
             (qos,) = connection.ext.offered_qos_profiles  # type: ignore[union-attr]
-            latched = output.name in ("line", "plant", "readback", "run_state")
+            latched = output.name in ("line", "plant", "readback", "alarm_states", "run_state")
             assert qos.durability == (QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE)
             assert qos.reliability == QosReliability.RELIABLE
             assert qos.depth == output.qos.depth

@@ -42,6 +42,7 @@ def test_recording_replays_bit_for_bit(bag: Path) -> None:
         "events": 8,
         "outcomes": 5,
         "readback": 4,
+        "alarm_states": 2,
     }
     assert told[-1] == pytest.approx(1.0)
 

@@ -29,7 +29,7 @@ def seen(sim: Simulation, name: str) -> tuple[float, ...]:
 
 def test_the_process_image_has_them() -> None:
     image = alone().process_image
-    assert tuple(name for name in image.signal_names if not name.startswith("belts/")) == (
+    assert tuple(name for name in image.signal_names if not name.startswith(("belts/", "alarm"))) == (
         "gates/g/position", "gates/g/is_closed", "gates/g/is_open", "gates/g/blocked",
         "pushers/p/position", "pushers/p/retracted", "pushers/p/extended", "pushers/p/blocked",
         "gates/g/mode", "pushers/p/mode",

@@ -175,9 +175,9 @@ def test_faults_out_of_range_are_refused() -> None:
 
 def test_a_scene_without_sensors_has_none_and_does_nothing_for_them() -> None:
     bare, full = eye_line(), eye_line(photo_eyes={"eye": across(0.3)})
-    assert {name.split("/")[0] for name in bare.process_image.signal_names} == {"belts"}
+    assert {name.split("/")[0] for name in bare.process_image.signal_names} == {"belts", "alarm_counts"}
     assert bare.process_image.faults == ()
-    assert {device.name.split("/")[0] for device in bare._line._devices} == {"belts"}
+    assert {device.name.split("/")[0] for device in bare._line._devices} == {"belts", "alarms"}
     for sim in (bare, full):
         sim.advance(100)
     assert bare.state_hash() == full.state_hash()

@@ -8,7 +8,7 @@ from conveyor_sim.scene import parse_scene
 
 def test_every_class_of_device_is_in_a_table() -> None:
     tags = image_of(parse_scene(EVERYTHING)).tags
-    assert {tag.device_class for tag in tags} == {*DEVICES, "run"}
+    assert {tag.device_class for tag in tags} == {*DEVICES, "alarms", "run"}
     rows = [
         line
         for name, table in tables().items()

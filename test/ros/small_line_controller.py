@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from conveyor_sim.control import Controller, Inputs, together
+from conveyor_sim.control import Alarm, Controller, Inputs, together
 from conveyor_sim.control.level import Count, LevelControl
 
 BOTTLES = "belts/table/bottles"
@@ -15,6 +15,7 @@ class TableFull:
 
     def __init__(self, high: float) -> None:
         self.high = high
+        self.declared_alarms = (Alarm("table full", f"{high:g} bottles on the table", "error", tag=BOTTLES),)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """The alarm."""

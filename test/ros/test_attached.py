@@ -55,6 +55,8 @@ def test_a_node_gives_the_bits_of_its_scan_function(scenario: Scenario) -> None:
         assert np.array_equal(other.history[FULL], scenario.history[FULL])
         assert np.ptp(other.history[FULL]) > 0.0  # it did come
         assert other.simulation.alarms == other.alarms == scenario.alarms
+        for line in (scenario, other):  # as it was declared, with the first request
+            assert line.simulation.line.alarms["table full"].text == f"{HIGH} bottles on the table"
 
 
 def test_it_is_served_as_by_the_simulation_s_own_node(scenario: Scenario, domain: int, client: LineClient) -> None:

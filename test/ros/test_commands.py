@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from conveyor_msgs.msg import Belts, CommandOutcome, Commands, Events
+from conveyor_msgs.msg import AlarmStates, Belts, CommandOutcome, Commands, Events
 from ros.line_client import LineClient, until
 from std_msgs.msg import Float64
 
@@ -91,6 +91,19 @@ def test_an_alarm_is_in_the_events_at_its_tick_even_beside_a_refused_command(sen
         (raised,) = [row for message in events.messages for row in rows(message) if row[1:3] == ("alarm_raised", ALARM)]
     assert raised == (outcomes[0].tick, "alarm_raised", ALARM, -1, 1.0)
     assert found == [(outcomes[1].tick, "alarm_cleared", ALARM, -1, 0.0)]
+
+
+def test_a_declaration_of_an_alarm_comes_before_the_commands_beside_it(sender: Sender) -> None:
+    declared = {"alarm_ids": ["declared"], "alarms": ['{"text": "it is there", "on_delay": 0.5}']}
+    outcome = sender.outcome_of(sender.commands, Commands(**declared))
+    assert (outcome.accepted, outcome.operation, list(outcome.names)) == (True, "declare", ["declared"])
+    outcome = sender.outcome_of(sender.commands, Commands(alarm_ids=["declared"], alarms=['{"class": 1}']))
+    assert not outcome.accepted
+    assert outcome.reason.startswith("alarm declared: class: no such field")
+    with sender.line.listen(AlarmStates, "alarm_states") as states:  # whoever comes late
+        message = until(lambda: states.messages and states.messages[-1], "alarm_states")
+    at = list(message.id).index("declared")
+    assert (message.text[at], message.state[at], message.declared_by[at]) == ("it is there", 0, "commands")
 
 
 def test_a_speed_sent_to_a_belt_changes_that_belt(sender: Sender) -> None:

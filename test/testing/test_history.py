@@ -53,7 +53,7 @@ def test_alarms_are_0_before_they_are_first_told_of(table: Scenario) -> None:
     table.run_until(lambda s: s["alarms/full"], within=10)
     table.run_for(0.1)
     full = table.history["alarms/full"]
-    assert full.tolist() == (table.history[ON_TABLE] >= 1).tolist()
+    assert full.tolist() == [False, *(table.history[ON_TABLE] >= 1).tolist()[:-1]]  # the line has it a tick later
     assert table.history[FEEDER][-2] == 0.0
     assert table.history.marks == []  # the controller's commands are none
 

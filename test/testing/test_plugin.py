@@ -7,11 +7,11 @@ from importlib.metadata import entry_points
 import pytest
 from testing.conftest import ON_TABLE, STOP, TABLE
 from testing.test_documented import PLUGIN
-from testing.test_scenario import Hold
+from testing.test_scenario import FEEDER, Hold
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.testing import Scenario
-from conveyor_sim.testing.evidence import traced
+from conveyor_sim.testing.evidence import came, traced
 
 TESTS = f"""
 import pytest
@@ -127,5 +127,13 @@ def test_what_is_traced() -> None:
     with pytest.raises(AssertionError):
         table.always(lambda s: s["infeeds/lane_1/fed"] > 90, for_=1)
     assert traced(table) == [
-        "infeeds/lane_1/fed", "machines/packer/running", "alarms/full", "belts/feeder/cmd_speed", ON_TABLE,
+        "infeeds/lane_1/fed", "machines/packer/running", "belts/feeder/cmd_speed", ON_TABLE,
     ]  # fmt: skip
+
+
+def test_alarms_are_traced_that_came_in_their_order() -> None:
+    table = Scenario(TABLE, {"alarms": {"one": {"tag": ON_TABLE, "high": 0}, "never": {"tag": ON_TABLE, "high": 99}}})
+    table.attach(Hold(1))
+    table.run_until(lambda s: s["alarms/full"], within=10)
+    assert came(table.history) == ["alarms/one", "alarms/full"]
+    assert traced(table)[:3] == ["alarms/full", "alarms/one", FEEDER]

@@ -116,6 +116,11 @@ class Alarm:
         return bool(self.shelved) or self.suppressed or self.out_of_service
 
     @property
+    def is_said(self) -> bool:
+        """Whether a controller has said, last, that its condition holds."""
+        return self.condition and not self.own and not self.fields.measured
+
+    @property
     def stands(self) -> bool:
         """Whether it is shown, and active or latched."""
         return self.main in STANDING
@@ -145,6 +150,11 @@ class Alarm:
             self.main = (LATCHED if self.fields.latching else CLEARED)[self.main]
             happened.append("alarm_latched" if self.fields.latching else "alarm_cleared")
         return happened
+
+    def delay(self, due: int) -> None:
+        """Count as not active until a tick, without having ended."""
+        self.active = self._heard = False
+        self.due = due
 
     def recall(self) -> None:
         """Its attributes were restored: it has settled."""

@@ -5,21 +5,31 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from difflib import get_close_matches
 from graphlib import CycleError
 from heapq import heappop, heappush
+from typing import NamedTuple
 
 import numpy as np
 
 from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, Alarm, AlarmState
-from conveyor_sim.line.alarms.declaration import Declared, ranks
+from conveyor_sim.line.alarms.declaration import MOST_ALARMS, Declared, ranks
 from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.events import Kind
 from conveyor_sim.scene.parts.alarm import CLASSES, PREFIX, AlarmFields
 from conveyor_sim.support.printable import printable
 
-MOST_ALARMS = 1000
-"""That controllers have at once, beside those of the line and the scene: declared, or raised without a declaration."""
-
 Note = Callable[[int, Kind, str, float, str], None]
 """Takes an event: tick, kind, name, value (1 while the alarm stands), text."""
+
+
+class DeclarationProblem(NamedTuple):
+    """Why an alarm can't be declared."""
+
+    id: str
+    field: str
+    text: str
+    """What was given, and what was expected."""
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (f"alarm {self.id}", self.field, self.text) if part)
 
 
 class Alarms:
@@ -32,8 +42,7 @@ class Alarms:
         self._groups: dict[str, list[Alarm]] = {}
         self._follow: dict[str, list[Alarm]] = {}  # of each id, whom it suppresses
         self._next: float = np.inf  # no deadline is before this tick
-        self._counts: tuple[float, ...] | None = None
-        self._standing: tuple[float, ...] | None = None
+        self._tags: tuple[float, ...] | None = None
         self.numbered = 0
         """Alarms so far, those that were forgotten too."""
         self.first: dict[str, str] = {}
@@ -59,34 +68,33 @@ class Alarms:
 
     # Declarations
 
-    def declaration_problem(self, declared: Sequence[Declared]) -> str:
-        """Why alarms can't be declared, "" if they can."""
+    def declaration_problem(self, declared: Sequence[Declared]) -> DeclarationProblem | None:
+        """Why alarms can't be declared; None if they can."""
         new = dict(declared)
-        for id, fields in new.items():
+        for id, fields in declared:
             present = self._all.get(id)
             if present is not None and present.own:
-                return f"alarm {id}: is declared by the {present.declared_by}, expected another id"
+                return DeclarationProblem(id, "id", f"is declared by the {present.declared_by}, expected another one")
             if fields.tag is not None and fields.tag not in self._signals:
-                close = get_close_matches(fields.tag, self._signals, n=1)
-                hint = f", such as {close[0]}" if close else ""
-                return f"alarm {id}: tag: {printable(fields.tag)} given, expected a signal of the line{hint}"
+                expected = f"expected a signal of the line{_hint(fields.tag, self._signals)}"
+                return DeclarationProblem(id, "tag", f"{printable(fields.tag)} given, {expected}")
             for cause in fields.suppressed_by:
                 if cause not in new and cause not in self._all:
-                    close = get_close_matches(cause, [*new, *self._all], n=1)
-                    hint = f", such as {close[0]}" if close else ""
-                    return (
-                        f"alarm {id}: suppressed_by: {cause} given, expected an alarm that is declared before or "
-                        f"together with it{hint}"
-                    )
+                    expected = "expected an alarm that is declared before or together with it"
+                    hint = _hint(cause, [*new, *self._all])
+                    return DeclarationProblem(id, "suppressed_by", f"{cause} given, {expected}{hint}")
         try:
             ranks({**{alarm.id: alarm.fields.suppressed_by for alarm in self}, **_causes(new)})
         except CycleError as error:
-            text = " by ".join(error.args[1][::-1])
-            return f"suppressed_by: {printable(text)} given, expected no alarm that suppresses itself in a circle"
+            text = printable(" by ".join(error.args[1][::-1]))
+            expected = "expected no alarm that suppresses itself in a circle"
+            first = next(id for id in new if id in error.args[1])
+            return DeclarationProblem(first, "suppressed_by", f"{text} given, {expected}")
         kept = self._kept() | {id for causes in _causes(new).values() for id in causes if not self._own(id)}
         if len(kept | new.keys()) > MOST_ALARMS:
-            return f"{len(new)} alarms declared beside {len(kept - new.keys())}, expected {MOST_ALARMS} at most"
-        return ""
+            text = f"{len(new)} alarms declared beside {len(kept - new.keys())}, expected {MOST_ALARMS} at most"
+            return DeclarationProblem(declared[0].id, "", text)
+        return None
 
     def declare(self, tick: int, declared: Sequence[Declared], by: str, own: bool = False) -> None:
         """Know alarms as declared; `declaration_problem` has nothing against it. by: who declares them, never "".
@@ -114,7 +122,7 @@ class Alarms:
         for alarm in sorted(self, key=lambda alarm: alarm.rank):
             alarm.suppressed = self._caused(alarm)
             alarm.recall()
-        self._next, self._counts, self._standing, self.changed = 0, None, None, True
+        self._next, self._tags, self.changed = 0, None, True
 
     # Conditions
 
@@ -145,20 +153,18 @@ class Alarms:
 
         One that nobody has declared is as by default; if there is no room for it, it is left out.
         """
-        turned = []
-        for id, on in said.items():
-            alarm = self._all.get(id)
-            if alarm is None:
-                if not self._make_room(1):
-                    continue
-                alarm = self._add(id, UNDECLARED, "", False)
-                turned.append(alarm)
-            if alarm.condition is not on:
-                alarm.condition = on
-                if self._turn(alarm, tick):
-                    turned.append(alarm)
+        new = [id for id in said if id not in self._all]
+        turned = [self._all[id] for id, on in said.items() if id in self._all and self._say(id, on, tick)]
         if turned:
             self.settle(tick, turned)
+        # Only then, for it may be forgotten what has just ended.
+        made = []
+        for id in new:
+            if self._make_room(1):
+                made.append(self._add(id, UNDECLARED, "", False))
+                self._say(id, said[id], tick)
+        if made:
+            self.settle(tick, made)
 
     def end(self, tick: int) -> None:
         """What falls due as a tick ends."""
@@ -201,7 +207,12 @@ class Alarms:
             queue(alarm)
         while waiting:
             alarm = self._all[heappop(waiting)[-1]]
-            alarm.suppressed = self._caused(alarm)
+            caused = self._caused(alarm)
+            if alarm.suppressed and not caused and alarm.active and alarm.delays[True]:
+                # What followed from a cause has its delay to end after it.
+                alarm.delay(tick + alarm.delays[True])
+                self.watch(alarm)
+            alarm.suppressed = caused
             for kind in alarm.settle():
                 self.note(tick, kind, alarm, self._why(kind, alarm))
             if alarm.fields.group and alarm.main is AlarmState.UNACKNOWLEDGED:
@@ -215,7 +226,7 @@ class Alarms:
         for group in {self._all[id].fields.group for id in queued} & self.first.keys():
             if all(alarm.main is AlarmState.NORMAL for alarm in self._groups[group]):
                 del self.first[group]
-        self._counts = self._standing = None
+        self._tags = None
         self.changed = True
 
     def note(self, tick: int, kind: Kind, alarm: Alarm, text: str) -> None:
@@ -228,18 +239,24 @@ class Alarms:
         """How many stand of each class, how many wait to be acknowledged, and the number of the first-out alarm that
         came first; 0: there is none.
         """
-        if self._counts is None:
-            standing = [alarm.fields.alarm_class for alarm in self if alarm.stands]
-            waiting = sum(alarm.main in ACKNOWLEDGED for alarm in self)
-            first = next((self._all[id].number for id in self.first.values()), 0)
-            self._counts = (*(float(standing.count(kind)) for kind in CLASSES), float(waiting), float(first))
-        return self._counts
+        standing = [alarm.fields.alarm_class for alarm in self if alarm.stands]
+        waiting = sum(alarm.main in ACKNOWLEDGED for alarm in self)
+        first = next((self._all[id].number for id in self.first.values()), 0)
+        return (*(float(standing.count(kind)) for kind in CLASSES), float(waiting), float(first))
 
-    def standing(self) -> tuple[float, ...]:
-        """1 for each alarm of line and scene that stands, 0 for the others, in their order."""
-        if self._standing is None:
-            self._standing = tuple(float(alarm.stands) for alarm in self if alarm.own)
-        return self._standing
+    def tag_values(self) -> tuple[float, ...]:
+        """The counts, then 1 for each alarm of line and scene that stands and 0 for the others, in their order."""
+        if self._tags is None:
+            self._tags = (*self.counts(), *(float(alarm.stands) for alarm in self if alarm.own))
+        return self._tags
+
+    def said(self) -> dict[str, float]:
+        """1 or 0 for each alarm of controllers, by its name in the process image."""
+        return {PREFIX + alarm.id: float(alarm.stands) for alarm in self if not alarm.own}
+
+    def changes(self) -> AlarmColumns | None:
+        """All of them, if anything of them has changed in this tick; at the start if there are any."""
+        return self.columns() if self.changed and self._all else None
 
     def columns(self) -> AlarmColumns:
         """All of them."""
@@ -282,8 +299,12 @@ class Alarms:
         self.first = {group: id for group, id in self.first.items() if self._all[id].fields.group == group}
         self.measured = tuple(alarm for alarm in self if alarm.fields.measured)
 
-    def _turn(self, alarm: Alarm, tick: int) -> bool:
-        """Its condition has changed; whether that counts at once."""
+    def _say(self, id: str, on: bool, tick: int) -> bool:
+        """Whether a condition holds now; whether that is news, and counts at once."""
+        alarm = self._all[id]
+        if alarm.condition is on:
+            return False
+        alarm.condition = on
         delay = alarm.delays[alarm.condition]
         if alarm.condition is alarm.active:
             alarm.due = NEVER
@@ -329,6 +350,11 @@ class Alarms:
                 del self._all[id]
             full -= len(spare)
         return full <= 0
+
+
+def _hint(given: str, known: Iterable[str]) -> str:
+    close = get_close_matches(given[:200], known, n=1)
+    return f", such as {close[0]}" if close else ""
 
 
 def _causes(declared: Mapping[str, AlarmFields]) -> dict[str, tuple[str, ...]]:

@@ -1,6 +1,7 @@
 """Declarations of alarms as they travel: an id, and a JSON object with the fields that a scene has for one."""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from graphlib import TopologicalSorter
 from typing import NamedTuple
@@ -8,6 +9,9 @@ from typing import NamedTuple
 from conveyor_sim.scene.part import part_from
 from conveyor_sim.scene.parts.alarm import AlarmFields, id_problem
 from conveyor_sim.support.printable import SENTENCE, printable
+
+MOST_ALARMS = 1000
+"""That controllers have at once, beside those of the line and the scene: declared, or raised without a declaration."""
 
 LONGEST_TEXT = 20_000
 """Characters of one declaration."""
@@ -20,10 +24,29 @@ class Declared(NamedTuple):
     fields: AlarmFields
 
 
+LINE_GROUP = "line"
+"""Group of the line's own alarms."""
+
+
+def error(id: str, text: str, tag: str) -> Declared:
+    """An alarm of the line that a device has stopped doing its work. tag: the signal that shows it."""
+    return Declared(id, AlarmFields(text=text, alarm_class="error", tag=tag, group=LINE_GROUP))
+
+
+def as_sent(text: str) -> str:
+    """A declaration fit to be kept and recorded: as it came, but for what does not print, and for what is too long."""
+    return printable(text.translate(_SPACES), LONGEST_TEXT + 1)
+
+
+_SPACES = str.maketrans("\n\r\t", "   ")
+
+
 def parse(ids: Sequence[str], texts: Sequence[str]) -> list[Declared] | str:
     """What an input declares, or why it can't be read: field, value, what was expected."""
     if not ids or len(ids) != len(texts):
         return f"{len(ids)} ids and {len(texts)} declarations of alarms given, expected as many of both, one at least"
+    if len(ids) > MOST_ALARMS:
+        return f"{len(ids)} alarms declared in one input, expected {MOST_ALARMS} at most"
     found = []
     for id, text in zip(ids, texts, strict=True):
         if problem := id_problem(id):
@@ -32,7 +55,7 @@ def parse(ids: Sequence[str], texts: Sequence[str]) -> list[Declared] | str:
         if isinstance(fields, str):
             return f"alarm {id}: {fields}"
         found.append(Declared(id, fields))
-    if twice := sorted({id for id in ids if ids.count(id) > 1}):
+    if twice := [id for id, times in Counter(ids).items() if times > 1]:
         return f"alarm {twice[0]}: declared twice in one input"
     return found
 

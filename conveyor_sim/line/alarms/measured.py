@@ -1,6 +1,6 @@
 """Conditions of alarms on measured values: those of the scene, and of controllers that gave a limit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from conveyor_sim.line.alarms.alarm import Alarm
@@ -22,21 +22,19 @@ class Measured:
         self._of: tuple[Alarm, ...] = ()
         self._watched: list[tuple[Device, list[_Watched]]] = []
 
-    def look(self, tick: int, now: ScanContext) -> None:
-        """A tick has ended: say which conditions hold."""
+    def changes(self, now: ScanContext, forced: Mapping[str, float]) -> dict[str, bool]:
+        """The conditions that have begun or ended, by id. forced: signals that are read otherwise than they are."""
         if self._of is not self._alarms.measured:
             self._find()
-        if not self._watched:
-            return
-        said = {}
+        changed = {}
         for device, watched in self._watched:
             values = device.values(now)
             for alarm, column in watched:
-                holds = beyond(alarm, float(values[column]))
+                value = forced.get(alarm.fields.tag or "") if forced else None
+                holds = beyond(alarm, float(values[column]) if value is None else value)
                 if holds is not alarm.condition:
-                    said[alarm.id] = holds
-        if said:
-            self._alarms.say(tick, said)
+                    changed[alarm.id] = holds
+        return changed
 
     def _find(self) -> None:
         self._of = self._alarms.measured

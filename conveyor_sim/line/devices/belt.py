@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.authority import AUTOMATIC
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import speed_command
@@ -49,10 +50,20 @@ class BeltDevice(Device):
         timeout = belt.watchdog
         self.watchdog = None if timeout is None else Watchdog(max(1, math.ceil(timeout / setup.scene.tick - 1e-9)))
 
+    @property
+    def alarms(self) -> Sequence[Declared]:
+        """Its watchdog has stopped it."""
+        if self.watchdog is None:
+            return ()
+        text = f"{self.name} stopped: no command came for its watchdog"
+        return (error(f"{self.name}/watchdog", text, f"{self.name}/speed"),)
+
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take a setpoint, m/s."""
         now.setpoints[self._index] = value
         if self.watchdog is not None:
+            if self.watchdog.tripped:
+                now.alarm(f"{self.name}/watchdog", False)
             self.watchdog.command(now.tick)
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
@@ -65,6 +76,7 @@ class BeltDevice(Device):
         if self.watchdog is None or not self.watchdog.trips(now.tick):
             return ""
         now.setpoints[self._index] = 0.0
+        now.alarm(f"{self.name}/watchdog", True)
         return self._speed_command
 
     def begin(self, now: ScanContext) -> None:

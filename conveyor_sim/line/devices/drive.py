@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.edge import RisingEdge
@@ -37,6 +38,7 @@ class DriveDevice(BeltDevice):
             tags.append(count(f"{name}/pulses", "counter", text, low=-MOST_COUNT))
         super().__init__(name, belt, setup, tags, backward=True)
         self._drive = drive
+        self._tripped = f"{name}/tripped"
         self.ramp = Ramp(belt.speed)
         self.run = True
         self.reverse = False
@@ -45,6 +47,11 @@ class DriveDevice(BeltDevice):
         self.tripped = False
         self.travel = 0.0
         """m, forward less backward."""
+
+    @property
+    def alarms(self) -> Sequence[Declared]:
+        """It has tripped, beside those of a belt."""
+        return (error(self._tripped, f"the drive of {self.name} has tripped", f"{self.name}/fault"), *super().alarms)
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take a setpoint (m/s), run, reverse, reset, or the fault trip."""
@@ -56,9 +63,11 @@ class DriveDevice(BeltDevice):
         elif what == "reset":
             if self.reset.rises(value) and not self.trip:
                 self.tripped = False
+                now.alarm(self._tripped, False)
         elif what == "trip":
             self.trip = value != 0.0
             self.tripped = self.tripped or self.trip
+            now.alarm(self._tripped, self.tripped)
         else:
             super().command(name, value, now)
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.counter import CounterDevice
@@ -54,6 +55,11 @@ class IndicatorDevice(Device):
         """Ticks for which nothing was there to leave."""
         self.jam = self.starved = self.blocked = False
 
+    @property
+    def alarms(self) -> Sequence[Declared]:
+        """A jam."""
+        return (error(f"{self.name}/jam", f"{self.name} shows a jam", f"{self.name}/jam"),)
+
     def end(self, now: ScanContext) -> None:
         """Judge this tick."""
         if now.tick == 0:
@@ -71,7 +77,10 @@ class IndicatorDevice(Device):
         self.blocked = bool(waits and wants and held)
         self.stuck = 0 if more or not waits or not runs or self.blocked else self.stuck + 1
         # A jam is not cleared by stopping the belt.
-        self.jam = self.stuck >= self._jam_ticks or (self.jam and waits and not more)
+        jam = bool(self.stuck >= self._jam_ticks or (self.jam and waits and not more))
+        if jam is not self.jam:
+            self.jam = jam
+            now.alarm(f"{self.name}/jam", jam)
         self.empty = self.empty + 1 if runs and not waits else 0
         self.starved = self.empty >= self._starved_ticks
 

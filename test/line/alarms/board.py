@@ -26,9 +26,9 @@ class Board:
         """Why not, "" if it was."""
         alarms = [Declared(id, AlarmFields(**fields)) for id, fields in declared.items()]
         problem = self.alarms.declaration_problem(alarms)
-        if not problem:
+        if problem is None:
             self.alarms.declare(self.tick, alarms, "line" if own else "plc", own)
-        return problem
+        return "" if problem is None else str(problem)
 
     def say(self, **conditions: bool) -> list[str]:
         """What happened then: kinds and ids."""

@@ -5,7 +5,7 @@ import re
 import pytest
 from line.alarms.board import Board
 
-from conveyor_sim.line.alarms.alarms import MOST_ALARMS
+from conveyor_sim.line.alarms.declaration import MOST_ALARMS
 
 
 def test_the_delays_are_those_of_ton_and_tof() -> None:
@@ -83,6 +83,23 @@ def test_a_cause_that_comes_later_hides_what_stands() -> None:
     board.say(jam=True)
     assert board.say(trip=True) == ["raised trip", "suppressed jam"]
     assert board.say(trip=False) == ["cleared trip", "raised jam"]
+
+
+def test_what_follows_has_its_delay_to_end_after_its_cause() -> None:
+    board = Board(trip={}, starved={"suppressed_by": ["trip"], "on_delay": 1.0}, empty={"suppressed_by": ["starved"]})
+    board.say(trip=True, starved=True)
+    assert board.to(30) == ["suppressed starved"]
+    assert board.say(empty=True) == ["suppressed empty"]
+    board.do("shelve", "starved")  # until its condition ends, which it does not while it is delayed
+    assert board.say(trip=False) == ["cleared trip", "raised empty"]
+    assert board.states()["starved"] == "SHELVED"
+    board.do("unshelve", "starved")
+    assert board.to(39) == [] and board.to(40) == ["raised starved", "suppressed empty"]
+    board.say(trip=True)
+    board.say(trip=False)
+    board.to(45)
+    board.say(starved=False)  # in time
+    assert board.to(70) == []
 
 
 def test_a_cause_out_of_service_suppresses_nothing_a_shelved_one_does() -> None:
@@ -180,7 +197,7 @@ def test_one_that_is_declared_after_it_was_said_keeps_its_state() -> None:
             {"a": {"suppressed_by": ["b"]}, "b": {"suppressed_by": ["c"]}, "c": {"suppressed_by": ["a"]}},
             "suppressed_by: . by . by . by . given",
         ),
-        ({"trip": {}}, "alarm trip: is declared by the line, expected another id"),
+        ({"trip": {}}, "alarm trip: id: is declared by the line, expected another one"),
         (
             {"a": {"tag": "zone/table/bottles", "high": 3}},
             "alarm a: tag: zone/table/bottles given, expected a signal of the line, such as zones/table/bottles",
@@ -205,7 +222,7 @@ def test_only_so_many() -> None:
     )
     board.say(**{"one more": True})
     assert len(board.alarms) == 1 + MOST_ALARMS and "one more" not in board.alarms
-    assert board.declare(b={}) == f"1 alarms declared beside {MOST_ALARMS}, expected {MOST_ALARMS} at most"
+    assert board.declare(b={}) == f"alarm b: 1 alarms declared beside {MOST_ALARMS}, expected {MOST_ALARMS} at most"
     # In place of one that goes at the same time, and one that is there already, there is room.
     assert board.alarms.room_problem({"a0": False, "one more": True}) == ""
     assert board.declare(a7={"text": "seven"}) == ""

@@ -34,7 +34,7 @@ def seen(fields: dict[str, Any], values: Sequence[float]) -> list[bool]:
     measured, found = Measured(board.alarms, [device, Shown(SIGNALS[1])]), []
     for device.value in values:
         board.tick += 1
-        measured.look(board.tick, NOW)
+        board.say(**measured.changes(NOW, {}))
         board.alarms.end(board.tick)
         found.append(board.alarms["it"].active)
     return found
@@ -59,12 +59,12 @@ def test_limits(fields: dict[str, Any], values: list[float], active: list[int]) 
 def test_only_devices_with_alarms_are_looked_at_each_once() -> None:
     board, one, other = Board(), Shown(SIGNALS[0]), Shown(SIGNALS[1])
     measured = Measured(board.alarms, [one, other])
-    measured.look(1, NOW)
+    assert measured.changes(NOW, {}) == {}
     assert one.looks == other.looks == 0
     board.declare(a={"tag": SIGNALS[1], "high": 1.0}, b={"tag": SIGNALS[1], "high": 3.0})  # later, by a controller
     other.value = 2.0
-    for tick in range(2, 12):
-        measured.look(tick, NOW)
+    for _ in range(10):
+        board.say(**measured.changes(NOW, {}))
     assert (one.looks, other.looks) == (0, 10)
     assert board.states() == {"a": "UNACKNOWLEDGED", "b": "NORMAL"}
     board.declare(a={})
