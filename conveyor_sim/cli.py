@@ -344,6 +344,17 @@ def events(bag: Path, file: Path | None, **chosen: Any) -> None:
 
 @main.command()
 @click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/report).")
+@click.option("--no-pictures", is_flag=True, help="Print only.")
+def report(bag: Path, **chosen: Any) -> None:
+    """Report how the line in BAG produced: bottles, times, OEE, MTBF, MTTR, stop reasons and longest stops."""
+    from conveyor_sim.runs.production_report import report_production
+
+    report_production(bag, **chosen)
+
+
+@main.command()
+@click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: BAG/pictures).")
 @click.option("--time", "times", type=float, multiple=True, help="Simulated time to draw the plant at, s; repeatable.")
 @click.option("--bottle", "bottles", type=int, multiple=True, help="Id of a bottle to draw over time; repeatable.")

@@ -42,7 +42,10 @@ STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
         "First steps": ["docs/build_a_line", "docs/testing_control_logic", "docs/ros"],
-        "A line": ["docs/scene", "docs/line", "docs/alarms", "docs/effects", "docs/base", "docs/energy_and_damage"],
+        "A line": [
+            *("docs/scene", "docs/line", "docs/alarms", "docs/report"),
+            *("docs/effects", "docs/base", "docs/energy_and_damage"),
+        ],
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],
         "Inside": ["docs/architecture", "docs/extending", "docs/api/index", "CONTRIBUTING", "CHANGELOG"],
     },

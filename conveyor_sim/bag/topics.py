@@ -14,6 +14,7 @@ from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES,
 from conveyor_sim.line.run_state import RunState
 from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.observe.events import EventColumns, event_columns
 from conveyor_sim.observe.ledger import Ledger
@@ -242,6 +243,15 @@ _ROWS = (
         state=lambda now: now.sim.line.signals(),
         read=lambda message: message.values,
         compare=Compare(lambda line, _, index: f"signal {line.signal_names[index]}", within={"values": 1e-4}),
+    ),
+    Topic(
+        "counters",
+        "conveyor_msgs/msg/Counters",
+        "bottles, times and efficiency of each machine and of the line since their last reset",
+        rate="counters",
+        state=lambda now: now.sim.line.counters(),
+        columns=CounterColumns,
+        compare=Compare(lambda line, message, index: f"counters of {message.name[index]}"),
     ),
     Topic(
         "ledger",

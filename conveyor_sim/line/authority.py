@@ -33,7 +33,7 @@ MAY: Mapping[str, Right] = {
     "remove_from_service": Right(("engineer", "test"), "Takes alarms out of service."),
     "return_to_service": Right(("engineer", "test"), "Ends that."),
     "declare": Right(("controller", "test"), "Declares a controller's alarms."),
-    "reset_counters": Right(("controller", *PEOPLE, "test"), "Counts of devices, or of all, begin at 0."),
+    "reset_counters": Right(("controller", *PEOPLE, "test"), "Counters and times of devices, or of all, begin anew."),
 }
 """By operation; what is not here, nobody may."""
 

@@ -188,6 +188,12 @@ class Device:
         """The signals' values, in their order."""
         return ()
 
+    def counts(self) -> tuple[int, int, int] | None:
+        """Bottles that it has processed, defective ones among them, and bottles that it has thrown out; None: what it
+        does is not counted.
+        """
+        return None
+
     def states(self, now: ScanContext) -> Sequence[float]:
         """The values of the signals that add to "state", in their order; asked for at every tick."""
         signals = zip(self._signals, self.values(now), strict=True)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 DEFINITIONS: Mapping[str, str] = {
-    "busy": "planned busy time: all time but planned stops",
+    "busy": "planned busy time (PBT): all time but planned stops",
     "availability": "time running / planned busy time (APT / PBT)",
     "effectiveness": "processed bottles / (nominal rate x time running) (PRI x PQ / APT)",
     "quality": "good / processed bottles (GQ / PQ)",
@@ -41,7 +41,7 @@ class Efficiency:
         return self.availability * self.effectiveness * self.quality
 
 
-def efficiency(times: Mapping[str, float], processed: int, defective: int, failures: int, rate: float) -> Efficiency:
+def efficiency(times: Mapping[str, float], processed: int, defective: int, failures: float, rate: float) -> Efficiency:
     """times: s by category, as `time_account` has them; rate: nominal, 1/s; the rest: counted over the same time."""
     running = times["running"]
     return Efficiency(

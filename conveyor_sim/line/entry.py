@@ -52,7 +52,7 @@ class Quality:
     def __init__(self, part: BadBottles, random: np.random.Generator) -> None:
         self._share, self._every, self._at = part.bad_share, part.bad_every, frozenset(part.bad_at)
         self.random = random
-        self.count = 0
+        self.count = self.bad = 0
 
     def judge(self, bottle: int, now: ScanContext) -> None:
         """Decide on the next bottle, by its id."""
@@ -65,4 +65,5 @@ class Quality:
         else:
             bad = self._share > 0.0 and float(self.random.uniform()) < self._share
         if bad:
+            self.bad += 1
             now.bad.add(bottle)

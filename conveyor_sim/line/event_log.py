@@ -22,11 +22,11 @@ class EventLog:
 
     def __init__(self, devices: Sequence[Device], now: ScanContext) -> None:
         """now: at the start, with the states that machines have at first."""
-        # Each machine with the names of its states.
+        # Each machine with its states.
         self._machines = [
-            (device, names)
+            (device, states)
             for device in devices
-            if (names := [signal.name for signal in device.signals if signal.adds_to == "state"])
+            if (states := [signal for signal in device.signals if signal.adds_to == "state"])
         ]
         self.events = []
         self.total = 0
@@ -69,13 +69,14 @@ class EventLog:
 
     def note_states(self, now: ScanContext) -> None:
         """A tick has ended."""
-        for device, names in self._machines:
+        for device, states in self._machines:
             before, present = self.states[device.name], device.states(now)
             if before != list(present):
                 self.states[device.name] = [float(value) for value in present]
-                for name, old, value in zip(names, before, present, strict=True):
+                for state, old, value in zip(states, before, present, strict=True):
                     if old != value:
-                        self.note(now.tick, "machine_state", name, float(value))
+                        text = state.texts.get(int(value), "")
+                        self.note(now.tick, "machine_state", state.name, float(value), text=text)
 
     def _note_bottles(self, kind: Kind, device: Device, bottles: Sequence[int], now: ScanContext) -> None:
         for bottle in bottles:

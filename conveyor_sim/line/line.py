@@ -13,6 +13,7 @@ from conveyor_sim.line.alarms.system import AlarmSystem
 from conveyor_sim.line.authority import unauthorized
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import ALARMS, refusal, shown
+from conveyor_sim.line.counters import RESET_COUNTERS, Counters
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
@@ -26,6 +27,7 @@ from conveyor_sim.line.read_back import ReadBack
 from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.model import build_model
+from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.observe.events import Event
 from conveyor_sim.observe.image import Image
@@ -79,12 +81,14 @@ class Line:
         self._faults = {tag.name: tag for tag in self.image.faults}
         objecting = [device for device in devices if type(device).objection is not Device.objection]
         self._objecting = {command.name: device for device in objecting for command in device.commands}
+        self._counters = Counters(devices)
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
             INJECT: Operation(lambda given: refusal(self._faults, FAULT, given.names, given.values), self._set),
             **self.modes.operations(),
             **self.forcing.operations(),
             **self._alarms.operations(),
+            RESET_COUNTERS: Operation(self._counters.refusal, self._counters.reset),
         }
         self._surfaces = BeltSurfaces(state)
         self.now.begin_scan()  # which its look at the devices began, before there are bottles
@@ -222,6 +226,7 @@ class Line:
             device.take(self.now)
             if removed := self.now.state.take_removed():
                 self._log.note_removed(device, removed, self.now)
+                self._counters.note_removed(device, removed, self.now.bad)
                 self.now.forget(removed)
         self.now.begin_scan()
 
@@ -262,6 +267,10 @@ class Line:
         values = [value for device in self._devices for value in device.values(self.now)]
         return self.forcing.image(np.array(values + self.modes.values, dtype=np.float64))
 
+    def counters(self) -> CounterColumns | None:
+        """What devices and the line made since they were reset, and where their time went; None if nothing counts."""
+        return self._counters.columns(self.now.tick, self.now.length)
+
     def photo_eyes(self) -> dict[str, bool]:
         """Whether each photo-eye is blocked, as controllers read it, by the device's name."""
         eyes = {eye.name: eye.blocked for eye in self._eyes}
@@ -289,6 +298,7 @@ class Line:
         restore(self.forcing, snapshot(other.forcing))
         self.forcing.wake()
         self._alarms.restore(self.now.tick, other._alarms.snapshot())
+        restore(self._counters.memory, snapshot(other._counters.memory))
 
     def snapshot(self) -> dict[str, Any]:
         """All that it remembers from tick to tick, as plain data."""
@@ -305,6 +315,7 @@ class Line:
             "modes": snapshot(self.modes),
             "forcing": snapshot(self.forcing),
             "alarms": self._alarms.snapshot(),
+            "counters": snapshot(self._counters.memory),
         }
 
     def restore(self, tick: int, memory: dict[str, Any]) -> None:
@@ -330,6 +341,7 @@ class Line:
         restore(self.forcing, memory["forcing"], "line.forcing")
         self.forcing.wake()
         self._alarms.restore(tick, memory["alarms"])
+        restore(self._counters.memory, memory["counters"], "line.counters")
 
     @property
     def held(self) -> list[int]:

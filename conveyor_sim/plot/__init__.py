@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from conveyor_sim.accuracy.results import Study
+    from conveyor_sim.observe.production import Production
     from conveyor_sim.scene import Scene
 
-__all__ = ["plot_accuracy", "plot_bag", "plot_scene"]
+__all__ = ["plot_accuracy", "plot_bag", "plot_production", "plot_scene"]
 
 # Each imports what it draws with: a process that draws a recording needs no kernels, which studies do.
 
@@ -50,6 +51,32 @@ def plot_bag(
     with open_bag(bag) as opened, opened.sense(), style.look():
         drawn = {name: style.rendered(draw()) for name, draw in figures_of(opened, times, bottles).items()}
     return [path for name, pair in drawn.items() for path in write(pair, Path(out_dir) / name)]
+
+
+def plot_production(production: Production, out_dir: str | Path) -> list[Path]:
+    """Draw how a recorded line produced; returns the files written.
+
+    `states` shows what its machines did over time, `stops` why they did not run, `efficiency` what was made of what the
+    bottleneck could make. Nothing is drawn of a line without machines. Raises ConveyorError if the files can't be
+    written.
+    """
+    from conveyor_sim.observe.periods import stop_reasons
+    from conveyor_sim.plot import style
+    from conveyor_sim.plot.line_efficiency import efficiency_figure
+    from conveyor_sim.plot.state_bars import state_bars_figure
+    from conveyor_sim.plot.stop_reasons import stop_reasons_figure
+
+    if not production.periods:
+        return []
+    name, periods = production.scene, production.periods
+    reasons = stop_reasons(period for machine in periods.values() for period in machine)
+    with style.look():
+        figures = {
+            "states": state_bars_figure(periods, production.start, production.end, name),
+            "stops": stop_reasons_figure(reasons, name),
+            "efficiency": efficiency_figure(production.counters, production.time, production.good, name),
+        }
+        return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]
 
 
 def plot_scene(scene: Scene, path: str | Path) -> Path:

@@ -129,6 +129,7 @@ class Outputs(Part):
     contacts: NotNegative = quantity("Every contact with its forces.", "Hz", default=50.0)
     belts: NotNegative = quantity("Speeds of the belts.", "Hz", default=50.0)
     signals: NotNegative = quantity("The process image.", "Hz", default=100.0)
+    counters: NotNegative = quantity("What machines made, and where their time went.", "Hz", default=1.0)
     ledger: NotNegative = quantity(
         "The energy ledger: work of each belt, what is dissipated and stored, and what does not close.",
         "Hz",

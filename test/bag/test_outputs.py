@@ -69,6 +69,7 @@ def test_rates_are_those_of_the_scene(scene: Scene) -> None:
         "contacts": every_other_tick,
         "belts": every_other_tick,
         "signals": 41,
+        "counters": 1,
         "events": 6,
         **dict.fromkeys(SILENT, 0),
     }

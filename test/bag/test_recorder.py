@@ -38,6 +38,7 @@ COUNTS = {
     "/contacts": 51,
     "/belts": 51,
     "/signals": 101,
+    "/counters": 2,
     "/events": 8,
 }
 SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events", "/run_state"), 0)

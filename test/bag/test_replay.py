@@ -39,6 +39,7 @@ def test_recording_replays_bit_for_bit(bag: Path) -> None:
         "contacts": 51,
         "belts": 51,
         "signals": 101,
+        "counters": 2,
         "events": 8,
         "outcomes": 5,
         "readback": 4,

@@ -160,6 +160,10 @@ class InfeedDevice(Device):
         if lateral:
             self.offset = float(self.random.uniform(-lateral, lateral))
 
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles fed, and bad ones among them."""
+        return self.fed, self.quality.bad, 0
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """Bottles fed so far, and whether one waits for room."""
         return self.fed, self.blocked

@@ -50,6 +50,10 @@ class InspectionDevice(Device):
         """Running."""
         return (not self.stop,)
 
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles that passed, and bad ones among them."""
+        return self.count, self.bad, 0
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """Running, bottles that passed, bad ones among them, and when the last of each did (s)."""
         return not self.stop, self.count, self.bad, self.time, self.bad_time

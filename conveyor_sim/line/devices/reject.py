@@ -72,6 +72,10 @@ class RejectDevice(Device):
         """Running."""
         return (not self.stop,)
 
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles thrown out, and bad ones among them."""
+        return self.removed, self.removed_bad, self.removed
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """Running, rejected, bad and good ones among them, and strokes that hit nothing."""
         return not self.stop, self.removed, self.removed_bad, self.removed - self.removed_bad, self.missed

@@ -44,6 +44,10 @@ class SinkDevice(TakingDevice):
                 self.cycle -= 1.0
         self.conclude(cause, now)
 
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles taken, and bad ones among them."""
+        return self.removed, self.removed_bad, 0
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         starved, time = self.cause == STARVED, self.starved_ticks * now.length

@@ -42,6 +42,10 @@ class SourceDevice(MachineDevice):
                 self.cycle -= 1.0
         self.conclude(cause, now)
 
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles given, and bad ones among them."""
+        return self.fed, self.quality.bad, 0
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         blocked = self.cause == BLOCKED

@@ -112,6 +112,10 @@ class StationDevice(TakingDevice):
             now.set_attribute(bottle, BAD, 1.0)
         self.good += not defective
 
+    def counts(self) -> tuple[int, int, int]:
+        """Bottles given back, and those that a test has found defective."""
+        return self.processed, self.processed - self.good, 0
+
     def values(self, now: ScanContext) -> Sequence[float]:
         """As its signals are listed."""
         return (

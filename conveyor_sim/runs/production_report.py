@@ -1,0 +1,25 @@
+"""What a person sees of how a line produced: tables, and pictures with their paths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from conveyor_sim.runs.production import read_production
+from conveyor_sim.runs.production_table import render
+from conveyor_sim.runs.report import plot_function
+
+
+def report_production(bag: Path, out: Path | None, no_pictures: bool) -> None:
+    """Print how the line in a recording produced, and draw it into a folder; None: one in that of the recording.
+
+    Raises BagError as `read_production`, ConveyorError if the pictures can't be written.
+    """
+    production = read_production(bag)
+    Console(markup=False, highlight=False).print(render(production))
+    folder = out or (bag if bag.is_dir() else bag.parent) / "report"
+    draw = None if no_pictures else plot_function("plot_production")
+    for picture in [] if draw is None else draw(production, folder):
+        click.echo(f"picture: {picture}")

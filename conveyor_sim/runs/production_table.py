@@ -1,0 +1,96 @@
+"""How a line produced, for a terminal."""
+
+from __future__ import annotations
+
+import math
+
+from rich.box import SIMPLE
+from rich.console import Group, RenderableType
+from rich.table import Table
+
+from conveyor_sim.line.efficiency import DEFINITIONS
+from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.observe.counters import CounterColumns
+from conveyor_sim.observe.periods import longest_stops, stop_reasons
+from conveyor_sim.observe.production import Production
+from conveyor_sim.support.printable import printable
+
+MOST = 10
+"""Rows of the lists of reasons and of stops."""
+
+FACTORS = ("availability", "effectiveness", "quality", "oee")
+
+
+def render(production: Production) -> Group:
+    """All that there is to say, the line first."""
+    parts: list[RenderableType] = [_headline(production), _bottles(production.counters)]
+    if production.periods:
+        periods = [period for machine in production.periods.values() for period in machine]
+        lost = sum(period.length for period in periods if period.category != "running")
+        reasons = _table("stopped", "for", "times", "in all, s", "of lost time")
+        for entry in stop_reasons(periods)[:MOST]:
+            share = _percent(entry.length / lost)
+            reasons.add_row(entry.machine, entry.why, str(entry.stops), f"{entry.length:.2f}", share)
+        longest = _table("longest stops", "for", "from, s", "length, s")
+        for stop in longest_stops(periods, MOST):
+            longest.add_row(stop.machine, stop.why, f"{stop.begin:.2f}", f"{stop.length:.2f}")
+        parts += [_times(production.counters), reasons, longest, _definitions()]
+    return Group(*parts)
+
+
+def _headline(production: Production) -> Table:
+    counters, rows = production.counters, Table.grid(padding=(0, 2))
+    left, good, rejected = (int(column[-1]) for column in (counters.processed, counters.good, counters.rejected))
+    rows.add_row("scene", production.scene)
+    rows.add_row("recorded", f"{production.start:.2f} s to {production.end:.2f} s")
+    rows.add_row("counters", "since their last reset" if counters.since.any() else "since the start of the run")
+    rows.add_row("bottles", f"{left} left the line, {good} of them good; {rejected} were rejected")
+    if counters.bottleneck:
+        slowest = " and ".join(printable(name) for name in counters.bottleneck)
+        made = f"{_percent(counters.oee[-1])} of what the bottleneck makes in its planned busy time"
+        rows.add_row("bottleneck", f"{slowest}: {3600.0 * counters.rate[-1]:g} bottles an hour")
+        rows.add_row("efficiency", f"{made}, running all of it")
+    return rows
+
+
+def _bottles(counters: CounterColumns) -> Table:
+    table = _table("bottles", "processed", "good", "defective", "rejected", "failures", "MTBF, s", "MTTR, s")
+    columns = counters.processed, counters.good, counters.defective, counters.rejected, counters.failures
+    for row, name in enumerate(counters.name):
+        means = (_number(column[row]) for column in (counters.mtbf, counters.mttr))
+        table.add_row(printable(name), *(str(int(column[row])) for column in columns), *means)
+    return table
+
+
+def _times(counters: CounterColumns) -> Table:
+    """Shares of the time since the reset, and what follows from them."""
+    table = _table("share of time", *CATEGORIES, *FACTORS[:-1], "OEE")
+    for row, name in enumerate(counters.name):
+        times = [float(getattr(counters, category)[row]) for category in CATEGORIES]
+        if sum(times) > 0.0:
+            shares = [_percent(time / sum(times)) for time in times]
+            table.add_row(printable(name), *shares, *(_percent(getattr(counters, factor)[row]) for factor in FACTORS))
+    return table
+
+
+def _definitions() -> Table:
+    rows = Table.grid(padding=(0, 2))
+    for name, text in DEFINITIONS.items():
+        rows.add_row(name.upper() if name in ("oee", "mtbf", "mttr") else name, text)
+    rows.add_row("line", "times and failures of its bottleneck, bottles that left the line")
+    return rows
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %" if math.isfinite(share) else "-"
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "-"
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=SIMPLE)
+    for index, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if index == 0 or heading == "for" else "right")
+    return table
