@@ -18,7 +18,7 @@ from conveyor_sim.line.tag import Kind
 from conveyor_sim.plot import style
 from conveyor_sim.plot.bottles import speed_scale
 from conveyor_sim.plot.data import Floats, Frame, Plant
-from conveyor_sim.plot.heading import heading
+from conveyor_sim.plot.heading import heading, note_forced
 from conveyor_sim.plot.labels import belt_labels, mark_labels, place, sensor_labels
 from conveyor_sim.plot.marks import Z_LINE
 from conveyor_sim.plot.views import WIDTH, colour_bar, draw_view, force_scale, instant, whole_region
@@ -38,6 +38,8 @@ class Trace:
     unit: str
     kind: Kind
     values: Floats
+    forced: bool = False
+    """At the end."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +59,18 @@ def moment_figure(
     time: Floats,
     traces: Sequence[Trace],
     events: Sequence[Event] = (),
+    forced: Sequence[str] = (),
 ) -> Figure:
     """The plant at the time of `frame`; under it the traces, one a row, over `time` (n,) s, which ends at that time.
 
-    text: what happened. blocked: names of the photo-eyes that are blocked then.
+    text: what happened. blocked: names of the photo-eyes that are blocked then. forced: signals that are forced then.
     """
     box = whole_region(plant, [frame])
     inches = WIDTH - 0.8
     height = float(np.clip(inches * (box[3] - box[1]) / (box[2] - box[0]), 2.0, 7.0))
     figure = style.new_figure(WIDTH, height + 2.6 + (_ROW + _NAME) * len(traces))
     heading(figure, title)
+    note_forced(figure, forced)
     happened = "\n".join([instant(frame), *wrap(text, _LETTERS)])
     grid = figure.add_gridspec(1 + len(traces), 1, height_ratios=[height, *[_ROW] * len(traces)])
     view = figure.add_subplot(grid[0])
@@ -114,7 +118,7 @@ def _draw_trace(ax: Axes, trace: Trace, time: Floats, colour: str) -> None:
     ax.set_xlim(time[0], time[-1] if time[-1] > time[0] else time[0] + 1.0)
     ax.plot(time, trace.values, color=colour, linewidth=1.3, drawstyle="steps-post", gid=trace.name)
     unit = f" ({trace.unit})" if trace.unit else ""
-    ax.set_title(f"{trace.name}{unit}", fontsize=8.0, fontweight="normal", pad=2.0)
+    ax.set_title(f"{trace.name}{unit}{', forced' * trace.forced}", fontsize=8.0, fontweight="normal", pad=2.0)
     ax.tick_params(labelsize=7.5)
     ax.grid(True, axis="x")
     last = trace.values[-1]

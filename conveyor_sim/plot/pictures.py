@@ -11,6 +11,7 @@ from conveyor_sim.bag.reader import Bag
 from conveyor_sim.plot.damage import bottles_figure, rails_figure
 from conveyor_sim.plot.energy import energy_figure
 from conveyor_sim.plot.flow import flow_figure, force_figure
+from conveyor_sim.plot.heading import note_forced
 from conveyor_sim.plot.recording import Recording
 from conveyor_sim.plot.series import velocity_figure
 from conveyor_sim.plot.views import plant_figure, table_figure
@@ -43,4 +44,12 @@ def figures_of(bag: Bag, times: Sequence[float] | None, bottles: Sequence[int] |
         figures["damage_bottles"] = partial(bottles_figure, damage, name)
         if len(damage.wear.rail):
             figures["damage_rails"] = partial(rails_figure, plant, damage, name)
+    if recording.forced:
+        return {name: partial(_noted, draw, recording.forced) for name, draw in figures.items()}
     return figures
+
+
+def _noted(draw: Callable[[], Figure], forced: Sequence[str]) -> Figure:
+    figure = draw()
+    note_forced(figure, forced)
+    return figure

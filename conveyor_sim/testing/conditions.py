@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from types import CodeType
 from typing import Any
 
@@ -60,7 +60,11 @@ def _constants(node: ast.Lambda) -> set[object]:
     return {value for value in inner if isinstance(value, _PLAIN)}
 
 
-def values(names: Iterable[str], present: Mapping[str, float], units: Callable[[str], str]) -> str:
-    """One line a signal: name, value and unit."""
-    lines = [f"    {name} = {present[name]:g} {units(name)}".rstrip() for name in names]
+def values(
+    names: Iterable[str], present: Mapping[str, float], units: Callable[[str], str], forced: Collection[str] = ()
+) -> str:
+    """One line a signal: name, value and unit, and whether it is forced."""
+    lines = [
+        f"    {name} = {present[name]:g} {units(name)}".rstrip() + " (forced)" * (name in forced) for name in names
+    ]
     return "\n".join(lines) or "    (it reads no signals)"

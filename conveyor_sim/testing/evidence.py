@@ -13,7 +13,7 @@ from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Frame, Plant
 from conveyor_sim.plot.moment import Event, Trace, moment_figure
 from conveyor_sim.plot.recording import contact_lines
-from conveyor_sim.testing.history import History
+from conveyor_sim.testing.history import History, Mark
 from conveyor_sim.testing.scenario import Scenario
 
 PICTURE = "line.png"
@@ -33,8 +33,12 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
     failed, history, time = scenario.failed, scenario.history, scenario.history.time
     length = _BEFORE + (0.0 if failed is None else scenario.time - failed.since)
     shown = slice(int(np.searchsorted(time, time[-1] - length - 1e-9)), None)
-    traces = [Trace(name, history.unit(name), history.kind(name), history[name][shown]) for name in traced(scenario)]
-    events = [Event(mark.time, f"{mark.name} = {mark.value:g}") for mark in history.marks][-_MOST_EVENTS:]
+    forced = scenario.simulation.line.forcing.names
+    traces = [
+        Trace(name, history.unit(name), history.kind(name), history[name][shown], name in forced)
+        for name in traced(scenario)
+    ]
+    events = [Event(mark.time, _words(mark)) for mark in history.marks][-_MOST_EVENTS:]
     if failed is not None and failed.since < scenario.time:
         events.append(Event(failed.since, f"{failed.word} asserted"))
     eyes = [name for name in history.names if name.startswith(EYES) and name.endswith("/blocked")]
@@ -49,6 +53,7 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
             time[shown],
             traces,
             sorted((event for event in events if event.time >= time[shown][0]), key=lambda event: event.time),
+            forced,
         )
         return style.save_png(figure, path)
 
@@ -80,6 +85,10 @@ def came(history: History) -> list[str]:
     """Names of the alarms that stood at any time, in the order in which they came."""
     columns = {name: history[name] for name in history.names if name.startswith(ALARMS)}
     return sorted((name for name, column in columns.items() if column.any()), key=lambda name: columns[name].argmax())
+
+
+def _words(mark: Mark) -> str:
+    return mark.name if np.isnan(mark.value) else f"{mark.name} = {mark.value:g}"
 
 
 def _frame(scenario: Scenario) -> Frame:

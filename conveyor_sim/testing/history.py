@@ -12,11 +12,14 @@ import numpy as np
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import INJECT, SET, CommandOutcome
+from conveyor_sim.line.inputs import FORCE, INJECT, MODE, SET, UNFORCE, CommandOutcome
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import Kind
 
 _FIRST_ROWS = 1024
+
+_MARKED = {MODE: "mode", FORCE: "forced", UNFORCE: "unforced"}
+"""What is marked of operations that give no commands."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Mark:
     """s"""
     name: str
     value: float
+    """NaN: none."""
 
 
 class History:
@@ -103,6 +107,11 @@ class History:
 
     def take(self, outcome: CommandOutcome, from_test: bool) -> None:
         """What was applied at the last tick. from_test: by the test itself, not by the controller."""
+        if what := _MARKED.get(outcome.operation):
+            names, values = outcome.names or ("all",), outcome.values or (math.nan,) * max(1, len(outcome.names))
+            self.marks += [
+                Mark(self._times[-1], f"{name} {what}", value) for name, value in zip(names, values, strict=True)
+            ]
         if outcome.operation not in (SET, INJECT):
             return
         for name, value in zip(outcome.names, outcome.values, strict=True):

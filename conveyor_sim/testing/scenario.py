@@ -16,7 +16,7 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DECLARE, FAULT, INJECT, SET, Input
+from conveyor_sim.line.inputs import DECLARE, DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
@@ -24,6 +24,7 @@ from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing.conditions import Condition, Present, text_of, values
 from conveyor_sim.testing.history import History
+from conveyor_sim.testing.person import Person
 
 if TYPE_CHECKING:
     from conveyor_sim.ros.attached import AttachedNode
@@ -89,6 +90,10 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.simulation = Simulation(self.scene) if start is None else Simulation.load(start, scene=self.scene)
         most = None if history is None else max(self._ticks(history), 1)
         self.history = History(self.simulation.process_image, most)
+        self.operator = Person(TEST, "operator", self._give)
+        """One at the line's panel."""
+        self.engineer = Person(TEST, "engineer", self._give)
+        """One who may do more (docs/line.md, Who may command)."""
         self.failed: Assertion | None = None
         """The condition that failed."""
         self.failure = ""
@@ -100,6 +105,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         began = None if start is None else Path(start)
         if began is not None:
             forget_past(self.simulation)
+            if owner := self.simulation.line.modes.owner:  # of the run before, whose controller is gone
+                self.simulation.give(Input(TEST, owner, "controller", DISOWN, (), ()))
         self._outputs.start()
         self._outputs.show_run(RunState(RUNNING))
         self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
@@ -276,7 +283,10 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _fail(self, assertion: Assertion, head: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
         self.failed, self.failure = assertion, head
-        raise AssertionError(f"{head}; the signals that it reads:\n{values(present.read, present, self.history.unit)}")
+        raise AssertionError(f"{head}; the signals that it reads:\n{self._values(present)}")
+
+    def _values(self, present: Present) -> str:
+        return values(present.read, present, self.history.unit, self.simulation.line.forcing.names)
 
     def _step(self) -> None:
         __tracebackhide__ = True

@@ -91,3 +91,14 @@ def test_what_has_come_to_rest_looks_it(plant: Plant, frame: Frame) -> None:
     (large, small) = (c for c in view.collections if c.get_gid() == "bottles")
     rest = style.SPEED(0.0)
     assert np.allclose(large.get_facecolor(), rest) and np.allclose(small.get_facecolor(), rest)
+
+
+def test_forced_signals_are_named_and_their_traces_say_so(plant: Plant, frame: Frame) -> None:
+    traces = (replace(TRACES[0], forced=True), *TRACES[1:])
+    forced = ("photo_eyes/entry/blocked", "zones/z/bottles")
+    figure = moment_figure(plant, frame, "small_plant", "It did not hold", (), TIME, traces, forced=forced)
+    assert figure.get_supxlabel() == "forced: photo_eyes/entry/blocked, zones/z/bottles"
+    assert [row.get_title(loc="left") for row in axes(figure)[1:3]] == [
+        "photo_eyes/entry/blocked, forced",
+        "belts/table/speed (m/s)",
+    ]

@@ -11,7 +11,16 @@ from conveyor_sim.testing import Scenario
 DOCS = Path(__file__).parent.parent.parent / "docs"
 PAGE = (DOCS / "testing_control_logic.md").read_text()
 BLOCKS = re.findall(r"```(?:python|yaml)\n# (\S+)\n(.*?)```", PAGE, re.DOTALL)
-NAMES = ["test_first.py", "table.yaml", "level.py", "test_level.py", "level.py", "test_warm.py", "by_hand.py"]
+NAMES = [
+    "test_first.py",
+    "test_panel.py",
+    "table.yaml",
+    "level.py",
+    "test_level.py",
+    "level.py",
+    "test_warm.py",
+    "by_hand.py",
+]
 PLUGIN = ("-p", "conveyor_sim.testing.plugin", "-p", "no:cacheprovider")
 
 
@@ -28,7 +37,7 @@ def timeless(text: str) -> str:
 
 def test_the_blocks_are_these() -> None:
     assert [name for name, _ in BLOCKS] == NAMES
-    assert BLOCKS[1][1] == TABLE.read_text().removeprefix("# table.yaml\n")
+    assert BLOCKS[2][1] == TABLE.read_text().removeprefix("# table.yaml\n")
 
 
 def test_the_first_scenario_passes(pytester: pytest.Pytester) -> None:
@@ -36,8 +45,13 @@ def test_the_first_scenario_passes(pytester: pytest.Pytester) -> None:
     pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=1)
 
 
+def test_operators_and_engineers_do_as_shown(pytester: pytest.Pytester) -> None:
+    write(pytester.path, 1)
+    pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
+
+
 def test_the_bug_is_found_as_shown(pytester: pytest.Pytester) -> None:
-    write(pytester.path, 1, 2, 3)
+    write(pytester.path, 2, 3, 4)
     result = pytester.runpytest_inprocess(*PLUGIN)
     result.assert_outcomes(passed=1, failed=1)
     shown = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)[0]
@@ -47,18 +61,18 @@ def test_the_bug_is_found_as_shown(pytester: pytest.Pytester) -> None:
 
 
 def test_the_mended_controller_passes(pytester: pytest.Pytester) -> None:
-    write(pytester.path, 1, 4, 3)
+    write(pytester.path, 2, 5, 4)
     pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
     assert not (pytester.path / "line-failures").exists()
 
 
 def test_it_starts_from_a_warm_line(pytester: pytest.Pytester) -> None:
-    write(pytester.path, 1, 4, 5)
+    write(pytester.path, 2, 5, 6)
     pytester.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
 
 
 def test_it_goes_without_pytest(capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(BLOCKS[6][1], "by_hand.py", "exec"), {})
+    exec(compile(BLOCKS[7][1], "by_hand.py", "exec"), {})
     assert capsys.readouterr().out == "0.1\n"
 
 
