@@ -1,4 +1,4 @@
-"""How a recorded line produced: counters at its end, and what its machines did when."""
+"""How a recorded line produced: counters at its end, what its machines did when, and alarms."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.observe.alarm_figures import AlarmFigures
 from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.periods import Period
 
@@ -25,6 +26,7 @@ class Production:
     """How often the line's counters were reset."""
     periods: Mapping[str, Sequence[Period]]
     """By machine, one after the other from start to end."""
+    alarms: AlarmFigures
     time: NDArray[np.float64]
     """(n,), s, of each counters message."""
     good: NDArray[np.float64]

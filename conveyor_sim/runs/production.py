@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.reader import Bag, Frame, open_bag
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError
+from conveyor_sim.observe.alarm_figures import AlarmTally
 from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.periods import Period
 from conveyor_sim.observe.production import Production
@@ -32,14 +33,17 @@ def read_production(path: Path) -> Production:
                 "its line counts nothing, or its scene has outputs: {counters: 0}"
             )
         counters, end = frames[-1].data, frames[-1].time
-        follower = _Follower(frames[0])
+        follower, alarms = _Follower(frames[0]), AlarmTally()
         for frame in bag.read("events"):
             end = max(end, frame.time)
             columns = frame.data
             changes = zip(columns.at, columns.kind, columns.name, columns.text, strict=True)
             for at, kind, name, text in changes:
+                alarms.event(bag.time(int(at)), kind, printable(name))
                 if kind == "machine_state":
                     follower.take(bag.time(int(at)), name, printable(text))
+        for frame in bag.read("alarm_states") if bag.types.get("alarm_states") == TOPICS["alarm_states"].type else ():
+            alarms.states = frame.data
         good, resets = _accumulated(frames)
         return Production(
             printable(bag.line.scene_name),
@@ -48,6 +52,7 @@ def read_production(path: Path) -> Production:
             counters,
             resets,
             follower.finished(end),
+            alarms.figures(end - frames[0].time, int(bag.line.tick_ns) * 1e-9),
             np.array([frame.time for frame in frames]),
             good,
         )

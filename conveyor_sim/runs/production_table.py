@@ -10,10 +10,11 @@ from rich.table import Table
 
 from conveyor_sim.line.efficiency import DEFINITIONS
 from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.observe.alarm_figures import AlarmFigures
 from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.periods import longest_stops, stop_reasons
 from conveyor_sim.observe.production import Production
-from conveyor_sim.support.printable import printable
+from conveyor_sim.support.printable import SENTENCE, printable
 
 MOST = 10
 """Rows of the lists of reasons and of stops."""
@@ -34,8 +35,8 @@ def render(production: Production) -> Group:
         longest = _table("longest stops", "for", "from, s", "length, s")
         for stop in longest_stops(periods, MOST):
             longest.add_row(stop.machine, stop.why, f"{stop.begin:.2f}", f"{stop.length:.2f}")
-        parts += [_times(production.counters), reasons, longest, _definitions()]
-    return Group(*parts)
+        parts += [_times(production.counters), reasons, longest]
+    return Group(*parts, *_alarms(production.alarms), *([_definitions()] if production.periods else []))
 
 
 def _headline(production: Production) -> Table:
@@ -71,6 +72,25 @@ def _times(counters: CounterColumns) -> Table:
             shares = [_percent(time / sum(times)) for time in times]
             table.add_row(printable(name), *shares, *(_percent(getattr(counters, factor)[row]) for factor in FACTORS))
     return table
+
+
+def _alarms(alarms: AlarmFigures) -> list[RenderableType]:
+    """Their rate, those that came most often, and those that stand."""
+    rows = Table.grid(padding=(0, 2))
+    rate = f"{alarms.per_window:.1f} in ten minutes, {alarms.most_in_window} at most"
+    rows.add_row("alarms", f"{alarms.raised} came, {rate}{': a flood' if alarms.flood else ''}")
+    parts: list[RenderableType] = [rows]
+    if alarms.by_alarm:
+        often = _table("alarm", "times")
+        for name, times in list(alarms.by_alarm.items())[:MOST]:
+            often.add_row(name, str(times))
+        parts.append(often)
+    if alarms.standing:
+        standing = _table("standing at the end", "for", "since, s")
+        for one in alarms.standing[:MOST]:
+            standing.add_row(printable(one.id), printable(one.text, SENTENCE), f"{one.since:.2f}")
+        parts.append(standing)
+    return parts
 
 
 def _definitions() -> Table:

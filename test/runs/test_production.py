@@ -92,6 +92,29 @@ def test_bottles_of_the_report_are_those_of_the_counters(production: Production)
     assert list(counters.bottleneck) == ["machines/filler"]
 
 
+def test_alarms_are_counted(bag: Path, tmp_path: Path) -> None:
+    """Those that a controller raises and clears; one stands at the end."""
+    scene = load_scene(FAILING_LINE)
+    sim = Simulation(scene)
+    with Recorder(tmp_path / "bag") as recorder:
+        outputs = Outputs(sim, [recorder], run_id="run")
+        outputs.start()
+        for tick in range(500):
+            if tick % 20 == 0 and tick < 480:
+                sim.command(("alarms/table full",), (float(tick % 40 == 0),))
+            if tick == 450:
+                sim.command(("alarms/no caps",), (1.0,))
+            sim.advance()
+            outputs.after_tick()
+    alarms = read_production(tmp_path / "bag").alarms
+    assert alarms.by_alarm["table full"] == 12
+    assert alarms.by_alarm["no caps"] == 1
+    assert alarms.flood and alarms.most_in_window == alarms.raised
+    assert [one.id for one in alarms.standing] == ["no caps"]
+    result = CliRunner().invoke(main, ["report", str(tmp_path / "bag"), "--no-pictures"], catch_exceptions=False)
+    assert "a flood" in result.output and "no caps" in result.output
+
+
 def test_the_report_prints_and_draws_it(bag: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(
         main, ["report", str(bag), "--out", str(tmp_path)], env={"COLUMNS": "200"}, catch_exceptions=False
