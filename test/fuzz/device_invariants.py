@@ -10,13 +10,16 @@ from fuzz.crossing import crossed
 from fuzz.violation import Violation
 from numpy.typing import NDArray
 
+from conveyor_sim.line.packml import State
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.geometry import SegmentPiece
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.parts.inspection import Inspection
+from conveyor_sim.scene.parts.machine import PackmlPart
 from conveyor_sim.scene.parts.reject import Reject
 from conveyor_sim.scene.parts.sink import Sink
 from conveyor_sim.scene.parts.source import Source
+from conveyor_sim.scene.parts.station import Station
 from conveyor_sim.simulation import Simulation
 
 F8 = NDArray[np.float64]
@@ -24,9 +27,13 @@ F8 = NDArray[np.float64]
 NEAR = 1e-7
 """Of a length: what rounding may make of a place at which something begins or ends."""
 
+RUNNING = (State.EXECUTE, State.SUSPENDED, State.COMPLETING)
+"""States in which a machine may give or take a bottle."""
+
 RISING = {
     "fed", "removed", "produced", "taken", "taken_bad", "count", "bad", "rejected", "rejected_bad", "rejected_good",
-    "missed", "dropped", "edges", "forward", "backward", "starved_time", "blocked_time", "time", "bad_time",
+    "processed", "good", "defective", "false_accepts", "false_rejects", "failures", "missed", "dropped", "edges",
+    "forward", "backward", "starved_time", "blocked_time", "time", "bad_time",
 }  # fmt: skip
 """Signals that never fall."""
 
@@ -97,6 +104,7 @@ class DeviceWatch:
         scene, now, counts = self._scene, self._now, self._sim.counts
         fed = sum(now[f"infeeds/{name}/fed"] for name in scene.infeeds)
         fed += sum(now[f"spills/{name}/dropped"] for name in scene.spills)
+        held = 0.0
         gone = sum(now[f"outfeeds/{name}/removed"] for name in scene.outfeeds)
         for name, machine in scene.machines.items():
             place = f"machines/{name}"
@@ -109,10 +117,29 @@ class DeviceWatch:
                 gone += now[f"{place}/rejected"]
                 if now[f"{place}/rejected_bad"] + now[f"{place}/rejected_good"] != now[f"{place}/rejected"]:
                     raise Violation("bad and good", f"{place}: not all rejected are one or the other")
+            elif isinstance(machine, Station):
+                held += now[f"{place}/holds"]
+                if now[f"{place}/good"] + now[f"{place}/defective"] != now[f"{place}/processed"]:
+                    raise Violation("bad and good", f"{place}: not all processed are good or defective")
             else:
                 _at_most(now, f"{place}/bad", f"{place}/count")
-        if (fed, gone) != (counts.fed, counts.removed):
-            raise Violation("lost bottle", f"devices fed {fed} and removed {gone}, {counts} told")
+            if isinstance(machine, PackmlPart):
+                self._machine(place)
+        if (fed, gone, held) != (counts.fed, counts.removed, counts.held):
+            raise Violation("lost bottle", f"devices fed {fed}, removed {gone} and hold {held}, {counts} told")
+
+    def _machine(self, place: str) -> None:
+        """What a machine says of itself goes together."""
+        now, before = self._now, self._before
+        state = int(now[f"{place}/state"])
+        if now[f"{place}/running"] and state not in RUNNING:
+            raise Violation("machine", f"{place} runs in state {state} at tick {self._sim.tick}")
+        if now[f"{place}/cur_rate"] > 0.0 and state not in (State.EXECUTE, State.COMPLETING):
+            raise Violation("machine", f"{place} has a rate in state {state} at tick {self._sim.tick}")
+        counters = [f"{place}/{what}" for what in ("produced", "taken", "processed") if f"{place}/{what}" in now]
+        moved = any(now[name] > before[name] for name in counters)
+        if moved and (state not in RUNNING or now[f"{place}/fault"]):
+            raise Violation("machine", f"{place} works on a bottle in state {state} at tick {self._sim.tick}")
 
     def _lines(self, before: BottleColumns, now: BottleColumns) -> None:
         """Counters and inspections count those that passed."""

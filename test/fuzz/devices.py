@@ -8,6 +8,12 @@ from typing import Any, Protocol
 from fuzz.draws import Data, between, fractions, scaled
 from hypothesis import strategies as st
 
+WORK: Data = {
+    "sets": {"cap": {"to": 1.0, "share": 0.5}, "bad": {"to": 0.0}},
+    "tests": {"cap": {"low": 1.0, "false_accept": 0.3, "false_reject": 0.3}},
+}
+"""Of a station."""
+
 
 class Frame(Protocol):
     """Sizes that the parts of a scene share."""
@@ -80,10 +86,10 @@ def _drives(draw: st.DrawFn, frame: Frame, swings: bool, length: float, accelera
 
 @st.composite
 def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
-    """Sources, sinks, inspections, rejects and spills; at least one."""
+    """Sources, sinks, stations, inspections, rejects and spills; at least one."""
     found: dict[str, dict[str, Data]] = {"machines": {}, "spills": {}}
     for n in range(draw(st.integers(1, 5))):
-        what = draw(st.sampled_from(["source", "sink", "inspection", "reject", "spill"]))
+        what = draw(st.sampled_from(["source", "sink", "station", "inspection", "reject", "spill"]))
         if what in ("source", "spill"):
             kind, at = draw(st.sampled_from(sorted(frame.types))), draw(frame.points)
             if not clear.of_rails([at], frame.types[kind]["radius"]):
@@ -96,15 +102,43 @@ def machines(draw: st.DrawFn, frame: Frame, clear: Clear) -> Data:
             entry |= draw(st.sampled_from([{}, {"bad_every": 2}, {"bad_share": 0.3}, {"bad_share": 1.0}]))
         elif what == "inspection":
             entry = {"kind": what, **draw(_lines(frame))}
+        elif what == "station":
+            at = draw(frame.points)
+            if not clear.of_rails([at], max(kind["radius"] for kind in frame.types.values())):
+                continue
+            entry = {"kind": what, "region": draw(_regions(frame)), "position": at}
+            entry |= {"direction": draw(between(-math.pi, math.pi)), "speed": frame.speed * draw(fractions)}
+            entry |= draw(st.sampled_from([{}, WORK]))
         else:
             entry = {"kind": what, "region": draw(_regions(frame))}
-        if what in ("source", "sink"):
+        if what in ("source", "sink", "station"):
             entry["rate"] = draw(scaled(0.02, 2.0)) / frame.tick
             entry |= draw(st.sampled_from([{}, {"rate_limit": 3.0 * entry["rate"]}]))
+            entry |= draw(_habits(frame.tick))
         elif what == "reject":
             entry |= {"delay": frame.tick * draw(st.sampled_from([0.0, 2.5])),
                       "window": frame.tick * draw(st.sampled_from([0.5, 4.0]))}  # fmt: skip
         found["machines"][f"machine_{n}"] = entry
+    return found
+
+
+@st.composite
+def _habits(draw: st.DrawFn, tick: float) -> Data:
+    """What a machine does by itself: most have none of it."""
+    times = st.sampled_from([0.5, 3.0, 20.0]).map(lambda ticks: ticks * tick)
+    found: Data = {"suspend_after": draw(times)}
+    if draw(st.booleans()):
+        return found
+    way = st.sampled_from(["exponential", "weibull", "list"])
+    failure: Data = {"counted": draw(st.sampled_from(["running", "clock"]))}
+    for what in ("between", "repair"):
+        kind, time = draw(way), draw(times)
+        more = {"exponential": {"mean": time}, "weibull": {"mean": time, "shape": 1.7}, "list": {"times": [time, tick]}}
+        failure[what] = {"kind": kind, **more[kind]}
+    found |= draw(st.sampled_from([{}, {"failures": {"jam": failure}}]))
+    found |= draw(st.sampled_from([{}, {"ramp_up": 7.0 * tick}]))
+    found |= draw(st.sampled_from([{}, {"acting_times": {"holding": 2.0 * tick, "starting": tick}}]))
+    found |= draw(st.sampled_from([{}, {"planned_stops": {"rest": {"start": tick, "duration": draw(times)}}}]))
     return found
 
 

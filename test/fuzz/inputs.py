@@ -7,22 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from conveyor_sim.scene import Scene
+from conveyor_sim.scene.parts.machine import PackmlPart
 from conveyor_sim.scene.parts.reject import Reject
-from conveyor_sim.scene.parts.sink import Sink
-from conveyor_sim.scene.parts.source import Source
 
 
 @dataclass(frozen=True)
 class Input:
     """One of them."""
 
-    type: str = "bool"
+    kind: str = "bool"
     low: float = 0.0
     high: float = 1.0
 
     def takes(self, value: float) -> bool:
         """Whether a value is accepted."""
-        whole = self.type == "number" or float(value).is_integer()
+        whole = self.kind == "number" or float(value).is_integer()
         return math.isfinite(value) and self.low <= value <= self.high and whole
 
 
@@ -41,7 +40,7 @@ def commands_of(scene: Scene) -> Table:
     for field, order in MOVERS:
         table |= {f"{field}/{name}/{order}": Input() for name in getattr(scene, field)}
     for name, machine in scene.machines.items():
-        if isinstance(machine, Source | Sink):
+        if isinstance(machine, PackmlPart):
             most = machine.rate if machine.rate_limit is None else machine.rate_limit
             table |= {f"machines/{name}/run": Input(), f"machines/{name}/rate": Input("number", 0.0, most)}
         elif isinstance(machine, Reject):

@@ -49,6 +49,8 @@ class Invariants:
         self._first = len(self._before.id) - simulation.counts.fed
         self._next_id = _after(self._before)
         self._removed = 0
+        self._held: set[int] = set()
+        """Ids of the bottles in stations."""
         self.bottle_ticks = 0
         self.most_contacts = 0
         self._finite()
@@ -87,21 +89,23 @@ class Invariants:
             raise Violation("doubled bottle", f"ids {ids.tolist()} at tick {self._sim.tick}")
         fresh = ids >= self._next_id
         lost = np.setdiff1d(before, ids)
-        if np.setdiff1d(ids[~fresh], before).size:
+        back = set(np.setdiff1d(ids[~fresh], before).tolist())
+        if not back <= self._held:
             raise Violation("doubled bottle", f"a bottle came back at tick {self._sim.tick}")
-        self._removed += lost.size
+        held, self._held = self._held, set(self._sim._state.held)
+        self._removed += lost.size - len(self._held - held)
         # A bottle may be fed into an outfeed, but is removed at the next tick at the earliest.
         if self._removed != counts.removed or counts.present != ids.size:
             raise Violation(
                 "lost bottle", f"{self._removed} gone, {ids.size} seen, {counts} told at tick {self._sim.tick}"
             )
-        if self._first + counts.fed - counts.removed != counts.present:
+        if self._first + counts.fed - counts.removed != counts.present + counts.held:
             raise Violation("lost bottle", f"{self._first} at first, {counts} at tick {self._sim.tick}")
         kept = np.isin(ids, before)
         if not np.array_equal(now.type[kept], self._before.type[np.isin(before, ids)]):
             raise Violation("doubled bottle", f"a bottle changed its type at tick {self._sim.tick}")
         self._next_id = max(self._next_id, _after(now))
-        return fresh
+        return fresh | np.isin(ids, list(back))
 
     def _births(self, now: BottleColumns, fresh: NDArray[np.bool_]) -> None:
         """A bottle enters beside others and beside rails, never in them."""
