@@ -49,6 +49,7 @@ setup(
     extras_require={
         "plot": requirements("plot"),
         "accuracy": requirements("accuracy"),
+        "scada": requirements("scada"),
         "bench": requirements("bench"),
         "test": requirements("pytest"),
         "docs": requirements("docs"),

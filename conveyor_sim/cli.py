@@ -93,18 +93,18 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 @main.command()
 @click.argument("scene")
 @click.option("--csv", "as_csv", is_flag=True, help="As CSV, with all that is known of each tag.")
+@click.option("--modbus", is_flag=True, help="As the map of their Modbus addresses, as CSV.")
+@click.option("--map", "kept", type=click.Path(path_type=Path), help="With --modbus: a map to keep, which only grows.")
+@click.option("--word-order", type=click.Choice(["big", "little"]), default="big", help="Of Modbus: ABCD or CDAB.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def tags(scene: str, as_csv: bool, outside_tables: bool) -> None:
+def tags(scene: str, outside_tables: bool, **chosen: Any) -> None:
     """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
-    from conveyor_sim.runs.tags import tag_csv, tag_table
+    from conveyor_sim.runs.tags import listed
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
-    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
-    if as_csv:
-        click.echo(tag_csv(loaded), nl=False)
-    else:
-        _print(tag_table(loaded))
+    shown = listed(load_scene(scene_path(scene), outside_tables=outside_tables), **chosen)
+    click.echo(shown, nl=False) if isinstance(shown, str) else _print(shown)
 
 
 @main.command()

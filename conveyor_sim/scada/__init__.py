@@ -1,0 +1,1 @@
+"""SCADA faces: what a line's tags are to the protocols that plants speak."""
