@@ -1,4 +1,4 @@
-"""The pytest plugin: the fixtures `line` and `warm_start`, and what they leave of a test that fails or is killed.
+"""The pytest plugin: the fixtures `line`, `warm_start` and `modbus`, and what a test leaves that fails or is killed.
 
 pytest loads it in every run by the entry point pytest11, so nothing of the simulation is imported until a test asks
 for a fixture. setup.py names it there by its module, so that `-p` of the same name does not load it twice.
@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Generator, Iterator, Mapping
 from functools import partial
 from hashlib import blake2b
+from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ import pytest
 
 if TYPE_CHECKING:
     from conveyor_sim.scene import Scene
+    from conveyor_sim.testing.faces import ModbusFaces
     from conveyor_sim.testing.scenario import Scenario
 
 DEFAULT_FOLDER = "line-failures"
@@ -154,6 +156,17 @@ def line(request: pytest.FixtureRequest) -> Iterator[Lines]:
     request.node.stash[_LINES] = lines
     yield lines
     lines.close()
+
+
+@pytest.fixture
+def modbus() -> Iterator[ModbusFaces]:
+    """Serves lines to Modbus TCP clients: `modbus(my_line, role="operator").port`. Skips a test without pymodbus."""
+    from conveyor_sim.testing.faces import MODBUS_MISSING, ModbusFaces
+
+    if find_spec("pymodbus") is None:
+        pytest.skip(MODBUS_MISSING)
+    with ModbusFaces() as faces:
+        yield faces
 
 
 @pytest.fixture(scope="session")

@@ -16,8 +16,9 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DECLARE, DISOWN, FAULT, INJECT, SET, Input
+from conveyor_sim.line.inputs import DECLARE, DISOWN, FAULT, INJECT, SET, CommandOutcome, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
+from conveyor_sim.scada.source import FACES, TickSource
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -116,6 +117,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._alarms: dict[str, float] = {}
         self._changes = AlarmChanges()
         self._standing: list[Assertion] = []
+        self._sources: list[TickSource] = []
         self._signals: dict[str, float] = {}
         self._stopped = False  # by the guard
         self._look()
@@ -197,6 +199,14 @@ class Scenario(AbstractContextManager["Scenario"]):
         )
         self._controller = node
         self._scan(node)
+
+    def source(self) -> TickSource:
+        """The line as a SCADA face sees it, from now on. What clients of that give is applied at the next tick.
+
+        One that is refused is an outcome and an event, and fails no test.
+        """
+        self._sources.append(TickSource(self.simulation))
+        return self._sources[-1]
 
     def command(self, name: str, value: float) -> None:
         """Give a command for the next tick; one of the controller's of the same name comes after it.
@@ -290,6 +300,8 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     def _step(self) -> None:
         __tracebackhide__ = True
+        for source in self._sources:
+            source.before_tick()
         if self._answer:
             names, values = tuple(self._answer), tuple(self._answer.values())
             if self._node is None:
@@ -317,9 +329,11 @@ class Scenario(AbstractContextManager["Scenario"]):
         for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
-            elif not (outcome.without_control and outcome.input.writer_kind == "controller"):
+            elif outcome.source not in FACES and not _by_other_hands(outcome):
                 refused.append(outcome.reason)
         self._look()
+        for source in self._sources:
+            source.after_tick()
         if refused:
             raise CommandError(f"at {self.time - self.scene.tick:.2f} s a command was refused: {'; '.join(refused)}")
         if self._controller is not None:
@@ -370,6 +384,11 @@ class Scenario(AbstractContextManager["Scenario"]):
         if not (math.isfinite(seconds) and seconds >= 0.0):
             raise ValueError(f"{seconds:g} s given, expected 0 s or more")
         return math.ceil(seconds / self.scene.tick - _ROUNDING)
+
+
+def _by_other_hands(outcome: CommandOutcome) -> bool:
+    """Whether a controller was refused what somebody else works."""
+    return outcome.without_control and outcome.input.writer_kind == "controller"
 
 
 def scene_of(scene: Scene | str | PathLike[str], overrides: Mapping[str, Any] | None) -> Scene:

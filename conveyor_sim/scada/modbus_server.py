@@ -1,0 +1,205 @@
+"""`ModbusServer`: a line as a Modbus TCP server, by the addresses of a map.
+
+Modbus identifies nobody: whoever reaches the port can read, and writes are refused unless the server was given a role
+to write in. What is refused gets an exception: 1 if nobody may write, and for a function that is not served; 2 for an
+address that is not in the map, or a value written in part; 3 for a value out of range; 6 for a device that is in
+other hands, or if too much waits already (Modbus Application Protocol 1.1b3, 7).
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping, Sequence
+from contextvars import ContextVar
+from typing import Any
+
+from pymodbus.constants import ExcCodes
+from pymodbus.pdu import ExceptionResponse
+from pymodbus.server import ModbusTcpServer
+from pymodbus.server.requesthandler import ServerRequestHandler
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL
+from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.inputs import SET, Input, WriterKind
+from conveyor_sim.line.tag import COMMANDS
+from conveyor_sim.scada.modbus_map import Row, Table, decode, encode
+from conveyor_sim.scada.source import MODBUS, TagSource
+
+MOST_CLIENTS = 64
+"""Connections at once; one more is closed at once."""
+
+_TABLE_OF: dict[int, Table] = {
+    **dict.fromkeys((1, 5, 15), "coil"),
+    2: "discrete input",
+    4: "input register",
+    **dict.fromkeys((3, 6, 16, 22, 23), "holding register"),
+}
+"""By function code; others are not served."""
+
+_client: ContextVar[str] = ContextVar("client", default="?")
+
+
+class ServerError(ConveyorError):
+    """A face that can't be served."""
+
+
+class ModbusServer:
+    """Serves one source. To be used in one asyncio loop."""
+
+    def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None = None) -> None:
+        """rows: the map. role: in which clients write; None: they may not."""
+        self._image = _Image(source, rows, role)
+        self._server: _Server | None = None
+
+    @property
+    def port(self) -> int:
+        """On which it listens. RuntimeError before `start`."""
+        if self._server is None or self._server.transport is None:
+            raise RuntimeError("the server was not started")
+        sockets: Any = self._server.transport
+        return int(sockets.sockets[0].getsockname()[1])
+
+    @property
+    def clients(self) -> int:
+        """Connections that are open."""
+        return 0 if self._server is None else len(self._server.connected)
+
+    @property
+    def writes(self) -> int:
+        """Requests so far that were passed on to the line."""
+        return self._image.writes
+
+    @property
+    def refused(self) -> int:
+        """Requests to write so far that were answered with an exception."""
+        return self._image.refused
+
+    async def start(self, host: str = "127.0.0.1", port: int = 502) -> None:
+        """Listen. port: 0 for any that is free. Raises ServerError if that is not possible."""
+        _require_free(host, port)
+        # The library wants a device of its own; the image takes its place.
+        server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
+        server.context = self._image  # type: ignore[assignment]
+        try:
+            await server.serve_forever(background=True)
+        except (OSError, RuntimeError) as error:
+            raise ServerError(f"modbus: {host}:{port} can't be listened on ({error})") from error
+        self._server = server
+
+    async def stop(self) -> None:
+        """End all connections."""
+        if self._server is not None:
+            await self._server.shutdown()
+            self._server = None
+
+
+class _Server(ModbusTcpServer):
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.connected: set[_Handler] = set()
+
+    def callback_new_connection(self) -> ServerRequestHandler:
+        return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
+
+
+class _Handler(ServerRequestHandler):
+    """One connection, whose client its requests are recorded under."""
+
+    server: _Server
+
+    def callback_connected(self) -> None:
+        super().callback_connected()
+        if len(self.server.connected) >= MOST_CLIENTS:
+            self.close()
+            return
+        self.server.connected.add(self)
+        if (connection := self.transport.get_extra_info("socket")) is not None:
+            # A client that is gone without a word is noticed.
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+
+    def callback_disconnected(self, exc: Exception | None) -> None:
+        self.server.connected.discard(self)
+        super().callback_disconnected(exc)
+
+    async def handle_request(self) -> None:
+        asked, peer = self.last_pdu, self.transport.get_extra_info("peername")
+        if asked is not None and asked.function_code not in _TABLE_OF:
+            # Of the library's own functions some would change how it serves all others.
+            answer = ExceptionResponse(asked.function_code, ExcCodes.ILLEGAL_FUNCTION)
+            answer.transaction_id, answer.dev_id = asked.transaction_id, asked.dev_id
+            self.server_send(answer, self.last_addr)
+        elif peer is not None:
+            _client.set(f"{peer[0]}:{peer[1]}")
+            await super().handle_request()
+
+
+class _Image:
+    """What the library asks for values, in place of a device's memory."""
+
+    def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None) -> None:
+        self._source, self._role = source, role
+        self._commands = {tag.name: tag for tag in source.tags if tag.role in COMMANDS}
+        self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
+        self.writes = self.refused = 0
+
+    def device_ids(self) -> list[int]:
+        """It answers to all."""
+        return [0]
+
+    async def async_getValues(self, device: int, function: int, address: int, count: int = 1) -> Any:
+        """Words or bits of one tick, (count,)."""
+        table, shown = _TABLE_OF[function], self._source.shown
+        values: list[int] = []
+        while len(values) < count:
+            at = address + len(values)
+            row = self._rows.get((table, at))
+            if row is None:
+                return ExcCodes.ILLEGAL_ADDRESS
+            words = encode(row, shown.values.get(row.name, 0.0))  # 0 for one that is gone
+            values += words[at - row.address :]
+        values = values[:count]
+        return [bool(value) for value in values] if table in ("coil", "discrete input") else values
+
+    async def async_setValues(self, device: int, function: int, address: int, values: Sequence[int]) -> Any:
+        """Pass values on to the line together; None if it takes them."""
+        problem = self._write(_TABLE_OF[function], address, list(values))
+        self.writes, self.refused = self.writes + (problem is None), self.refused + (problem is not None)
+        return problem
+
+    def _write(self, table: Table, address: int, words: list[int]) -> ExcCodes | None:
+        if self._role is None:
+            return ExcCodes.ILLEGAL_FUNCTION
+        names: list[str] = []
+        numbers: list[float] = []
+        while words:
+            row = self._rows.get((table, address))
+            if row is None or row.access == "read" or row.address != address or row.words > len(words):
+                return ExcCodes.ILLEGAL_ADDRESS
+            names.append(row.name)
+            numbers.append(decode(row, words[: row.words]))
+            words, address = words[row.words :], address + row.words
+        if refusal(self._commands, "command", names, numbers):
+            return ExcCodes.ILLEGAL_VALUE
+        if not all(self._in_control(name) for name in names):
+            return ExcCodes.DEVICE_BUSY
+        given = Input(MODBUS, f"{MODBUS} {_client.get()}", self._role, SET, tuple(names), tuple(numbers))
+        return ExcCodes.DEVICE_BUSY if self._source.give(given) else None
+
+    def _in_control(self, name: str) -> bool:
+        """Whether the device of a command takes it from this role, as the line was last; the line itself decides."""
+        mode = self._source.shown.values.get(f"{self._commands[name].device}/mode", AUTOMATIC)
+        return self._role in IN_CONTROL[int(mode)]
+
+
+def _require_free(host: str, port: int) -> None:
+    """The library only says that it could not listen, not why."""
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ServerError(f"modbus: {host}:{port} can't be listened on ({reason}), expected a free port") from error

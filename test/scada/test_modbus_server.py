@@ -1,0 +1,235 @@
+"""A line over Modbus TCP, with clients that others wrote: what they read is what the simulation shows, and what they
+write acts at a tick, or is refused with an exception."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import struct
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.modbus_map import Row, modbus_map
+from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.scada.source import MOST_WAITING, TickSource
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
+
+pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+
+from pymodbus.client import ModbusTcpClient
+
+from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer, ServerError
+
+ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY = 1, 2, 3, 6
+SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
+
+
+@dataclass
+class Line:
+    """One that is stepped by the test, and served."""
+
+    simulation: Simulation
+    source: TickSource
+    rows: dict[str, Row]
+    server: ModbusServer
+    client: ModbusTcpClient
+
+    def advance(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.source.before_tick()
+            self.simulation.advance()
+            self.source.after_tick()
+
+    def read(self, name: str) -> float:
+        """As the client's own library decodes it."""
+        row, client = self.rows[name], self.client
+        ask = {
+            "coil": client.read_coils,
+            "discrete input": client.read_discrete_inputs,
+            "input register": client.read_input_registers,
+            "holding register": client.read_holding_registers,
+        }[row.table]
+        answer = ask(row.address, count=row.words)
+        assert not answer.isError(), answer
+        if row.type == "bool":
+            return float(answer.bits[0])
+        kind = client.DATATYPE[row.type.upper()]
+        return float(client.convert_from_registers(answer.registers, kind, word_order=row.word_order))
+
+    def write(self, name: str, value: float) -> Any:
+        row, client = self.rows[name], self.client
+        if row.type == "bool":
+            return client.write_coil(row.address, bool(value))
+        kind = client.DATATYPE[row.type.upper()]
+        words = client.convert_to_registers(value, kind, word_order=row.word_order)
+        return client.write_registers(row.address, words)
+
+
+@pytest.fixture(params=["operator"])
+def line(request: pytest.FixtureRequest) -> Iterator[Line]:
+    """The zoned line, in which clients write as what the test says; None: they may not."""
+    role: WriterKind | None = request.param
+    simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
+    source = TickSource(simulation)
+    rows = modbus_map(source.tags)
+    server = ModbusServer(source, rows, role)
+    with ServerThread() as thread:
+        thread.run(server.start(port=0))
+        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=20) as client:
+            yield Line(simulation, source, {row.name: row for row in rows}, server, client)
+        thread.run(server.stop())
+
+
+controller = pytest.mark.parametrize("line", ["controller"], indirect=True)
+
+
+def test_every_tag_reads_as_the_simulation_shows_it(line: Line) -> None:
+    line.advance(400)
+    shown = dict(zip(line.simulation.process_image.signal_names, line.simulation.signals(), strict=True))
+    assert shown[SPEED] > 0.0 and shown["machines/filler/produced"] >= 1.0
+    for name, value in shown.items():
+        assert line.read(name) == pytest.approx(value, rel=1e-6), name
+    for tag in line.simulation.process_image.commands:
+        assert line.read(tag.name) == pytest.approx(tag.initial, rel=1e-6), tag.name
+
+
+def test_times_keep_their_microseconds(line: Line) -> None:
+    assert line.rows["photo_eyes/full1/rose"].type == "float64"
+    line.advance(1500)
+    time = line.simulation.signals()[line.simulation.process_image.signal_names.index("photo_eyes/full1/rose")]
+    assert time > 1.0
+    assert line.read("photo_eyes/full1/rose") == time
+
+
+@controller
+def test_a_write_acts_at_the_next_tick_and_is_read_back(line: Line) -> None:
+    assert not line.write(SETPOINT, 0.1).isError()
+    assert line.read(SETPOINT) != pytest.approx(0.1)  # no tick has passed
+    line.advance()
+    (outcome,) = line.simulation.take_outcomes()
+    assert outcome.accepted, outcome.reason
+    assert (outcome.names, outcome.values) == ((SETPOINT,), (0.1,))  # as it was typed, not as a float32
+    given = outcome.input
+    assert (given.source, given.writer_kind) == ("modbus", "controller")
+    assert given.writer == f"modbus 127.0.0.1:{line.client.socket.getsockname()[1]}"
+    assert line.read(SETPOINT) == pytest.approx(0.1)
+    line.advance(200)
+    assert line.read(SPEED) == pytest.approx(0.1)
+
+
+@controller
+def test_values_that_come_in_one_request_act_together_or_not_at_all(line: Line) -> None:
+    coils = sorted((row for row in line.rows.values() if row.table == "coil"), key=lambda row: row.address)
+    assert len(coils) >= 2
+    assert not line.client.write_coils(0, [True, False]).isError()
+    line.advance()
+    (outcome,) = line.simulation.take_outcomes()
+    assert outcome.names == (coils[0].name, coils[1].name)
+    row = line.rows[SETPOINT]
+    good = line.client.convert_to_registers(0.1, line.client.DATATYPE.FLOAT32)
+    beyond = line.client.convert_to_registers(1e6, line.client.DATATYPE.FLOAT32)
+    assert line.client.write_registers(row.address, good + beyond).exception_code == ILLEGAL_VALUE
+    line.advance()
+    assert line.simulation.take_outcomes() == []
+
+
+@controller
+def test_what_can_not_be_gets_an_exception(line: Line) -> None:
+    client, setpoint = line.client, line.rows[SETPOINT]
+    too_much = client.convert_to_registers(1e6, client.DATATYPE.FLOAT32)
+    not_a_number = client.convert_to_registers(float("nan"), client.DATATYPE.FLOAT32)
+    answers = [
+        (client.write_registers(setpoint.address, too_much), ILLEGAL_VALUE),
+        (client.write_registers(setpoint.address, not_a_number), ILLEGAL_VALUE),
+        (client.write_register(setpoint.address, 1), ILLEGAL_ADDRESS),  # half of a value
+        (client.write_registers(setpoint.address + 1, too_much), ILLEGAL_ADDRESS),
+        (client.write_coil(60000, True), ILLEGAL_ADDRESS),
+        (client.read_holding_registers(60000), ILLEGAL_ADDRESS),
+        (client.read_input_registers(65535, count=2), ILLEGAL_ADDRESS),
+        (client.diag_restart_communication(True), ILLEGAL_FUNCTION),
+        (client.read_device_information(), ILLEGAL_FUNCTION),
+    ]
+    assert [answer.exception_code for answer, _ in answers] == [code for _, code in answers]
+    line.advance()
+    assert line.simulation.take_outcomes() == []
+    assert (line.server.writes, line.server.refused) == (0, 5)
+
+
+@pytest.mark.parametrize("line", [None], indirect=True)
+def test_without_a_role_nobody_writes(line: Line) -> None:
+    assert line.write(SETPOINT, 0.1).exception_code == ILLEGAL_FUNCTION
+    line.advance()
+    assert line.simulation.take_outcomes() == []
+    assert line.read(SETPOINT) == pytest.approx(line.simulation.process_image.commands[0].initial)
+
+
+@controller
+def test_more_writes_than_can_wait_are_refused_and_no_more_is_kept(line: Line) -> None:
+    codes = [line.write(SETPOINT, 0.1).isError() for _ in range(MOST_WAITING + 5)]
+    assert codes == [False] * MOST_WAITING + [True] * 5
+    assert line.write(SETPOINT, 0.1).exception_code == BUSY
+    line.advance()
+    assert len(line.simulation.take_outcomes()) == MOST_WAITING
+    assert not line.write(SETPOINT, 0.2).isError()
+
+
+@controller
+def test_packets_that_are_none_end_nothing(line: Line) -> None:
+    """Wrong lengths, wrong protocol, half a packet, a megabyte of noise: the next client is served all the same."""
+    noise = [
+        b"\x00",
+        b"\x00\x01\x00\x00\x00\x06\x01\x03\x00\x00",
+        b"\x00\x01\x00\x00\xff\xff\x01\x03\x00\x00\x00\x01",
+        b"\x00\x01\x00\x07\x00\x06\x01\x03\x00\x00\x00\x01",
+        struct.pack(">HHHBBHHB", 1, 0, 7, 1, 16, 0, 2, 4),
+        bytes(range(256)) * 4096,
+        b"GET / HTTP/1.1\r\n\r\n",
+    ]
+    for packet in noise:
+        with socket.create_connection(("127.0.0.1", line.server.port), timeout=20) as raw:
+            raw.sendall(packet)
+    assert not line.write(SETPOINT, 0.1).isError()
+    line.advance()
+    assert [outcome.names for outcome in line.simulation.take_outcomes()] == [(SETPOINT,)]
+
+
+def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
+    address = ("127.0.0.1", line.server.port)
+    many = [socket.create_connection(address, timeout=20) for _ in range(MOST_CLIENTS + 8)]
+    many[-1].settimeout(20)
+    assert many[-1].recv(1) == b""  # closed by the server
+    assert line.server.clients == MOST_CLIENTS
+    for one in many:
+        one.close()
+    assert line.read(SPEED) == line.read(SPEED)
+    with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=20) as another:
+        assert not another.read_coils(0).isError()
+
+
+def test_a_port_that_is_taken_is_said(line: Line) -> None:
+    taken = line.server.port
+    other = ModbusServer(line.source, list(line.rows.values()))
+    with ServerThread() as thread, pytest.raises(ServerError, match=f"modbus: 127.0.0.1:{taken} can't be listened on"):
+        thread.run(other.start(port=taken))
+
+
+@pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed: apt-get install mbpoll")
+@controller
+def test_mbpoll_reads_and_writes(line: Line) -> None:
+    """An implementation in C (libmodbus). Its -B has the high word first."""
+    port = str(line.server.port)
+    row = line.rows[SETPOINT]
+    common = ["mbpoll", "-0", "-B", "-p", port, "-t", "4:float", "-r", str(row.address), "-1", "127.0.0.1"]
+    subprocess.run([*common, "0.125"], check=True, capture_output=True, timeout=60)
+    line.advance(300)
+    read = subprocess.run(common, check=True, capture_output=True, text=True, timeout=60).stdout
+    assert "0.125" in read.split("--")[-1]
+    assert line.read(SPEED) == pytest.approx(0.125)
+    refused = subprocess.run([*common, "99"], capture_output=True, text=True, timeout=60)
+    assert "Illegal data value" in refused.stderr
