@@ -63,7 +63,7 @@ def test_it_stands_as_it_was_saved(warm: Path) -> None:
     with Scenario(TABLE, start=str(warm)) as table:
         assert table.signals[ON_TABLE] == 2
         assert not table.signals.on("machines/packer/running")  # the fault is still there
-        assert table.alarms == {"full"} == table.simulation.alarms
+        assert table.alarms == {"full", "machines/packer/fault"} == table.simulation.alarms
         assert table.signals["alarms/full"] == 1.0
         assert table.history.time.tolist() == [table.time]
         assert table.history["alarms/full"].tolist() == [1.0]
@@ -73,7 +73,7 @@ def test_it_stands_as_it_was_saved(warm: Path) -> None:
         assert table.signals["belts/feeder/speed"] == 0.0
         table.attach(Constant({FEEDER: 0.4}))  # which has no such alarm: it goes
         table.run_for(0.05)
-        assert not table.simulation.alarms and not table.alarms
+        assert table.simulation.alarms == table.alarms == {"machines/packer/fault"}
 
 
 def test_the_duration_may_be_another(warm: Path) -> None:

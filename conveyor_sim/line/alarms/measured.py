@@ -26,7 +26,7 @@ class Measured:
         """The conditions that have begun or ended, by id. forced: signals that are read otherwise than they are."""
         if self._of is not self._alarms.measured:
             self._find()
-        changed = {}
+        changed: dict[str, bool] = {}
         for device, watched in self._watched:
             values = device.values(now)
             for alarm, column in watched:

@@ -48,8 +48,10 @@ class LimitConditions:
 
     def changes(self, passed: Sequence[DamageEvent], clogged: Mapping[str, bool]) -> dict[str, bool]:
         """Those that have begun or ended, by id. passed: in the tick that ends; clogged: outfeeds."""
+        if not (self._alarms or clogged):
+            return {}
         now = {f"outfeeds/{name}/clogged": on for name, on in clogged.items()}
         if self._alarms:
             kinds = {LIMITS + limit.kind for limit in passed}
             now.update({alarm.id: alarm.id in kinds for alarm in self._alarms})
-        return {id: on for id, on in now.items() if on is not self._all[id].condition} if now else now
+        return {id: on for id, on in now.items() if on is not self._all[id].condition}

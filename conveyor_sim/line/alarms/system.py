@@ -1,6 +1,7 @@
 """`AlarmSystem`: the alarms of one line, tied to its devices, its scene and its inputs."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from conveyor_sim.errors import SceneError
@@ -74,12 +75,11 @@ class AlarmSystem:
         forced: Mapping[str, float],
     ) -> None:
         """A tick has ended, in which limits were passed. clogged: outfeeds; forced: signals, as they are read."""
-        said = self._measured.changes(now, forced)
-        if now.conditions:
-            said, now.conditions = {**now.conditions, **said}, {}
-        said.update(self._limits.changes(passed, clogged))
-        if said:
-            self.alarms.say(now.tick, said)
+        if measured := self._measured.changes(now, forced):
+            now.conditions |= measured
+        if limits := self._limits.changes(passed, clogged):
+            now.conditions |= limits
+        self.take(now)
         self.alarms.end(now.tick)
 
     def snapshot(self) -> dict[str, Any]:
@@ -122,8 +122,12 @@ def _said(names: Sequence[str], values: Sequence[float]) -> dict[str, bool]:
     """Alarms among names and values, by id; of what is no alarm nothing."""
     if len(names) != len(values):
         return {}
-    return {
-        name.removeprefix(PREFIX): value == 1.0
-        for name, value in zip(names, values, strict=True)
-        if name.startswith(PREFIX) and name != PREFIX and value in (0.0, 1.0)
-    }
+    found = _alarms_among(tuple(names))
+    return {id: values[place] == 1.0 for place, id in found if values[place] in (0.0, 1.0)} if found else {}
+
+
+@lru_cache(maxsize=64)
+def _alarms_among(names: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
+    """Places and ids of alarms; a controller gives the same names in every scan."""
+    given = [(place, name.removeprefix(PREFIX)) for place, name in enumerate(names) if name.startswith(PREFIX)]
+    return tuple((place, id) for place, id in given if id)
