@@ -199,8 +199,9 @@ def _row(
     bottles = {"processed": processed, "good": processed - defective, "defective": defective, "rejected": rejected}
     return {
         "name": name,
-        "since": np.uint64(since),
-        **{field: np.uint64(value) for field, value in (bottles | {"failures": failures}).items()},
+        "since": np.uint64(max(since, 0)),
+        # Below 0 by an edited checkpoint alone.
+        **{field: np.uint64(max(value, 0)) for field, value in (bottles | {"failures": failures}).items()},
         **times,
         "rate": rate,
         "availability": made.availability,

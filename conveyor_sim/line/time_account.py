@@ -15,13 +15,14 @@ CATEGORIES: tuple[Category, ...] = get_args(Category)
 class TimeAccount:
     """Where the time of one machine went, in ticks. Public attributes are remembered in checkpoints."""
 
+    category: Category
+    """Present one."""
     ticks: dict[str, int]
     """By category, up to the last change."""
 
     def __init__(self, category: Category, tick: int = 0) -> None:
         """category: that in which the account opens."""
-        self.category: str = category
-        """Present one."""
+        self.category = category
         self.since = tick
         """Tick at which it began, or at which all was set to 0."""
         self.reset(tick)

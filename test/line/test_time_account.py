@@ -49,3 +49,5 @@ def test_an_account_goes_on_from_a_checkpoint() -> None:
     assert other.up_to(12) == account.up_to(12)
     with pytest.raises(ValueError, match="ticks"):
         restore(other, {**snapshot(account), "ticks": {"running": 1}})
+    with pytest.raises(ValueError, match="category"):
+        restore(other, {**snapshot(account), "category": "asleep"})
