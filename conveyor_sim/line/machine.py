@@ -195,14 +195,14 @@ class MachineDevice(Device):
             self.packml.take(command)
 
     def advance(self, now: ScanContext) -> None:
-        """A tick has passed: fail or be repaired, leave acting states, ramp up. To be called once a tick, first."""
+        """A tick has passed: fail or be repaired, leave acting states, ramp up. Once a tick, first, if it is busy."""
         if now.tick == 0:
             return
         if self._clocks:
             self._count_failures()
         if self._plans:
             self._follow_plan(now.tick)
-        if self.packml.state != EXECUTE:
+        if self.packml.acts:
             self.packml.advance(self.ready(now))
             self._settle_state()
         if self._ramp and self.packml.state in WORKING:
@@ -252,8 +252,9 @@ class MachineDevice(Device):
 
     def _note_state(self) -> None:
         self._changed = True
-        waits = self.state == SUSPENDED and self.reason in (STARVED, BLOCKED)
-        self._works = (self.state in self._working or waits) and not self._failed
+        self._waits = self.state == SUSPENDED and self.reason in (STARVED, BLOCKED)
+        self._works = (self.state in self._working or self._waits) and not self._failed
+        self._busy = bool(self._clocks or self._plans or self._ramp) or self.packml.acts
         if self.state not in WORKING:
             self.speed = 0.0 if self._ramp else self.speed
 
@@ -277,13 +278,15 @@ class MachineDevice(Device):
 
     def goes_on(self) -> bool:
         """Whether it works on a bottle that it could take or give now: it comes back from Suspended for it."""
-        if self.packml.state == SUSPENDED:
+        if self._waits:
             self.packml.take(Command.UNSUSPEND)
             self._note_state()
         return self._works
 
     def conclude(self, cause: int, now: ScanContext) -> None:
         """The tick's work is done. cause: STARVED or BLOCKED if it had to wait, NONE if not. Once a tick, last."""
+        if not (cause or self.waited or self._changed):
+            return
         if cause:
             self.waited = self.waited + 1 if cause == self.cause else 1
             if self.waited >= self._suspend_ticks and self.packml.state == EXECUTE:
@@ -315,8 +318,7 @@ class MachineDevice(Device):
 
     def status(self) -> Sequence[float]:
         """State, category, stop_reason, fault, failures and cur_rate (1/s)."""
-        works = self._works and self.packml.state != SUSPENDED
-        rate = (self.speed if self._ramp else self.rate) if works else 0.0
+        rate = (self.speed if self._ramp else self.rate) if self._works and not self._waits else 0.0
         return *self._shown, self.failures, rate
 
     def _ticks(self, seconds: float) -> int:

@@ -27,7 +27,8 @@ class SinkDevice(TakingDevice):
 
     def take(self, now: ScanContext) -> None:
         """Take the bottle that has waited longest, if one is due."""
-        self.advance(now)
+        if self._busy:
+            self.advance(now)
         slot_of = self.queue(now)
         cause = NONE
         if self.turn(now):

@@ -29,7 +29,8 @@ class SourceDevice(MachineDevice):
 
     def feed(self, now: ScanContext) -> None:
         """Give the bottle that is due, if there is room."""
-        self.advance(now)
+        if self._busy:
+            self.advance(now)
         cause = NONE
         if self.turn(now):
             if not self._entry.has_room(now.state, *self._position):

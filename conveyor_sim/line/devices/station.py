@@ -65,7 +65,8 @@ class StationDevice(TakingDevice):
 
     def take(self, now: ScanContext) -> None:
         """Take the bottle that has waited longest, if it has none."""
-        self.advance(now)
+        if self._busy:
+            self.advance(now)
         slot_of = self.queue(now)
         if self.holding == EMPTY and self.works and self.waiting and self.goes_on():
             # One that it had to wait for begins its cycle now; any other one when the last was given.
