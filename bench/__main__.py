@@ -12,7 +12,7 @@ from conveyor_sim.support.interrupt import one_line, while_importing
 with while_importing():
     import click
 
-    from bench import control, dense, growth, lockstep, markdown, memory, node, plant, start, targets, whole
+    from bench import control, dense, growth, lockstep, markdown, memory, node, plant, riding, start, targets, whole
     from bench.measure import Effort, say
     from bench.rows import Row, Rows
     from conveyor_sim.support.machine import PACKAGES, machine
@@ -42,6 +42,7 @@ PARTS: dict[str, Part] = {
     "start": start,
     "node": node,
     "control": control,
+    "riding": riding,
     "lockstep": lockstep,
     "whole": whole,
 }

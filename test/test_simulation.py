@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scenes import MASS, RADIUS, bottle, contact, kind, line, scene, segment, simulation
 
+from conveyor_sim.engine.integrators import RIDES
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.simulation import Simulation
 
@@ -93,6 +94,7 @@ def test_the_little_line_is_busy(reference: Simulation) -> None:
     others = {"hertz", "table", "tsuji_damping", "onset_damping", "atan_friction", "implicit_friction"}
     others |= {"moving_rails", "scuffing", "crushing", "impacts", "tipping"}
     others |= {"static_friction", "viscoelastic_damping"}
+    others |= set() if sim.model.integrator in RIDES else {"riding"}
     assert off == others | {"tangential_spring", "ring_base", "peaks", "contact_arrays", "energy_ledger"}
     assert [outcome.source for outcome in sim.take_outcomes()][-1] == "watchdog"
 

@@ -4,7 +4,7 @@ What no scene asks for is absent: its arrays are None and its branch is not comp
 effects have a file each; `laws/` and `model/` build their arrays, the laws are files in `engine/`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from conveyor_sim.effects.base import BASE_FRICTION, BELTS, CURVED_BELTS, RING_BASE
 from conveyor_sim.effects.contacts import BOTTLE_CONTACT, HERTZ, LINEAR, TABLE
@@ -16,6 +16,7 @@ from conveyor_sim.effects.geometry import ARC_RAILS, MOVING_RAILS, SEGMENT_RAILS
 from conveyor_sim.effects.impacts import impact_bounds, impacts
 from conveyor_sim.effects.load import contact_load
 from conveyor_sim.effects.observers import CONTACT_ARRAYS, ENERGY_LEDGER, PEAKS
+from conveyor_sim.effects.riding import RIDING
 from conveyor_sim.effects.rotation import ROTATION
 from conveyor_sim.effects.static_friction import STATIC_FRICTION
 from conveyor_sim.effects.supply import INFEED, OUTFEED
@@ -69,6 +70,7 @@ EFFECTS: tuple[Effect, ...] = (
     CRUSHING,
     IMPACTS,
     TIPPING,
+    RIDING,
 )
 """In the order in which they are decided: what is on may call for those after it."""
 
@@ -76,12 +78,12 @@ EFFECTS: tuple[Effect, ...] = (
 def choose_effects(scene: Scene) -> tuple[EffectChoice, ...]:
     """Decide every effect for a scene, in the order of EFFECTS. SceneError if one can't be forced as the scene says."""
     choices: list[EffectChoice] = []
-    refused: list[EffectName] = []
+    refused: dict[EffectName, str] = {}
     on: set[str] = set()
     for effect in EFFECTS:
         choice = _choose(effect, scene, on)
         if choice is None:
-            refused.append(effect.name)
+            refused[effect.name] = _absent(effect, scene, on)
             continue
         choices.append(choice)
         if choice.on:
@@ -116,7 +118,7 @@ def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:
     cause = effect.called_for(scene, on)
     forced = scene.effects.get(effect.name)
     if forced is None:
-        why = effect.absent if cause is None else str(cause)
+        why = _absent(effect, scene, on) if cause is None else str(cause)
         return EffectChoice(effect.name, cause is not None, why, None if cause is None else cause.path)
     possible = effect.can_force_off if forced == "off" else effect.can_force_on
     if not possible and (cause is not None) != (forced == "on"):
@@ -125,12 +127,16 @@ def _choose(effect: Effect, scene: Scene, on: set[str]) -> EffectChoice | None:
     return EffectChoice(effect.name, forced == "on", why, ("effects", effect.name), forced=True)
 
 
-def _refusals(scene: Scene, names: Sequence[EffectName]) -> list[str]:
-    """A line for each effect that can't be forced, in the order of the scene's lines."""
+def _absent(effect: Effect, scene: Scene, on: set[str]) -> str:
+    here = "" if effect.absent_here is None else effect.absent_here(scene, on)
+    return here or effect.absent
+
+
+def _refusals(scene: Scene, absent: Mapping[EffectName, str]) -> list[str]:
+    """A line for each effect that can't be forced, in the order of the scene's lines. absent: what it lacks."""
     places = Places(scene)
-    absent = {effect.name: effect.absent for effect in EFFECTS}
     lines = []
-    for name in sorted(names, key=lambda name: places.line_of(("effects", name)) or 0):
+    for name in sorted(absent, key=lambda name: places.line_of(("effects", name)) or 0):
         reason = f'"on" given, expected "off": {absent[name]}'
         if scene.effects[name] == "off":
             reason = f'"off" given, expected "on": what calls for {name} makes no sense without it'

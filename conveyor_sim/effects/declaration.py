@@ -37,6 +37,8 @@ class Effect:
     """What is missing when nothing calls for it."""
     needs: str
     """State and parameters that it brings, in words."""
+    absent_here: Callable[[Scene, Collection[str]], str] | None = None
+    """What is missing in a scene, given the effects before it that are on; "" or None: as in `absent`."""
     bounds: Callable[[Terms], list[Bound]] | None = None
     """The bounds on dt that it brings when it is on; None: it brings none."""
     bound: str = ""

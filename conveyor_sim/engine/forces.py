@@ -11,9 +11,17 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import find_touching, pack, pair_forces
 from conveyor_sim.engine.contact.path import forget_path
 from conveyor_sim.engine.contact.slots import sum_pair_forces, sum_slots
-from conveyor_sim.engine.observers.ledger_parts import find_base_parts, find_pair_parts, keep_load, sum_pair_parts
+from conveyor_sim.engine.lists.riding import step_all, stepped_run, stepped_runs
+from conveyor_sim.engine.observers.ledger_parts import (
+    add_belt_powers,
+    clear_belt_powers,
+    find_base_parts,
+    find_pair_parts,
+    keep_load,
+    sum_pair_parts,
+)
 from conveyor_sim.engine.rails.rails import add_rail_forces, count_rail_contacts
-from conveyor_sim.engine.support.base import add_base_friction
+from conveyor_sim.engine.support.base import add_base_friction, add_straddling_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
 from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
@@ -23,6 +31,7 @@ from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
 def evaluate_forces(world: World, worker: Worker, dt: float) -> None:
     """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
     forget_path(world.path, world.moving, worker)
+    step_all(world.riding, world.bottles, worker)
     pack_all(world, worker)
     pair_phase(world, worker, dt, 0.0)
     begin, stop = share(worker, world.bottles.x.size)
@@ -54,16 +63,30 @@ def pair_phase(world: World, worker: Worker, dt: float, spring_dt: float) -> Non
 
 @part
 def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, first: int, end: int) -> None:
-    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22)."""
-    sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
-    sum_pair_parts(world.pairs, world.slots, world.ledger, first, end)
-    add_rail_forces(world, worker.found, first, end, spring_dt)
-    keep_load(world.load, world.spin, world.ledger, first, end)
-    check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(world, world.spin, world.load, world.implicit, _belt_power(world.ledger), dt, first, end)
+    """Fill `world.load` (N) and `world.spin.moment` (N m) of bottles first to end (eq. 22), but of those that ride.
+
+    First to end is a block (`riding.py`).
+    """
     lag = world.settings.lag * dt
+    clear_belt_powers(world.ledger, first, end)
+    for run in range(stepped_runs(world.riding, first)):
+        begin, stop = stepped_run(world.riding, first, end, run)
+        sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), begin, stop)
+        sum_pair_parts(world.pairs, world.slots, world.ledger, begin, stop)
+    # What lists by unit have is stepped, all of it.
+    add_rail_forces(world, worker.found, first, end, spring_dt)
+    check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
+    for run in range(stepped_runs(world.riding, first)):
+        begin, stop = stepped_run(world.riding, first, end, run)
+        keep_load(world.load, world.spin, world.ledger, begin, stop)
+        add_base_friction(world, world.spin, world.load, world.implicit, dt, begin, stop)
+    add_straddling_friction(world, world.spin, world.load, _belt_power(world.ledger), lag, first, end)
     add_static_friction(world.bottles, world.load, world.footing, world.static_friction, lag, True, first, end)
-    find_base_parts(world, first, end)
+    if world.ledger is not None:
+        for run in range(stepped_runs(world.riding, first)):
+            begin, stop = stepped_run(world.riding, first, end, run)
+            find_base_parts(world, begin, stop)
+        add_belt_powers(world, first, end)
 
 
 @part
@@ -91,12 +114,16 @@ def _count_closed(world: World, worker: Worker, dt: float) -> None:
     begin, stop = share(worker, bottles.x.size)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        sum_slots(world.slots, _touch(world), first, end, implicit.closed)
+        for run in range(stepped_runs(world.riding, first)):
+            left, right = stepped_run(world.riding, first, end, run)
+            sum_slots(world.slots, _touch(world), left, right, implicit.closed)
         count_rail_contacts(world, worker.found, first, end, implicit.closed)
-        for i in range(first, end):
-            # The base is a contact too.
-            implicit.closed[i] += 1.0
-            implicit.compliance[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
+        for run in range(stepped_runs(world.riding, first)):
+            left, right = stepped_run(world.riding, first, end, run)
+            for i in range(left, right):
+                # The base is a contact too.
+                implicit.closed[i] += 1.0
+                implicit.compliance[i] = world.settings.ahead * dt * implicit.mobility[i] * implicit.closed[i]
     wait_for_all(worker)
 
 

@@ -11,7 +11,7 @@ from conveyor_sim.engine.compiler.groups import without
 
 NOT_FOR_FORCES = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
 NOT_FOR_LISTS = NOT_FOR_FORCES | {
-    "spin", "load", "path", "implicit", "curves", "rail_law", "static_friction", "ledger",
+    "spin", "load", "path", "implicit", "riding", "curves", "rail_law", "static_friction", "ledger",
 }  # fmt: skip
 
 

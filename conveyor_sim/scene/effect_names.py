@@ -35,6 +35,7 @@ EffectName = Literal[
     "crushing",
     "impacts",
     "tipping",
+    "riding",
 ]
 
 EFFECT_NAMES: tuple[EffectName, ...] = get_args(EffectName)

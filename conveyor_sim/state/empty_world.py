@@ -10,11 +10,13 @@ from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, 
 from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
 from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
 from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
+from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED
+from conveyor_sim.engine.lists.riding import LEAST
 from conveyor_sim.engine.observers.ledger import BELTS
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.model import Model
@@ -89,6 +91,7 @@ def empty_world(model: Model, slots: int) -> World:
         slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
         linear=_linear(slots) if model.integrator in LINEAR else None,
         implicit=Implicit(reals(), reals(), reals()) if model.has("implicit_friction") else None,
+        riding=_riding(model, slots) if model.has("riding") else None,
         neighbourhood=Neighbourhood(
             x=reals(),
             y=reals(),
@@ -211,6 +214,20 @@ def _linear(slots: int) -> Linear:
         left_sum=np.zeros(units),
         way_sum=np.zeros(units),
         most=np.zeros(units),
+    )
+
+
+def _riding(model: Model, slots: int) -> Riding:
+    runs, units = slots // LEAST + 2, slots // UNIT + 1
+    return Riding(
+        vx=np.zeros(slots),
+        vy=np.zeros(slots),
+        omega=np.zeros(slots) if model.has("rotation") else None,
+        rides=np.zeros(slots, np.int8),
+        first=np.zeros(runs, np.uint32),
+        end=np.zeros(runs, np.uint32),
+        runs=np.zeros(units, np.int64),
+        progress=np.zeros(units, np.int64),
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
+from conveyor_sim.engine.lists.riding import PLANNED, STEPPED
 from conveyor_sim.model import Model
 from conveyor_sim.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
 from conveyor_sim.state.world_arrays import Arrays, changing_arrays
@@ -33,6 +34,7 @@ SCRATCH = (
     "slopes.",
     "linear.",
     "implicit.",
+    "riding.",
     "probe.depth",
     *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
     *(f"pairs.{name}" for name in ("reach", "radius_i")),
@@ -112,6 +114,11 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "moving.actuators.mode": (ON_PROFILE, HELD),
         "moving.actuators.left": (0, 1),
         "static_friction.belt": (-1, belts),
+        "riding.rides": (0, 1),
+        "riding.first": (0, slots),
+        "riding.end": (0, slots),
+        "riding.runs": (0, slots),
+        "riding.progress": (STEPPED, PLANNED),
     }
     if world.belts is not None:
         given["belts.start"] = (0, world.belts.candidate.size)

@@ -134,7 +134,7 @@ def choices(**fields: Any) -> dict[str, str]:
         ({"bottle_types": {"bottle": kind(base_radius=0.04)}, "bottles": TWO[:1], **NO_FLOOR}, {}),
         (
             {"belts": {"one": belt(0.1)}, "base": base(0.4)},
-            {"base_friction": "belts.one: friction 0.4", "belts": "belts.one"},
+            {"base_friction": "belts.one: friction 0.4", "belts": "belts.one", "riding": "belts.one"},
         ),
         (
             {"belts": {"one": belt(0.1)}, "base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]},
@@ -147,7 +147,12 @@ def choices(**fields: Any) -> dict[str, str]:
         ({"belts": {"one": belt(0.1)}, "base": base(0.0)}, {}),
         (
             {"belts": {"one": belt(0.1), "bend": CURVED}, "base": base(0.4)},
-            {"base_friction": "belts.one: friction 0.4", "belts": "belts.one", "curved_belts": "belts.bend"},
+            {
+                "base_friction": "belts.one: friction 0.4",
+                "belts": "belts.one",
+                "curved_belts": "belts.bend",
+                "riding": "belts.one",
+            },
         ),
         (
             {"outfeeds": {"out": {"region": [[0, 0], [1, 0], [1, 1]]}}, "bottles": TWO[:1]},
@@ -195,6 +200,25 @@ def test_every_effect_is_decided_and_says_why_not() -> None:
         "tangential_spring", "static_friction", "ring_base", "peaks", "contact_arrays", "energy_ledger", "scuffing",
         "crushing", "impacts", "tipping",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("fields", "why"),
+    [
+        ({"accuracy": {"integrator": "rk4"}}, "with rk4 a step leaves nobody out"),
+        ({"accuracy": {"integrator": "linearly_implicit"}}, "with linearly_implicit a step leaves nobody out"),
+        ({"base": [{**base(0.4)[0], "tangential": {"stiffness": 900.0}}]}, "springs under the bottles pull anew"),
+        ({"belts": {"bend": CURVED}}, "no straight belt"),
+    ],
+)  # fmt: skip
+def test_where_nobody_can_ride_it_says_why(fields: dict[str, Any], why: str) -> None:
+    """Also where it is forced on, which is refused."""
+    given = {"belts": {"one": belt(0.1)}, "base": base(0.4), **fields}
+    (choice,) = (choice for choice in choose_effects(scene(**given)) if choice.name == "riding")
+    assert not choice.on
+    assert choice.why.startswith(why)
+    with pytest.raises(SceneError, match=f'effects.riding: "on" given, expected "off": {why}'):
+        choose_effects(scene(**given, effects={"riding": "on"}))
 
 
 def test_every_name_that_a_scene_may_force_is_one_effect() -> None:

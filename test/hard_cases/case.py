@@ -52,11 +52,13 @@ class Case:
     settled: float = 0.0
     """From when on drift, travel and means are taken; of the short run where there is one."""
     commands: Sequence[Mapping[str, float]] = ()
-    """`at`, and belts with their speeds (m/s), or whole names of commands with their values."""
+    """`at`, and belts with their speeds (m/s), or whole names of commands or faults with their values."""
     ramp: Mapping[str, Any] = field(default_factory=dict)
     """`belt`, `from`, `to` (m/s) and `acceleration` (m/s^2): a command every tick."""
     put: Sequence[Mapping[str, Any]] = ()
     """`at`, `bottle`, and `by` (m) or `push` (m/s): a bottle displaced from outside."""
+    saved: float | None = None
+    """When the run is saved and goes on from its checkpoint."""
     stiffness: float | None = None
     """N/m, in place of that of all contacts of glass."""
     variants: Sequence[str] = ("plain",)

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from hard_cases.case import Case
@@ -14,9 +18,10 @@ from conveyor_sim.accuracy.chatter import STEPS
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
+from conveyor_sim.engine.lists.riding import left_out
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.observe.columns import BottleColumns
-from conveyor_sim.scene import Scene
+from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stepping.guard.chatter import ChatterMeter
 
@@ -63,6 +68,8 @@ MEASURES = {
     "shortened_ticks": "ticks that the guard had done again in shorter steps",
     "residual": "energy that the ledger can't place, over its turnover",
     "simulated": "s",
+    "riding": "bottles that ride at once, at most, of those that are looked at",
+    "unlike_stepped": "1 if a run in which nobody rides ends in another state, else 0; where a row expects it",
 }
 """What is measured, and in what; NaN where there is nothing to measure it on."""
 
@@ -84,12 +91,15 @@ def run(
     watch = _Watch(simulation, case.settled)
     outcome = Outcome()
     every = max(1, math.ceil(ticks / SAMPLES))
-    stops, done = sorted({*_acts(case, scene), hash_at}), 0
+    saved = -1 if case.saved is None else round(case.saved / scene.tick)
+    stops, done = sorted({*_acts(case, scene), hash_at, saved}), 0
     # A run that is unstable overflows before it ends.
     with np.errstate(over="ignore", invalid="ignore"):
         try:
             watch.look(simulation)
             while done < ticks:
+                if done == saved:
+                    simulation = _reloaded(simulation, threads)
                 _act(case, simulation, done)
                 step = min([every - done % every, ticks - done, *(tick - done for tick in stops if tick > done)])
                 simulation.advance(step)
@@ -106,7 +116,40 @@ def run(
         if case.put:
             outcome.measures["residual"] = math.nan  # what is put in from outside is in no ledger
         outcome.measures["chatter"] = math.nan if outcome.sentence else chatter(simulation)
+        if "unlike_stepped" in case.expect:
+            outcome.measures["unlike_stepped"] = float(_end(simulation) != _end(_stepped(case, scene, done)))
     return outcome
+
+
+def _reloaded(simulation: Simulation, threads: int) -> Simulation:
+    """As it goes on from its checkpoint."""
+    with TemporaryDirectory() as folder:
+        simulation.save(Path(folder) / "case")
+        return Simulation.load(Path(folder) / "case", threads=threads)
+
+
+def _stepped(case: Case, scene: Scene, ticks: int) -> Simulation:
+    """The same run with nobody riding."""
+    overrides = {**parse_overrides(scene.overrides_text), "effects": {**scene.effects, "riding": "off"}}
+    simulation = Simulation(parse_scene(scene.source_text, scene.source_name, overrides), threads=1)
+    with suppress(SimulationError):
+        for tick in range(ticks):
+            _act(case, simulation, tick)
+            simulation.advance()
+    return simulation
+
+
+def _end(simulation: Simulation) -> tuple[Any, ...]:
+    """What a run came to, to the bit."""
+    books = (repr(simulation.ledger()), simulation.peak_force, simulation.deepest_overlap, simulation.shortened_ticks)
+    return (simulation.tick, simulation.state_hash(), *books)
+
+
+def riders(simulation: Simulation) -> int:
+    """Bottles that the last step of the last tick left out, on one thread; 0 where nobody can ride."""
+    world = simulation._state.world
+    ids = world.bottles.id
+    return int((left_out(world.riding, ids.size) & (ids >= 0)).sum())
 
 
 def _acts(case: Case, scene: Scene) -> list[int]:
@@ -129,8 +172,11 @@ def _act(case: Case, simulation: Simulation, tick: int) -> None:
     for command in case.commands:
         if round(command["at"] / scene.tick) == tick:
             given = {name: value for name, value in command.items() if name != "at"}
+            for name in given.keys() & set(simulation.process_image.fault_names):
+                simulation.inject(name, given.pop(name))
             names = [name if "/" in name else f"belts/{name}/cmd_speed" for name in given]
-            simulation.command(names, list(given.values()))
+            if names:
+                simulation.command(names, list(given.values()))
     if case.ramp:
         way = case.ramp["to"] - case.ramp["from"]
         gone = min(abs(way), _rise(case, scene) * (tick + 1))
@@ -151,7 +197,7 @@ class _Watch:
         self._settled = settled
         self._first = simulation.counts.present - simulation.counts.fed
         self._at_first = simulation.bottles()
-        self._most = dict.fromkeys(("overlap", "peak_force", "speed", "slip"), 0.0)
+        self._most = dict.fromkeys(("overlap", "peak_force", "speed", "slip", "riding"), 0.0)
         self._crossed: set[int] = set()
         self._before: BottleColumns | None = None
         self._start: BottleColumns | None = None
@@ -167,6 +213,7 @@ class _Watch:
         self._raise("speed", speed)
         self._raise("peak_force", np.array([simulation.peak_force or 0.0]))
         self._raise("slip", slips(simulation, bottles))
+        self._raise("riding", np.array([float(riders(simulation))]))
         radius = simulation.model.type_radius[bottles.type]
         smaller = radius[np.searchsorted(bottles.id, contacts.a)]
         pairs = contacts.kind == PAIR
@@ -211,6 +258,7 @@ class _Watch:
             "blocked_ticks": float(counts.blocked_ticks),
             "residual": residual(simulation),
             "simulated": ticks * simulation.scene.tick,
+            "unlike_stepped": math.nan,
         }
         if self._start is not None:
             _, here, there = np.intersect1d(self._start.id, bottles.id, assume_unique=True, return_indices=True)

@@ -10,6 +10,7 @@ from conveyor_sim.engine.arrays.lists import Listed, Near, Neighbourhood, Static
 from conveyor_sim.engine.arrays.moving import MovingRails
 from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
+from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface
 from conveyor_sim.engine.arrays.types import I8
 from conveyor_sim.engine.compiler.groups import group
@@ -57,6 +58,7 @@ class World(NamedTuple):
     slopes: Slopes | None
     linear: Linear | None
     implicit: Implicit | None
+    riding: Riding | None
     neighbourhood: Neighbourhood
     probe: GuardProbe
     pairs: Pairs | None

@@ -36,6 +36,9 @@ ON_PATHS = frozenset({"velocity_verlet", "rk4"})
 STAGED = frozenset({"velocity_verlet"})
 """Integrators that keep a copy of the velocities within a step (``World.stage``)."""
 
+RIDES = frozenset({"leapfrog", "semi_implicit_euler", "velocity_verlet"})
+"""Integrators that can leave out bottles whose velocity stays as it is (``World.riding``, `riding.py`)."""
+
 SLOPES = {"rk4": rk4.STAGES, "dormand_prince": dormand_prince.STAGES}
 """Integrators that keep the slopes of so many stages within a step (``World.slopes``)."""
 

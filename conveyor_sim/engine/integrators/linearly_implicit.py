@@ -38,7 +38,7 @@ from conveyor_sim.engine.integrators.tangent_rails import linear_rails, stiffest
 from conveyor_sim.engine.lists.rebuild import moved_too_far
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book, note_powers
-from conveyor_sim.engine.support.base import add_base_friction
+from conveyor_sim.engine.support.base import add_base_friction, add_straddling_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.threads.workers import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
 from conveyor_sim.engine.world_views import for_forces
@@ -174,7 +174,8 @@ def _assemble(world: World, worker: Worker, dt: float, theta: float, first: int,
     _inertia(bottles, world.spin, own, first, end)
     linear_rails(world, worker.found, (dt, theta), first, end)
     check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(world, world.spin, world.load, None, None, dt, first, end)
+    add_base_friction(world, world.spin, world.load, None, dt, first, end)
+    add_straddling_friction(world, world.spin, world.load, None, world.settings.lag * dt, first, end)
     resist_base(world, dt, theta, first, end)
     _copy_blocks(own, inverse, first, end)
     add_pair_blocks(world.pairs, world.slots, inverse, first, end)

@@ -11,6 +11,7 @@ from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
+from conveyor_sim.engine.lists.riding import wake_all
 from conveyor_sim.engine.observers.guard_probe import probe_overlaps
 from conveyor_sim.engine.threads.workers import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
 from conveyor_sim.engine.world_views import for_lists
@@ -69,6 +70,7 @@ def lists_hold(world: World, worker: Worker) -> bool:
             rebuild(for_lists(world))
             world.probe.due[0] = 1
         wait_for_all(worker)
+        wake_all(world.riding, world.bottles, worker)
     return world.neighbourhood.stale[0] == 0
 
 

@@ -21,6 +21,7 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, note_moved, probe_rebuilt, settle
+from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -36,6 +37,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     line = for_forces(world)
     begin, stop = share(worker, bottles.x.size)
     place_rails(line.moving, worker, dt)
+    step_all(world.riding, bottles, worker)
     pack_all(line, worker)
     for step in range(steps):
         note_damage(world, worker, dt)
@@ -44,10 +46,15 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             bottle_forces(line, worker, dt, dt, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
-            _move(bottles, world.load, dt, first, end)
-            _turn(world.spin, dt, first, end)
+            begin_look(bottles, world.spin, world.riding, first, end)
+            for run in range(stepped_runs(world.riding, first)):
+                left, right = stepped_run(world.riding, first, end, run)
+                _move(bottles, world.load, dt, left, right)
+                _turn(world.spin, dt, left, right)
+                accumulate_peaks(world.load, world.peaks, dt, left, right)
+            ride(bottles, world.spin, world.riding, dt, first, end)
+            end_look(line, None, first, end)
             carry_anchors(world.footing, world.static_friction, dt, first, end)
-            accumulate_peaks(world.load, world.peaks, dt, first, end)
             note_moved(line, worker, first, end)
         hold = lists_hold(line, worker)
         pass_step(line.moving, line.ledger, worker, dt, False)

@@ -24,6 +24,7 @@ from conveyor_sim.engine.contact.path import note_path
 from conveyor_sim.engine.forces import bottle_forces, evaluate_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, probe_rebuilt, settle
 from conveyor_sim.engine.integrators.phase import START
+from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -58,6 +59,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             return 0
         probe_rebuilt(line, worker)
     else:
+        step_all(world.riding, world.bottles, worker)
         pack_all(line, worker)
     while True:
         done += 1
@@ -66,6 +68,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             bottle_forces(line, worker, dt, dt, first, end)
             _end_step(world, stage, dt, first, end)
+            end_look(line, stage, first, end)
             if done < steps and not damage:
                 _begin_step(world, line, stage, worker, dt, first, end)
         if done == steps:
@@ -91,10 +94,14 @@ def _begin_step(world: World, line: World, stage: Stage, worker: Worker, dt: flo
     """Move bottles first to end, and give them the velocities at which the forces at the end of the step are taken."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
     book_kick(bottles, spin, load, world.ledger, half, first, end)
-    _move(bottles, load, stage, dt, first, end)
-    _turn(spin, stage, dt, first, end)
+    begin_look(bottles, spin, world.riding, first, end)
+    for run in range(stepped_runs(world.riding, first)):
+        left, right = stepped_run(world.riding, first, end, run)
+        _move(bottles, load, stage, dt, left, right)
+        _turn(spin, stage, dt, left, right)
+        note_path(world.path, stage, dt, left, right)
+    ride(bottles, spin, world.riding, dt, first, end)
     carry_anchors(world.footing, world.static_friction, dt, first, end)
-    note_path(world.path, stage, dt, first, end)
     note_moved(line, worker, first, end)
 
 
@@ -102,10 +109,14 @@ def _begin_step(world: World, line: World, stage: Stage, worker: Worker, dt: flo
 def _end_step(world: World, stage: Stage, dt: float, first: int, end: int) -> None:
     """Give bottles first to end their velocities at the end of the step, from those at its middle."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
-    _recall(bottles, spin, stage, first, end)
+    for run in range(stepped_runs(world.riding, first)):
+        left, right = stepped_run(world.riding, first, end, run)
+        _recall(bottles, spin, stage, left, right)
     book_kick(bottles, spin, load, world.ledger, half, first, end)
-    kick(bottles, spin, load, half, first, end)
-    accumulate_peaks(load, world.peaks, dt, first, end)
+    for run in range(stepped_runs(world.riding, first)):
+        left, right = stepped_run(world.riding, first, end, run)
+        kick(bottles, spin, load, half, left, right)
+        accumulate_peaks(load, world.peaks, dt, left, right)
 
 
 @part

@@ -20,7 +20,7 @@ from conveyor_sim.engine.contact.slots import WIDTH
 from conveyor_sim.engine.observers.contact_list import pair_contact
 from conveyor_sim.engine.rails.moving import moves, surface_velocity
 from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
-from conveyor_sim.engine.support.base import add_base_friction
+from conveyor_sim.engine.support.base import add_base_friction, add_straddling_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
 from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, wait_for_all
@@ -280,8 +280,9 @@ def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> N
         tipping.fx[i] = tipping.fy[i] = tipping.moment[i] = 0.0
     load = Load(tipping.fx, tipping.fy, None, None)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
-    add_base_friction(world, _apart(world.spin, tipping.moment), load, None, None, dt, first, end)
-    lag = world.settings.lag * dt
+    spin, lag = _apart(world.spin, tipping.moment), world.settings.lag * dt
+    add_base_friction(world, spin, load, None, dt, first, end)
+    add_straddling_friction(world, spin, load, None, lag, first, end)
     add_static_friction(world.bottles, load, world.footing, world.static_friction, lag, False, first, end)
 
 

@@ -126,14 +126,21 @@ def add_rail_parts(
 
 
 @part
-def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
-    """Keep what the contacts exert on bottles first to end, and clear what belts do: before base friction is added."""
+def clear_belt_powers(ledger: Any, first: int, end: int) -> None:
+    """Clear what belts do to bottles first to end, which begin with a unit."""
     if ledger is None:
         return
     begin, stop = units(first, end)
     for unit in range(begin, stop):
         for h in range(ledger.belt_power.shape[1]):
             ledger.belt_power[unit, h] = 0.0
+
+
+@part
+def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
+    """Keep what the contacts exert on bottles first to end: before base friction is added."""
+    if ledger is None:
+        return
     for i in range(uint64(first), uint64(end)):
         ledger.base.x[i] = load.fx[i]
         ledger.base.y[i] = load.fy[i]
@@ -144,8 +151,8 @@ def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
 
 @part
 def find_base_parts(world: World, first: int, end: int) -> None:
-    """Find what base friction has added to the load of bottles first to end, and the power of each belt."""
-    load, spin, footing, ledger = world.load, world.spin, world.footing, world.ledger
+    """Find what base friction has added to the load of bottles first to end."""
+    load, spin, ledger = world.load, world.spin, world.ledger
     if ledger is None:
         return
     base = ledger.base
@@ -155,11 +162,19 @@ def find_base_parts(world: World, first: int, end: int) -> None:
     if spin is not None:
         for i in range(uint64(first), uint64(end)):
             base.turn[i] = spin.moment[i] - base.turn[i]
+
+
+@part
+def add_belt_powers(world: World, first: int, end: int) -> None:
+    """Add the power of each belt on bottles first to end; riders' bases drag as they did."""
+    footing, ledger = world.footing, world.ledger
+    if ledger is None:
+        return
     if footing is not None:
         for i in range(uint64(first), uint64(end)):
             # A ring that may straddle belts was booked point by point.
             if not _by_points(world.belts, world.ring, i):
-                power = _belt_power(world.bottles, footing, footing.turn, base, i)
+                power = _belt_power(world.bottles, footing, footing.turn, ledger.base, i)
                 ledger.belt_power[i // uint64(UNIT), footing.carrier[i]] += power
 
 

@@ -18,13 +18,10 @@ from conveyor_sim.engine.threads.workers import units
 
 
 @part
-def add_base_friction(
-    world: World, spin: Any, load: Load, implicit: Any, powers: Any, dt: float, first: int, end: int
-) -> None:
-    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end.
+def add_base_friction(world: World, spin: Any, load: Load, implicit: Any, dt: float, first: int, end: int) -> None:
+    """Add the friction of belts and floor to `load` and `spin.moment` of bottles first to end, but of straddling rings.
 
-    spin, load, implicit: those of the World, or others. powers: (units, H + 1), W, to which what straddling rings take
-    from each belt is added, or None.
+    spin, load, implicit: those of the World, or others.
     """
     if world.footing is None:
         return
@@ -32,7 +29,6 @@ def add_base_friction(
         _point_friction(world, load, implicit, dt, first, end)
     if world.ring is not None:
         _ring_friction(world, spin, load, implicit, dt, first, end)
-        _straddling(world, spin, load, powers, world.settings.lag * dt, first, end)
 
 
 @part
@@ -94,9 +90,16 @@ def _turn(turn: Any, i: int) -> float:
 
 
 @part
-def _straddling(world: World, spin: Any, load: Load, powers: Any, lag: float, first: int, end: int) -> None:
+def add_straddling_friction(world: World, spin: Any, load: Load, powers: Any, lag: float, first: int, end: int) -> None:
+    """Add to those of bottles first to end, which begin with a unit, the friction on rings that may straddle belts.
+
+    powers: (units, H + 1), W, to which what they take from each belt is added, or None. lag: s, as in
+    `relative_velocity`.
+    """
     bottles, belts = world.bottles, world.belts
     if belts is None:
+        return
+    if world.ring is None:
         return
     begin, stop = units(first, end)
     for entry in range(belts.uncertain.first[begin], belts.uncertain.first[stop]):

@@ -1,0 +1,197 @@
+"""Bottles that ride: alone on a straight belt, and as fast as a step leaves them, to the bit.
+
+Such a bottle needs no forces. They depend on its velocity alone, which the next step leaves as it is again, so that
+all steps do to it is x += dt v. It rides until lists are made anew: up to then nobody is within its reach (it has no
+pair and no rail in the lists, those that move included) and it stays on its belt (which is certain). Whatever else can
+change its motion comes in between ticks: speeds of belts, bottles that come or go, faults, edits. So each call of an
+integrator begins with all bottles stepped, and so does what follows a rebuild; the first step is looked at.
+
+Riding changes no bit. That makes it free to leave out: only LEAST bottles or more that ride in slots side by side are
+left out of the loops, for a loop over few costs more than they do. A block of bottles is then some runs that are
+stepped. What of a rider is not stepped (its force, its velocities within a step) stays as the last step left it, which
+is what each step would write.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import uint64
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.bodies import Bottles
+from conveyor_sim.engine.arrays.riding import Riding
+from conveyor_sim.engine.arrays.world import Worker, World
+from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.contact.pairs import pack
+from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, units, wait_for_all
+
+LEAST = 8
+"""Bottles side by side, as many as one instruction works on."""
+
+STEPPED, LOOKED_AT, PLANNED = 0, 1, 2
+"""Of a block: all its bottles are stepped; its velocities are kept; who rides is found out."""
+
+
+@part
+def step_all(riding: Any, bottles: Bottles, worker: Worker) -> None:
+    """Nobody of this worker's bottles rides."""
+    if riding is None:
+        return
+    begin, stop = share(worker, bottles.x.size)
+    for first in range(begin, stop, BLOCK):
+        unit = first // UNIT
+        riding.progress[unit] = STEPPED
+        riding.runs[unit] = 1
+        riding.first[first // LEAST] = first
+        riding.end[first // LEAST] = min(first + BLOCK, stop)
+
+
+@part
+def wake_all(riding: Any, bottles: Bottles, worker: Worker) -> None:
+    """After a rebuild: nobody rides, and those who did are packed where they are now; all are on return."""
+    if riding is None:
+        return
+    begin, stop = share(worker, bottles.x.size)
+    pack(bottles, begin, stop)
+    step_all(riding, bottles, worker)
+    wait_for_all(worker)
+
+
+@part
+def stepped_runs(riding: Any, first: int) -> int:
+    """How many runs of the block that begins with a slot are stepped."""
+    if riding is None:
+        return 1
+    return int(riding.runs[first // UNIT])
+
+
+@part
+def stepped_run(riding: Any, first: int, end: int, run: int) -> tuple[int, int]:
+    """The run-th of them: its first slot, and where it ends. end: of the block."""
+    if riding is None:
+        return first, end
+    return int(riding.first[first // LEAST + run]), int(riding.end[first // LEAST + run])
+
+
+def left_out(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
+    """Which of all slots the next step would leave out, free ones among them; as blocks are on one thread."""
+    rides = np.zeros(slots, np.bool_)
+    if riding is None:
+        return rides
+    for first in range(0, slots, BLOCK):
+        if riding.progress[first // UNIT] == PLANNED:
+            rides[first : first + BLOCK] = True
+            for run in range(first // LEAST, first // LEAST + int(riding.runs[first // UNIT])):
+                rides[riding.first[run] : riding.end[run]] = False
+    return rides
+
+
+@part
+def begin_look(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -> None:
+    """Before a block is kicked: keep its velocities if this is the step that is looked at."""
+    if riding is None:
+        return
+    if riding.progress[first // UNIT] != STEPPED:
+        return
+    riding.progress[first // UNIT] = LOOKED_AT
+    for i in range(uint64(first), uint64(end)):
+        riding.vx[i] = bottles.vx[i]
+        riding.vy[i] = bottles.vy[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            riding.omega[i] = spin.omega[i]
+
+
+@part
+def end_look(world: World, stage: Any, first: int, end: int) -> None:
+    """After a block was kicked: find out who rides from now on if this was the step that is looked at.
+
+    stage: velocities within the step that must not differ either, or None.
+    """
+    riding = world.riding
+    if riding is None:
+        return
+    if riding.progress[first // UNIT] != LOOKED_AT:
+        return
+    riding.progress[first // UNIT] = PLANNED
+    _find_steady(world, stage, riding, first, end)
+    _find_railed(world.railed, riding, first, end)
+    _plan(riding, first, end)
+
+
+@part
+def _find_steady(world: World, stage: Any, riding: Riding, first: int, end: int) -> None:
+    """Note who is as fast as before, has no pair, and is sure of its belt, which does not turn."""
+    bottles, spin, slots, belts, footing = world.bottles, world.spin, world.slots, world.belts, world.footing
+    for i in range(uint64(first), uint64(end)):
+        # What is not a number is not as it was either.
+        steady = riding.vx[i] == bottles.vx[i] and riding.vy[i] == bottles.vy[i]
+        if stage is not None:
+            steady = steady and riding.vx[i] == stage.vx[i] and riding.vy[i] == stage.vy[i]
+        if spin is not None:
+            steady = steady and riding.omega[i] == spin.omega[i]
+            if stage is not None:
+                steady = steady and riding.omega[i] == stage.omega[i]
+        if slots is not None:
+            steady = steady and slots.filled[i] == 0
+        if belts is not None:
+            steady = steady and belts.certain[i] >= 0
+        if footing is not None:
+            if footing.turn is not None:
+                steady = steady and footing.turn[i] == 0.0
+        riding.rides[i] = 1 if steady else 0
+
+
+@part
+def _find_railed(railed: Any, riding: Riding, first: int, end: int) -> None:
+    if railed is None:
+        return
+    begin, stop = units(first, end)
+    for place in range(railed.first[begin], railed.first[stop]):
+        riding.rides[railed.bottle[place]] = 0
+
+
+@part
+def _plan(riding: Riding, first: int, end: int) -> None:
+    """Cut a block into runs: LEAST riders or more side by side end one."""
+    place = first // LEAST
+    count, begin, i = 0, first, first
+    while i < end:
+        last = i
+        while last < end and riding.rides[last] != 0:
+            last += 1
+        if last - i >= LEAST:
+            if begin < i:
+                riding.first[place + count] = begin
+                riding.end[place + count] = i
+                count += 1
+            begin = last
+        i = last + 1
+    if begin < end:
+        riding.first[place + count] = begin
+        riding.end[place + count] = end
+        count += 1
+    riding.runs[first // UNIT] = count
+
+
+@part
+def ride(bottles: Bottles, spin: Any, riding: Any, dt: float, first: int, end: int) -> None:
+    """Take those of bottles first to end that ride along for dt seconds, by the additions that a step makes."""
+    if riding is None:
+        return
+    begin = first
+    for run in range(stepped_runs(riding, first)):
+        left, right = stepped_run(riding, first, end, run)
+        _go_on(bottles, spin, dt, begin, left)
+        begin = right
+    _go_on(bottles, spin, dt, begin, end)
+
+
+@part
+def _go_on(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
+    for i in range(uint64(first), uint64(end)):
+        bottles.x[i] = bottles.x[i] + dt * bottles.vx[i]
+        bottles.y[i] = bottles.y[i] + dt * bottles.vy[i]
+    if spin is not None:
+        for i in range(uint64(first), uint64(end)):
+            spin.theta[i] += dt * spin.omega[i]
