@@ -70,7 +70,7 @@ class Modes:
 
     def operations(self) -> dict[str, Operation]:
         """What changes hands, by name."""
-        row = Operation(lambda given: self._later()._problem(given), self._change)
+        row = Operation(lambda given: self.later()._problem(given), self._change)
         return dict.fromkeys(_HANDS, row)
 
     def divide(self, given: Input) -> tuple[Input | None, Input | None, str]:
@@ -84,7 +84,7 @@ class Modes:
         kind, quiet = given.writer_kind, self._all_automatic and not self._waiting()
         if kind == "test" or kind not in WRITER_KINDS or (quiet and kind == "controller" and self._is_free(given)):
             return None, given, ""
-        later = self._later()
+        later = self.later()
         devices = {name: self._device_of[name] for name in given.names if name in self._device_of}
         objections = {device: later._objection(given, device) for device in dict.fromkeys(devices.values())}
         foreign = [index for index, name in enumerate(given.names) if objections.get(devices.get(name, ""))]
@@ -106,6 +106,18 @@ class Modes:
             if not any(self._fits(pattern, device) for device in self.modes):
                 return f"{printable(pattern)}: fits no device that takes commands, expected such as {_some(self.modes)}"
         return ""
+
+    def later(self) -> Modes:
+        """As it will be once what waits has been applied."""
+        changes = [given for given in self._waiting() if given.operation in _HANDS]
+        if not changes:
+            return self
+        later = copy(self)
+        later.modes, later.taken_by = dict(self.modes), dict(self.taken_by)
+        for given in changes:
+            if not unauthorized(given, _HANDS) and not later._problem(given):
+                later._apply(given)
+        return later
 
     def report(self, given: Input) -> bool:
         """Whether a refusal for want of control says something new: to this kind of writer, of one of its devices."""
@@ -196,18 +208,6 @@ class Modes:
             self.reported = []
         self._look()
         return changed
-
-    def _later(self) -> Modes:
-        """As it will be once what waits has been applied."""
-        changes = [given for given in self._waiting() if given.operation in _HANDS]
-        if not changes:
-            return self
-        later = copy(self)
-        later.modes, later.taken_by = dict(self.modes), dict(self.taken_by)
-        for given in changes:
-            if not unauthorized(given, _HANDS) and not later._problem(given):
-                later._apply(given)
-        return later
 
     def _fits(self, pattern: str, device: str) -> bool:
         return fnmatchcase(device, pattern) or fnmatchcase(f"{self._where}/{device}", pattern)

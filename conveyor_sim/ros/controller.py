@@ -81,15 +81,26 @@ class Scanner:
 class ControllerRun:
     """A node's part in a simulation: it finds the line, and has a controller scan until the end."""
 
-    def __init__(self, node: Node, make: Make, *, scan_ticks: int, run_id: str, stop: StopRequest) -> None:
+    def __init__(
+        self,
+        node: Node,
+        make: Make,
+        *,
+        scan_ticks: int,
+        run_id: str,
+        released: Sequence[str] = (),
+        stop: StopRequest,
+    ) -> None:
         """make: called at the start, and again after every reset of the simulation.
 
-        scan_ticks: ticks from one scan to the next. run_id: under which the simulation is owned in lockstep.
+        scan_ticks: ticks from one scan to the next. run_id: under which the simulation is owned in lockstep, but
+        for the devices that are released, by patterns.
         """
         self._node = node
         self._make = make
         self._scan_ticks = scan_ticks
         self._run_id = run_id
+        self._released = list(released)
         self._stop = stop
         self._error: Exception | None = None
         self._line: Any = None
@@ -184,6 +195,7 @@ class ControllerRun:
             values=list(commands.values()),
             release=release,
             sim_run_id=line.run_id,
+            released=self._released,
             **(declared or {}),
         )
         numbers = set()

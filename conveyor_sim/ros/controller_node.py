@@ -34,6 +34,7 @@ PARAMETERS = (
     Entry("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
     Entry("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
     Entry("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
+    Entry("released", "", "Devices that others may command beside it in lockstep: patterns, by commas."),
 )
 
 
@@ -52,7 +53,10 @@ def run(stop: StopRequest) -> None:
             raise ConveyorError(str(error)) from error
 
     make(None)  # what can't be made is reported before there is a simulation
-    controller = ControllerRun(node, make, scan_ticks=given["scan_ticks"], run_id=given["run_id"], stop=stop)
+    released = [pattern.strip() for pattern in given["released"].split(",") if pattern.strip()]
+    controller = ControllerRun(
+        node, make, scan_ticks=given["scan_ticks"], run_id=given["run_id"], released=released, stop=stop
+    )
     with closing(controller), suppress(Stopped):
         if given["mode"] == "free":
             controller.run_free()

@@ -60,6 +60,7 @@ class LockstepRequest:
     sim_run_id: str = ""
     alarm_ids: tuple[str, ...] = ()
     alarms: tuple[str, ...] = ()
+    released: tuple[str, ...] = ()
 
     def same_as(self, other: LockstepRequest | None) -> bool:
         """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
@@ -82,6 +83,7 @@ class LockstepRequest:
             self.sim_run_id,
             self.alarm_ids,
             self.alarms,
+            self.released,
         )
 
 

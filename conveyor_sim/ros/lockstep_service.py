@@ -80,6 +80,7 @@ class LockstepService:
             request.sim_run_id,
             tuple(request.alarm_ids),
             tuple(request.alarms),
+            tuple(request.released),
         )
         with self._lock:
             full = self._waiting >= MOST_WAITING

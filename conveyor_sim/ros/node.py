@@ -26,6 +26,7 @@ from conveyor_sim.ros.fault_service import FaultService
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
+from conveyor_sim.ros.operate_service import OperateService
 from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import Services
@@ -139,6 +140,7 @@ class SimNode:
             self._services.serve(stepper)
             CheckpointServices(node, executor, stepper, given.checkpoint_folder, read_checkpoint)
             FaultService(node, executor, stepper)
+            OperateService(node, executor, stepper)
             lockstep = LockstepService(node, stepper, given.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
             Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))

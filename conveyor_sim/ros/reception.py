@@ -42,7 +42,9 @@ class Reception:
         self._handed_bytes += size
 
     def refuse(self, session: Session, given: Input, reason: str) -> None:
-        """Refuse an input for which there is no tick."""
+        """Refuse an input for which there is no tick; of a line that is run no more, nobody is the owner."""
+        if given.operation in (OWN, DISOWN):
+            return
         self.refused += given.operation == SET
         self._log(f"{given.source} refused since {reason}")
         session.refuse(given, reason)
@@ -87,7 +89,8 @@ class Reception:
     # For the answers of lockstep
 
     def keep(self, outcomes: Sequence[CommandOutcome]) -> None:
-        """Keep outcomes for the next answer, as many as it may hold."""
+        """Keep outcomes for the next answer, as many as it may hold; who owns the line, its asker knows."""
+        outcomes = [outcome for outcome in outcomes if outcome.operation not in (OWN, DISOWN)]
         room = KEPT - len(self._kept)
         self._kept += outcomes[:room]
         self._dropped += max(0, len(outcomes) - room)

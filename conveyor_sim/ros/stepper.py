@@ -16,6 +16,7 @@ from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import SET, CommandOutcome, Input
+from conveyor_sim.ros import ownership
 from conveyor_sim.ros.advance import Advance, refuse
 from conveyor_sim.ros.calls import Calls
 from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
@@ -175,6 +176,7 @@ class Stepper:
         self._runs += 1
         reason = "a checkpoint was loaded"
         broken_off = self._leave(reason)
+        ownership.give_up(simulation)
         self._enter(session)
         self.state = State.PAUSED
         refuse(broken_off, reason)
@@ -211,7 +213,9 @@ class Stepper:
         sizes = [size_of(given) for given in request.inputs]
         if sum(sizes) > MESSAGE_BYTES:
             raise Refused(f"its commands are {TOO_LARGE}")
+        ownership.require_fitting(simulation, request)
         answer = self.lockstep.accept(request, self.session.run_id, simulation.tick, self.session.last_tick)
+        ownership.claim(simulation, request)
         for given, size in zip(request.inputs, sizes, strict=True):
             if given.operation == SET:
                 self.inbox.receive()
@@ -222,6 +226,8 @@ class Stepper:
         def done() -> None:
             outcomes = self.reception.take_kept(simulation.tick)
             answer.set_result(LockstepAnswer.of(simulation, self.run_id, outcomes))
+            if request.release and not self.standstill:  # as the next tick begins, if there is to be one
+                ownership.give_up(simulation)
 
         self._advance = Advance(request.target_tick, paced=True, done=done, failed=answer.set_exception)
         return answer
