@@ -57,6 +57,10 @@ class Person:
         """Take alarms off the shelf; without: all."""
         self.operate("unshelve", alarms)
 
+    def reset_counters(self, *devices: str) -> None:
+        """Have the counters and times of devices begin anew; without: of all."""
+        self.operate("reset_counters", devices)
+
     def operate(
         self, operation: str, names: Sequence[str] = (), values: Sequence[float] = (), texts: Sequence[str] = ()
     ) -> None:

@@ -46,6 +46,29 @@ def test_what_was_done_is_marked_and_a_failure_says_what_is_forced(table: Scenar
         table.never(lambda s: s[EYE])
 
 
+def test_what_a_person_does_to_alarms_and_counters(table: Scenario) -> None:
+    table.attach(Constant({"alarms/full": 1.0}))
+    table.run_for(0.05)
+    full = table.simulation.line.alarms["full"]
+    table.operator.acknowledge("full")
+    table.run_for(0.01)
+    assert (full.state.name, full.changed_by) == ("ACKNOWLEDGED", "operator")
+    table.operator.shelve("full", 1.0)
+    table.run_for(0.01)
+    assert full.state.name == "SHELVED"
+    table.engineer.unshelve()
+    table.run_for(0.01)
+    assert (full.state.name, full.changed_by) == ("UNACKNOWLEDGED", "engineer")  # it comes anew
+    with pytest.raises(CommandError, match="remove_from_service: given by operator, expected one of the kind engineer"):
+        table.operator.operate("remove_from_service", ["full"])
+    with pytest.raises(CommandError, match="full: is unacknowledged, expected one that has latched"):
+        table.operator.reset("full")
+    table.operator.reset_counters()
+    table.run_for(0.01)
+    with pytest.raises(CommandError, match="no such alarm"):
+        table.operator.acknowledge("ful")
+
+
 def test_a_checkpoint_of_an_owned_line_has_no_owner_any_more(table: Scenario, tmp_path: Path) -> None:
     """Its controller is not in the checkpoint; the test attaches its own."""
     table.simulation.give(Input("lockstep", "plc", "controller", OWN, (), ()))
