@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 HEADER = b"\x00\x01\x00\x00"
 """Encapsulation: CDR, little endian, no options."""
+_STAMP = struct.Struct("<iI")
 _TEXT = 12
 """Byte at which a header's frame_id begins, with its length: behind the encapsulation and the stamp."""
 
@@ -17,8 +18,15 @@ _TEXT = 12
 class CdrWriter:
     """Appends CDR values with the alignment they need, counted from behind the encapsulation header."""
 
-    def __init__(self) -> None:
-        self._buffer = bytearray(HEADER)
+    def __init__(self, phase: int = 0) -> None:
+        """phase: where in 8 bytes a part begins that is written by itself."""
+        self._begin = len(HEADER) + phase
+        self._buffer = bytearray(HEADER) + bytes(phase)
+
+    @property
+    def phase(self) -> int:
+        """Where in 8 bytes the next value would begin: what alignments depend on."""
+        return (len(self._buffer) - len(HEADER)) % 8
 
     def _align(self, size: int) -> None:
         self._buffer += bytes((len(HEADER) - len(self._buffer)) % size)
@@ -36,9 +44,8 @@ class CdrWriter:
 
     def stamp(self, stamp_ns: int) -> None:
         """builtin_interfaces/Time of a time in ns."""
-        seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-        self.pack("i", seconds)
-        self.pack("I", nanoseconds)
+        self._align(4)
+        self._buffer += _STAMP.pack(*divmod(stamp_ns, 1_000_000_000))
 
     def header(self, stamp_ns: int, frame_id: str) -> None:
         """std_msgs/Header."""
@@ -51,6 +58,14 @@ class CdrWriter:
         if len(rows):
             self._align(8)
             self._buffer += np.ascontiguousarray(rows, dtype="<f8").data
+
+    def raw(self, part: bytes) -> None:
+        """A part that was written by itself, from this phase on."""
+        self._buffer += part
+
+    def part(self) -> bytes:
+        """What has been written, without what it stands behind."""
+        return bytes(self._buffer[self._begin :])
 
     def finish(self) -> bytes:
         """The whole message."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,26 +80,54 @@ def marker_array(markers: Sequence[Marker], header: Header) -> bytes:
 
 
 def _write(writer: CdrWriter, marker: Marker, header: Header) -> None:
-    writer.header(header.stamp_ns, header.frame_id)
-    writer.string(marker.ns)
-    writer.pack("i", marker.id, marker.type, marker.action)
-    writer.pack("d", *marker.position, 0.0, 0.0, 0.0, 1.0)
-    writer.pack("d", *marker.scale)
-    writer.pack("f", *marker.colour)
+    writer.stamp(header.stamp_ns)
+    look = marker.ns, marker.id, marker.type, marker.action, marker.position, marker.scale, marker.colour
+    writer.raw(_before_points(writer.phase, header.frame_id, *look))
+    writer.double_rows(marker.points)
+    writer.raw(_behind_points(writer.phase, marker.text))
+
+
+@lru_cache(maxsize=1024)
+def _before_points(
+    phase: int,
+    frame_id: str,
+    ns: str,
+    number: int,
+    kind: int,
+    action: int,
+    position: tuple[float, float, float],
+    scale: tuple[float, float, float],
+    colour: Colour,
+) -> bytes:
+    """A Marker's fields from behind the stamp to the points, where a message has come to a phase of its alignment."""
+    writer = CdrWriter(phase)
+    writer.string(frame_id)
+    writer.string(ns)
+    writer.pack("i", number, kind, action)
+    writer.pack("d", *position, 0.0, 0.0, 0.0, 1.0)
+    writer.pack("d", *scale)
+    writer.pack("f", *colour)
     writer.pack("i", 0, 0)  # lifetime: for ever
     writer.pack("?", False)  # frame_locked
-    writer.double_rows(marker.points)
+    return writer.part()
+
+
+@lru_cache(maxsize=1024)
+def _behind_points(phase: int, text: str) -> bytes:
+    """Those behind the points."""
+    writer = CdrWriter(phase)
     writer.pack("I", 0)  # colors: one colour for all points
     writer.string("")  # texture_resource
     writer.header(0, "")  # texture, a CompressedImage: header, format, data
     writer.string("")
     writer.pack("I", 0)
     writer.pack("I", 0)  # uv_coordinates
-    writer.string(marker.text)
+    writer.string(text)
     writer.string("")  # mesh_resource
     writer.string("")  # mesh_file: filename, data
     writer.pack("I", 0)
     writer.pack("?", False)  # mesh_use_embedded_materials
+    return writer.part()
 
 
 def bottles_markers(
@@ -107,10 +136,11 @@ def bottles_markers(
     """What moves: one SPHERE_LIST a bottle type that has bottles, resting on the belts (z = 0); and rails that move."""
     markers = []
     for index, radius in enumerate(radii):
-        chosen = columns.type == index
-        if not chosen.any():
+        chosen = np.flatnonzero(columns.type == index)
+        if not chosen.size:
             continue
-        points = xyz_rows(np.column_stack((columns.x[chosen], columns.y[chosen])), z=float(radius))
+        points = np.empty((chosen.size, 3))
+        points[:, 0], points[:, 1], points[:, 2] = columns.x[chosen], columns.y[chosen], radius
         colour = BOTTLE_COLOURS[index % len(BOTTLE_COLOURS)]
         size = 2.0 * float(radius)
         markers.append(Marker("bottles", index, SPHERE_LIST, (size, size, size), colour, points))

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import IO, Any
 
-from mcap.writer import CompressionType, Writer
-
+from conveyor_sim.bag.mcap_writer import McapWriter
 from conveyor_sim.bag.metadata import (
     RECORD_KEY,
     RECORD_NAME,
@@ -47,17 +46,21 @@ class McapFile:
 
     def __init__(self, stream: IO[bytes], name: str, distro: str) -> None:
         self._distro = distro
-        # Of what lies between and around the chunks, only the checksum over all data shows damage.
-        self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        self._writer = McapWriter(stream, PROFILE, f"{LIBRARY} {__version__}")
         self._schemas: dict[Schema, int] = {}
         self._topics: dict[int, TopicInfo] = {}
-        self.info = FileInfo(name, 0, 0, 0)
-        self._writer.start(profile=PROFILE, library=f"{LIBRARY} {__version__}")
+        self._name = name
+
+    @property
+    def info(self) -> FileInfo:
+        """The file so far."""
+        return FileInfo(self._name, *self._writer.times, self._writer.counts.total())
 
     @property
     def topics(self) -> list[TopicInfo]:
         """The topics with their counts so far."""
-        return list(self._topics.values())
+        counts = self._writer.counts
+        return [replace(topic, message_count=counts[channel]) for channel, topic in self._topics.items()]
 
     def add_topic(self, name: str, schema: Schema, encoding: str, metadata: dict[str, str]) -> int:
         """Registers a channel for messages of the schema's type; returns its number."""
@@ -70,10 +73,6 @@ class McapFile:
     def add_message(self, channel: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
         """Appends a message; times in ns."""
         self._writer.add_message(channel, log_time, data, publish_time, sequence)
-        info, topic = self.info, self._topics[channel]
-        start = min(info.start_ns, log_time) if info.message_count else log_time
-        self.info = FileInfo(info.path, start, max(info.end_ns, log_time), info.message_count + 1)
-        self._topics[channel] = replace(topic, message_count=topic.message_count + 1)
 
     def add_metadata(self, name: str, content: dict[str, str]) -> None:
         """Appends a metadata record."""
@@ -81,16 +80,16 @@ class McapFile:
 
     def add_attachment(self, name: str, media_type: str, data: bytes, log_time: int, create_time: int) -> None:
         """Appends a file; times in ns."""
-        self._writer.add_attachment(create_time, log_time, name, media_type, data)
+        self._writer.add_attachment(name, media_type, data, log_time, create_time)
 
     def flush(self) -> None:
         """Ends the present chunk and hands everything to the operating system."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._writer.flush()
 
     def finish(self) -> dict[str, Any]:
         """Writes the metadata record, index and end; returns what belongs into metadata.yaml."""
         self.flush()
         information = bag_information(self.topics, [self.info], self._distro)
         self.add_metadata(RECORD_NAME, {RECORD_KEY: to_yaml(information)})
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         return information

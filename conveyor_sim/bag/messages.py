@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.packing import packer
 from conveyor_sim.line.inputs import CommandOutcome, Input, recorded_input
 from conveyor_sim.line.run_state import RunState
 from conveyor_sim.observe.columns import BottleColumns
@@ -41,38 +41,13 @@ class Header:
     frame_id: str
 
 
-@lru_cache(maxsize=16)
-def _sequence_types(type_name: str) -> dict[str, np.dtype[Any]]:
-    """The element type of every numeric sequence of a message, by field."""
-    store = typestore()
-    kinds = {}
-    for name, (_, details) in store.fielddefs[type_name][1]:
-        if isinstance(details, tuple) and isinstance(details[0], tuple) and details[0][1][0] != "string":
-            kinds[name] = np.dtype(details[0][1][0])
-    return kinds
-
-
-def _ros_header(header: Header) -> Any:
-    types = typestore().types
-    seconds, nanoseconds = divmod(header.stamp_ns, 1_000_000_000)
-    stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-    return types["std_msgs/msg/Header"](stamp=stamp, frame_id=header.frame_id)
-
-
-def _serialize(type_name: str, header: Header, values: dict[str, Any]) -> bytes:
-    # rosbags copies an array's bytes whatever its type, so each is brought to the field's type first.
-    for name, kind in _sequence_types(type_name).items():
-        values[name] = np.ascontiguousarray(values[name], dtype=kind)
-    store = typestore()
-    message = store.types[type_name](header=_ros_header(header), tick=header.tick, **values)
-    return bytes(store.serialize_cdr(message, type_name, little_endian=True))
+def _pack(type_name: str, header: Header, values: dict[str, Any]) -> bytes:
+    return packer(type_name).pack(header.frame_id, header.stamp_ns, header.tick, values.__getitem__)
 
 
 def columns_message(type_name: str, columns: Any, header: Header) -> bytes:
     """A message of the fields of a dataclass; of something with a tick of its own, the header belongs to that."""
-    values = {field.name: getattr(columns, field.name) for field in fields(columns) if field.name != "tick"}
-    texts = {name: list(value) for name, value in values.items() if isinstance(value, tuple)}
-    return _serialize(type_name, header, {**values, **texts})
+    return packer(type_name).pack(header.frame_id, header.stamp_ns, header.tick, partial(getattr, columns))
 
 
 def to_image(message: Any) -> Image:
@@ -110,9 +85,8 @@ class Outcome:
 
 def outcome_message(outcome: CommandOutcome, header: Header) -> bytes:
     """conveyor_msgs/CommandOutcome."""
-    fields = {**outcome.input._asdict(), "accepted": outcome.accepted, "reason": outcome.reason}
-    texts = {name: list(fields[name]) for name in ("names", "texts")}
-    return _serialize(OUTCOME, header, {**fields, **texts})
+    values = {**outcome.input._asdict(), "accepted": outcome.accepted, "reason": outcome.reason}
+    return _pack(OUTCOME, header, values)
 
 
 def to_outcome(message: Any) -> Outcome:
@@ -129,7 +103,7 @@ def to_outcome(message: Any) -> Outcome:
 
 def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:
     """conveyor_msgs/Commands."""
-    return _serialize(COMMANDS, header, {"names": list(names), "values": values})
+    return _pack(COMMANDS, header, {"names": names, "values": values})
 
 
 def speed_message(speed: float) -> bytes:
@@ -141,7 +115,7 @@ def speed_message(speed: float) -> bytes:
 
 def run_state_message(run: RunState, header: Header) -> bytes:
     """conveyor_msgs/RunState."""
-    return _serialize(RUN_STATE, header, {"state": run.state, "text": run.text, "reason": run.reason})
+    return _pack(RUN_STATE, header, {"state": run.state, "text": run.text, "reason": run.reason})
 
 
 def poses_message(columns: BottleColumns, header: Header) -> bytes:
@@ -211,4 +185,4 @@ def line_message(sim: Simulation, run_id: str, header: Header) -> bytes:
         "tag_devices": [tag.device for tag in image.tags],
         "tag_classes": [tag.device_class for tag in image.tags],
     }
-    return _serialize(LINE, header, values)
+    return _pack(LINE, header, values)
