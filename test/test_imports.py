@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
@@ -119,6 +120,15 @@ def test_no_files_import_each_other_in_a_circle() -> None:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(f"these import each other: {' -> '.join(error.args[1])}")
+
+
+@pytest.mark.parametrize("module", ["bag.recorder", "bag.reader", "plot.aside", "ros.controller_node"])
+def test_what_reads_draws_or_controls_does_without_the_compiler(module: str) -> None:
+    """Numba takes half a second to import, in processes that never step anything."""
+    name = f"conveyor_sim.{module}"
+    pytest.importorskip({"plot": "matplotlib", "ros": "rclpy"}.get(module.partition(".")[0], "numpy"))
+    code = f"import sys, {name}; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=module_of)

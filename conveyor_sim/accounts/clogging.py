@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.observe.damage import DamageEvent
+from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.state import State
-from conveyor_sim.state.snapshot import Unchecked
 
 SLOW = 0.1
 """Of the speed of the belt under it: what is slower is held up."""

@@ -9,9 +9,9 @@ from conveyor_sim.engine.arrays.damage import Damage, Worst, worst_columns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
 from conveyor_sim.scene.limits import Limits
+from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.state import State
 from conveyor_sim.state.empty_damage import rail_places
-from conveyor_sim.state.snapshot import Unchecked
 
 WORDS = {
     "scuffing_work": ("has taken {:.3g} J of sliding work at its wall by the time it is", "J"),

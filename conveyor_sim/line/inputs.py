@@ -5,12 +5,10 @@ one tick are taken in the order in which they were given, and within one the nam
 line stands after those before it. Watchdogs act after all inputs, devices after the watchdogs.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
-from conveyor_sim.line.device import ScanContext
-from conveyor_sim.state.snapshot import Unchecked
+from conveyor_sim.scene.types import Unchecked
 
 WriterKind = Literal["controller", "operator", "engineer", "test", "line"]
 """Who acts; "line": the line itself, which replay and rerun bring about again without being given it."""
@@ -76,15 +74,6 @@ class Input(NamedTuple):
     def by_line(self) -> bool:
         """Whether the line itself brought it about."""
         return self.writer_kind == "line"
-
-
-class Operation(NamedTuple):
-    """What can be done to a line."""
-
-    refusal: Callable[[Input], str]
-    """Why it can't be applied as the line stands, "" if it can."""
-    apply: Callable[[Input, ScanContext], None]
-    """Called only if there is no reason against it."""
 
 
 @dataclass(frozen=True)

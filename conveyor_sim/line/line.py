@@ -20,8 +20,9 @@ from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.forcing import Forcing
-from conveyor_sim.line.inputs import DECLARE, FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, Operation
+from conveyor_sim.line.inputs import DECLARE, FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input
 from conveyor_sim.line.modes import Modes
+from conveyor_sim.line.operation import Operation
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.read_back import ReadBack
 from conveyor_sim.line.run_state import RUN_TAGS

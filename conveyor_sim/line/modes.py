@@ -10,7 +10,8 @@ from fnmatch import fnmatchcase
 from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, OPERATORS_MODES, unauthorized, who
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input, Operation
+from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input
+from conveyor_sim.line.operation import Operation
 from conveyor_sim.line.tag import Tag, choice
 from conveyor_sim.support.printable import SENTENCE, printable
 

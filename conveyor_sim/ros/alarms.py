@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.ros.lockstep_service import to_time
+from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.publishers import ros_qos
 
 

@@ -16,8 +16,8 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.errors import CheckpointError, ConveyorError
+from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.lockstep import Refused
-from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.simulation import Simulation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
@@ -10,6 +11,12 @@ from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import ros_qos
 
 NS = 1_000_000_000
+
+
+def to_time(stamp_ns: int) -> Time:
+    """Nanoseconds as ROS writes them."""
+    sec, nanosec = divmod(stamp_ns, NS)
+    return Time(sec=sec, nanosec=nanosec)
 
 
 class ClockPublisher:

@@ -10,8 +10,8 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.graph_watch import GraphWatch
-from conveyor_sim.ros.lockstep_service import to_time
 from conveyor_sim.ros.publishers import RosSink, ros_qos
 from conveyor_sim.ros.run_state import State
 from conveyor_sim.ros.stepper import Stepper

@@ -10,7 +10,6 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from builtin_interfaces.msg import Time
 from conveyor_msgs.msg import CommandOutcome as OutcomeMessage
 from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
@@ -19,6 +18,7 @@ from rclpy.service import Service
 from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.direct import Aside, take_request
 from conveyor_sim.ros.lockstep import LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.publishers import ros_qos
@@ -26,7 +26,6 @@ from conveyor_sim.simulation import Simulation
 
 T = TypeVar("T")
 
-NS = 1_000_000_000
 MOST_WAITING = 100
 """Requests that wait for an answer at once; one controller has one, sent again a few times."""
 
@@ -157,12 +156,6 @@ class LockstepService:
 def _never(_: Any, response: Any) -> Any:
     """No executor takes requests of a service that is aside."""
     return response
-
-
-def to_time(stamp_ns: int) -> Time:
-    """Nanoseconds as ROS writes them."""
-    sec, nanosec = divmod(stamp_ns, NS)
-    return Time(sec=sec, nanosec=nanosec)
 
 
 def _outcome(outcome: CommandOutcome, tick_ns: int, frame_id: str) -> OutcomeMessage:

@@ -105,6 +105,9 @@ Text = Annotated[str, Says("a text")]
 
 _angle_words = 'an angle, a number or a text like "90 deg"'
 _span_words = 'an angle greater than 0 and at most a full turn, a number or a text like "90 deg"'
+Unchecked = Annotated[float, AllowInfNan(True)]
+"""That need not be finite: of what a snapshot keeps, not of a scene."""
+
 Angle = Annotated[float, Strict(), AllowInfNan(False), BeforeValidator(parse_angle), Says(_angle_words), _small]
 Span = Annotated[
     float,

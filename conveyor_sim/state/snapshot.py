@@ -3,15 +3,12 @@
 import json
 import math
 from functools import lru_cache
-from typing import Annotated, Any, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
-from pydantic import AllowInfNan, ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from conveyor_sim.scene.part import Part
-
-Unchecked = Annotated[float, AllowInfNan(True)]
-"""A number that need not be finite, in annotations."""
 
 LARGEST = 2**53
 """Of whole numbers: ticks, counts and ids are far below."""

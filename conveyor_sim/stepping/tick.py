@@ -11,8 +11,9 @@ from conveyor_sim.engine.threads.thread_choice import ThreadChoice
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.model.moving_rails import fastest_rail
+from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.state import State
-from conveyor_sim.state.snapshot import Unchecked, entries, typed
+from conveyor_sim.state.snapshot import entries, typed
 from conveyor_sim.stepping.guard import Guard, GuardEvent, Violation, chatter
 from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 

@@ -12,7 +12,8 @@ from conveyor_sim.line.alarms.measured import Measured
 from conveyor_sim.line.alarms.own import LimitConditions, limit_alarms, scene_alarms
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.alarms import AlarmsDevice
-from conveyor_sim.line.inputs import DECLARE, Input, Operation
+from conveyor_sim.line.inputs import DECLARE, Input
+from conveyor_sim.line.operation import Operation
 from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.scene.places import Places
