@@ -2,6 +2,8 @@
 
 import io
 from collections.abc import Mapping
+from contextlib import suppress
+from functools import lru_cache
 from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any
@@ -17,6 +19,8 @@ from conveyor_sim.scene.tables import Beside, with_tables
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, in_mb, read_file
 
+_KEPT_TEXT = 200_000
+"""Letters of a text that is kept once it was read: a run asks for its scene some ten times, in 20 ms each."""
 _MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
 
 
@@ -49,7 +53,7 @@ def parse_scene(
 
     See `load_scene`.
     """
-    document = Document(text, name)
+    document = _document(text, name)
     changes = plain(overrides or {}, name)
     merged = _merge(document.data, changes) if changes else document.data
     data, unread = with_tables(merged, beside)
@@ -70,6 +74,19 @@ def parse_scene(
         raise SceneError(f"{name}: tables and overrides of {in_mb(len(kept_text))} as YAML, expected at most {most}")
     scene._source = Origin(text, name, _yaml_text(changes), kept_text)
     return scene
+
+
+def _document(text: str, name: str) -> Document:
+    """Read YAML, or what was read of the same text before: not to be changed. Raises SceneError."""
+    if len(text) <= _KEPT_TEXT:
+        with suppress(SceneError):  # which is to have the name
+            return _read(text)
+    return Document(text, name)
+
+
+@lru_cache(maxsize=4)
+def _read(text: str) -> Document:
+    return Document(text, "")
 
 
 def parse_overrides(text: str) -> dict[str, Any]:
