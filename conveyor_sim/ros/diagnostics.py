@@ -12,14 +12,13 @@ from rclpy.node import Node
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.graph_watch import GraphWatch
+from conveyor_sim.ros.observer import TICK, WALL
 from conveyor_sim.ros.publishers import RosSink, ros_qos
 from conveyor_sim.ros.run_state import State
 from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.support.printable import printable
 
 PERIOD = 1.0  # s of wall time
-TICK = "tick"
-WALL = "wall time from first to last tick (s)"
 
 
 class Diagnostics:
@@ -41,9 +40,10 @@ class Diagnostics:
         self._last_lost = 0
         self._last_guard_events = 0
         # A steady clock: with use_sim_time the node's own would stand still while paused.
-        node.create_timer(PERIOD, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(PERIOD, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _publish(self) -> None:
+    def publish(self) -> None:
+        """How it fares now; in the thread of the executor."""
         stepper = self._stepper
         session, pacer = stepper.session, stepper.pacer
         simulation = session.simulation

@@ -18,15 +18,13 @@ with while_importing():
 
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.errors import ConveyorError, Interrupted
-    from conveyor_sim.model import build_model
     from conveyor_sim.ros.child import Child
     from conveyor_sim.ros.domain import private_domain
     from conveyor_sim.ros.observer import Observer
     from conveyor_sim.ros.stop_request import StopRequest
-    from conveyor_sim.runs.compilation import compiling, seconds_to_compile
     from conveyor_sim.runs.drawing import Drawing
-    from conveyor_sim.runs.report import report
-    from conveyor_sim.scene import load_scene
+    from conveyor_sim.scene import Scene, load_scene
+    from conveyor_sim.support.garbage import collected_later
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.progress import ProgressBar, told_if_long
     from conveyor_sim.support.resources import scene_path
@@ -82,7 +80,7 @@ def run_in_lockstep(
         def going_on() -> bool:
             return node.exit_code is None and controller.exit_code is None and not stop.requested
 
-        with told_if_long(compiling(seconds_to_compile(build_model(scene)))):
+        with told_if_long(_compiling(scene)):
             while not observer.started and going_on():
                 observer.wait(LOOK)
         started()
@@ -105,6 +103,17 @@ def run_in_lockstep(
         return observer.wall
 
 
+def _compiling(scene: Scene) -> str:
+    """What is said if the run does not begin soon."""
+    # Imported not before: the processes that have been started need as much, and all three would wait for one.
+    with collected_later():
+        import conveyor_sim.runs.report  # noqa: F401  # for the end
+        from conveyor_sim.model import build_model
+        from conveyor_sim.runs.compilation import compiling, seconds_to_compile
+
+    return compiling(seconds_to_compile(build_model(scene)))
+
+
 def _keep_logs(logs: Path, bag: Path) -> None:
     """Beside the recording, if there is one."""
     if bag.is_dir():
@@ -123,8 +132,11 @@ def main(scene: str, out: Path | None, duration: float | None, outside_tables: b
     """Run SCENE as a ROS 2 node with a controller as a second one, in lockstep; record, sum up and draw it."""
     try:
         with run_folder(out) as bag, Drawing() as drawing:
-            # Not before: the processes that start keep all cores busy.
-            report(bag, run_in_lockstep(scene, bag, duration, outside_tables, drawing.get_ready), drawing)
+            # Ready not before the start: the processes that start keep all cores busy.
+            wall = run_in_lockstep(scene, bag, duration, outside_tables, drawing.get_ready)
+            from conveyor_sim.runs.report import report
+
+            report(bag, wall, drawing)
     except ConveyorError as error:
         print(f"main job: {printable_lines(error)}", file=sys.stderr)
         sys.exit(STATUS if isinstance(error, Interrupted) else 1)

@@ -132,6 +132,7 @@ class SimNode:
             playing=not given.start_paused,
             lockstep_max_ticks=given.lockstep_max_ticks,
             beat=clock.beat if clock else lambda stamp_ns, now: None,
+            ended=lambda: executor.create_task(diagnostics.publish),  # nobody has to wait for the next second
             died=self._die,
             log=node.get_logger(),
         )
@@ -143,7 +144,7 @@ class SimNode:
             OperateService(node, executor, stepper)
             lockstep = LockstepService(node, stepper, given.frame_id, died=self._die)
             self._intake = Intake(node.context, lockstep, commands, died=self._die)
-            Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
+            diagnostics = Diagnostics(node, stepper, sink, GraphWatch(node, clock.topic if clock else None))
 
         def on_set(changed: list[Parameter]) -> None:
             for parameter in changed:

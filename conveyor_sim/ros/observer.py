@@ -12,9 +12,10 @@ from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.ros.context import new_node, start_ros
-from conveyor_sim.ros.diagnostics import TICK, WALL
 from conveyor_sim.ros.publishers import ros_qos
 
+TICK, WALL = "tick", "wall time from first to last tick (s)"
+"""Keys in /diagnostics."""
 START = 1e-6  # s, between the stamps of tick 0 and of any other
 
 

@@ -47,17 +47,19 @@ class Stepper:
         playing: bool,
         lockstep_max_ticks: int,
         beat: Callable[[int, float], None],
+        ended: Callable[[], object] = lambda: None,
         died: Callable[[Exception], None],
         log: Log,
     ) -> None:
         """`open_session`: opens the run with the given number of runs before it; with a Simulation, if one is given.
         `beat`: called after each tick and while idle, with the simulated time in ns and the wall time in s.
-        `died`: called if the thread can't go on.
+        `ended`: called at the end of each run, when its recording is complete. `died`: if the thread can't go on.
 
         Raises what `open_session` raises.
         """
         self._open_session = open_session
         self._beat = beat
+        self._tell_end = ended
         self._died = died
         self._log = log
         self.session = open_session(0, None)
@@ -366,6 +368,7 @@ class Stepper:
         self._show_run()
         self._close_recording()
         self._log.info(f"end of the run, {self.session.account}" + _to_bag(self.session))
+        self._tell_end()
 
     def _fail(self, error: Exception) -> None:
         """What is known stays published; only a reset leads on."""
