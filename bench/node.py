@@ -33,6 +33,7 @@ SETTLE = 1.0
 REAL_TIME, FREE = "at real time", "as fast as it goes"
 OUTSIDE = "share of wall time outside the kernels"
 OVERHEAD = "cores beside the kernels'"
+"""s of a core a simulated second: so it is the same where the machine is too busy for real time."""
 WHOLE = "cores of the node"
 LATENCY = "ms from a command to its outcome"
 PATIENCE = 120.0
@@ -74,7 +75,7 @@ def _one_size(n: int, effort: Effort, folder: Path) -> list[Row]:
                 latencies = line.latencies(5 if effort.quick else 30)
             if how == FREE:
                 rows.append(Row(CASE, n, how, OUTSIDE, turn, 1.0 - wall / node_wall))
-            rows.append(Row(CASE, n, how, OVERHEAD, turn, (node_cpu - cpu) / node_wall))
+            rows.append(Row(CASE, n, how, OVERHEAD, turn, (node_cpu - cpu) / TICK))
             rows.append(Row(CASE, n, how, WHOLE, turn, node_cpu / node_wall))
             first = turn * len(latencies)
             rows += [Row(CASE, n, how, LATENCY, first + i, 1e3 * took) for i, took in enumerate(latencies)]
@@ -128,6 +129,7 @@ def tables(rows: Rows) -> str:
     body = [[f"{what}, {how}", *(rows.spread(CASE, n, how, what) for n in rows.ns(CASE))] for how, what in columns]
     text = (
         "One thread. A command's outcome is published at the end of the tick in which the belt changed, and arrives in "
-        "another process: the belt had changed by then. What doesn't reach real time has no figure there."
+        "another process: the belt had changed by then. What doesn't reach real time has no figure there. Cores beside "
+        "the kernels' are seconds of a core a simulated second."
     )
     return f"{markdown(['', *(f'N = {n:g}' for n in rows.ns(CASE))], body)}\n\n{text}"

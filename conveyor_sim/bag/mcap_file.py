@@ -86,10 +86,10 @@ class McapFile:
         """Ends the present chunk and hands everything to the operating system."""
         self._writer.flush()
 
-    def finish(self) -> dict[str, Any]:
-        """Writes the metadata record, index and end; returns what belongs into metadata.yaml."""
+    def finish(self) -> str:
+        """Writes the metadata record, index and end; returns what belongs into metadata.yaml (`write_metadata`)."""
         self.flush()
-        information = bag_information(self.topics, [self.info], self._distro)
-        self.add_metadata(RECORD_NAME, {RECORD_KEY: to_yaml(information)})
+        information = to_yaml(bag_information(self.topics, [self.info], self._distro))
+        self.add_metadata(RECORD_NAME, {RECORD_KEY: information})
         self._writer.finish()
         return information

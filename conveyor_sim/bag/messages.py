@@ -102,8 +102,8 @@ def to_outcome(message: Any) -> Outcome:
 
 
 def commands_message(names: Sequence[str], values: NDArray[np.float64], header: Header) -> bytes:
-    """conveyor_msgs/Commands."""
-    return _pack(COMMANDS, header, {"names": names, "values": values})
+    """conveyor_msgs/Commands, without declarations of alarms."""
+    return _pack(COMMANDS, header, {"names": names, "values": values, "alarm_ids": (), "alarms": ()})
 
 
 def speed_message(speed: float) -> bytes:

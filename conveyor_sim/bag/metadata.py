@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from io import StringIO
 from pathlib import Path, PurePath
+from textwrap import indent
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -106,11 +107,11 @@ def from_yaml(text: str) -> Any:
         return None
 
 
-def write_metadata(folder: Path, information: Mapping[str, Any]) -> None:
-    """Writes metadata.yaml into the folder, whole or not at all."""
+def write_metadata(folder: Path, information: str) -> None:
+    """Writes metadata.yaml into the folder, whole or not at all; information: `bag_information` as YAML."""
     temporary = folder / f"{FILE_NAME}.tmp"
     try:
-        temporary.write_text(to_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
+        temporary.write_text(f"rosbag2_bagfile_information:\n{indent(information, '  ')}", encoding="utf-8")
         temporary.replace(folder / FILE_NAME)
     except OSError:
         temporary.unlink(missing_ok=True)

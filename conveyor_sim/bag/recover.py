@@ -24,6 +24,7 @@ from conveyor_sim.bag.metadata import (
     file_names,
     fits,
     read_metadata,
+    to_yaml,
     write_metadata,
 )
 from conveyor_sim.bag.reader import mcap_files, open_bag
@@ -276,7 +277,7 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | No
     if file.is_file():
         kept.append(_aside(file))
         file.rename(kept[0])
-    write_metadata(folder, expected)
+    write_metadata(folder, to_yaml(expected))
     return kept
 
 
