@@ -13,7 +13,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.declared import Entry, declare_table
 
 _RATE_TEXT = "Hz of simulated time; -1: as the scene says, 0: never. Must divide the tick rate."
-RATES = ("bottles", "poses", "contacts", "belts", "signals", "ledger", "damage")
+RATES = ("bottles", "poses", "contacts", "belts", "signals", "ledger", "damage", "counters")
 
 TABLE = (
     Entry("scene", "paper_plant", "Scene file, or the name of a shipped scene."),
