@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from conveyor_sim.line.inputs import Input
+from conveyor_sim.ros.lockstep import Refused
 
 MESSAGE_BYTES = 256 * 1024
 """Of one command as it is sent: thousands of names. What a PLC sends in a scan has some hundred bytes."""
@@ -117,6 +119,14 @@ def size_of(given: Input) -> int:
     """Bytes of an input, about as it is sent."""
     words = sum(map(len, given.names)) + sum(map(len, given.texts))
     return words + VALUE_BYTES * max(len(given.names), len(given.values))
+
+
+def sizes_of(inputs: Iterable[Input]) -> list[int]:
+    """The same of each of those that come together. Raises Refused if they are too large for one command."""
+    sizes = [size_of(given) for given in inputs]
+    if sum(sizes) > MESSAGE_BYTES:
+        raise Refused(f"its commands are {TOO_LARGE}")
+    return sizes
 
 
 def _many(count: int) -> str:

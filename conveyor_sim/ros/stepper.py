@@ -11,6 +11,7 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,7 +20,7 @@ from conveyor_sim.line.inputs import SET, CommandOutcome, Input
 from conveyor_sim.ros import ownership
 from conveyor_sim.ros.advance import Advance, refuse
 from conveyor_sim.ros.calls import Calls
-from conveyor_sim.ros.inbox import MESSAGE_BYTES, TOO_LARGE, Inbox, size_of
+from conveyor_sim.ros.inbox import Inbox, sizes_of
 from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.pacing import Pacer
 from conveyor_sim.ros.reception import Reception
@@ -197,9 +198,7 @@ class Stepper:
         if tick + ticks > last:
             raise Refused(f"steps: {ticks} given, but the run ends in {last - tick} ticks, at tick {last}")
         future: Future[None] = Future()
-        self._advance = Advance(
-            tick + ticks, paced=False, done=lambda: future.set_result(None), failed=future.set_exception
-        )
+        self._advance = Advance(tick + ticks, False, partial(future.set_result, None), future.set_exception)
         return future
 
     def advance_lockstep(self, request: LockstepRequest) -> Future[LockstepAnswer]:
@@ -212,9 +211,7 @@ class Stepper:
         if self._advance is not None and not self.lockstep.owner:
             raise Refused(f"an advance to tick {self._advance.target} is still under way")
         simulation = self.session.simulation
-        sizes = [size_of(given) for given in request.inputs]
-        if sum(sizes) > MESSAGE_BYTES:
-            raise Refused(f"its commands are {TOO_LARGE}")
+        sizes = sizes_of(request.inputs)
         ownership.require_fitting(simulation, request)
         answer = self.lockstep.accept(request, self.session.run_id, simulation.tick, self.session.last_tick)
         ownership.claim(simulation, request)
