@@ -24,12 +24,12 @@ def simulate(scene: Scene, tick: int) -> Simulation:
 
 
 def test_columns_are_those_of_the_simulation(scene: Scene, bag: Path) -> None:
-    simulation = simulate(scene, 44)
+    simulation = simulate(scene, 40)
     with open_bag(bag) as opened:
-        bottles = {frame.tick: frame.data for frame in opened.bottles()}[44]
-        contacts = {frame.tick: frame.data for frame in opened.contacts()}[44]
-        belts = {frame.tick: frame.data for frame in opened.belts()}[44]
-        signals = {frame.tick: frame.data for frame in opened.signals()}[44]
+        bottles = {frame.tick: frame.data for frame in opened.bottles()}[40]
+        contacts = {frame.tick: frame.data for frame in opened.contacts()}[40]
+        belts = {frame.tick: frame.data for frame in opened.belts()}[40]
+        signals = {frame.tick: frame.data for frame in opened.signals()}[40]
     live_columns = (simulation.bottles(), simulation.contacts(), simulation.belts())
     for recorded, live in zip((bottles, contacts, belts), live_columns, strict=True):
         for name in vars(live):
