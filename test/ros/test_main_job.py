@@ -54,7 +54,7 @@ def test_two_runs_give_the_same_bytes_and_the_controller_its_commands(tmp_path: 
     one = messages(tmp_path / "one")
     assert one == messages(tmp_path / "two")
     assert len(one["signals"]) == 401
-    assert len(one["outcomes"]) == 40  # a scan every 10 ticks
+    assert len(one["outcomes"]) == 41  # a scan every 10 ticks, and before them the controller takes the line
     with open_bag(tmp_path / "one") as bag:
         assert bag.line.overrides == "duration: 4.0\n"
     assert {path.name for path in (tmp_path / "one" / "logs").iterdir()} == {"sim_node.log", "controller_node.log"}
