@@ -86,7 +86,7 @@ def test_the_little_line_is_busy(reference: Simulation) -> None:
         for kind_ in sim.contacts().kind.tolist():
             contacts[kind_] += 1
         belts.update(sim.bottles().belt.tolist())
-    assert min(contacts.values()) > 200
+    assert min(contacts.values()) > 150
     assert belts >= {0, 1, 2, 3}
     assert sim.counts.fed > 20
     assert sim.counts.removed > 5
