@@ -11,12 +11,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from conveyor_sim.scene import initial_bottles, load_scene, parse_scene
+from conveyor_sim.scene import Scene, initial_bottles, load_scene, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
 
@@ -46,6 +47,12 @@ SHIFT = 8.0
 Instant = dict[str, Any]
 
 
+def as_recorded(scene: Scene) -> Scene:
+    """A scene whose random streams are keyed by place, as they were before they had names: the record is older."""
+    scene._source = replace(scene._source, streams_by_index=True)
+    return scene
+
+
 def instants(simulation: Simulation, times: tuple[float, ...]) -> list[Instant]:
     """What is recorded of a simulation at each of the times, s."""
     found = []
@@ -63,7 +70,7 @@ def _instant(simulation: Simulation, time: float) -> Instant:
     return {
         "time": time,
         "counts": [counts.fed, counts.removed, counts.present],
-        "signals": simulation.signals().tolist(),
+        "signals": dict(zip(simulation.process_image.signal_names, simulation.signals().tolist(), strict=True)),
         "contacts closed": sum(normal > FAINT for normal, _ in forces.values()),
         "bottles": [
             {
