@@ -47,6 +47,6 @@ def test_what_decides_bits_changes_the_hash_and_nothing_else_does(copied: Path) 
     assert edited("stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74") != before
     assert edited("simulation.py", "def state_hash(self", "def bits(self") != before
     assert edited("stepping/guard/guard.py", "\n\n\n", "\n\n\n# A comment.\n") == before
-    assert edited("cli.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
+    assert edited("cli/run.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
     assert edited("plot/style.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
     assert hash_of(copied) == before

@@ -140,7 +140,7 @@ class _Image:
 
     def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None) -> None:
         self._source, self._role = source, role
-        self._commands = {tag.name: tag for tag in source.tags if tag.role in COMMANDS}
+        self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.observe.alarms import AlarmColumns
+from conveyor_sim.observe.events import Event
+from conveyor_sim.observe.read_back import ReadBackColumns
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -16,11 +20,36 @@ if TYPE_CHECKING:
 MODBUS = "modbus"
 """Source of inputs that come by Modbus."""
 
-FACES = (MODBUS,)
+OPCUA = "opcua"
+"""Source of inputs that come by OPC UA."""
+
+FACES = (MODBUS, OPCUA)
 """Sources of inputs that SCADA clients give."""
 
 MOST_WAITING = 1000
 """Inputs that wait for a tick at once, from all clients of all faces."""
+
+MOST_EVENTS = 10_000
+"""That a source keeps, the last ones."""
+
+Control = Literal["pause", "resume", "step", "reset", "seek", "speed", "loop"]
+"""What can be asked of a run. step: so many ticks; seek: to a simulated time, s; speed: times real time; loop: 1, 0."""
+
+
+@dataclass(frozen=True)
+class About:
+    """What stays the same of a line for as long as it is served."""
+
+    name: str
+    """Of the scene."""
+    where: str
+    """Its path in the plant; empty: none."""
+    tick: float
+    """Length of a tick, s."""
+    start_time: str
+    """The wall-clock time that simulated time 0 stands for, ISO 8601."""
+    tags: Sequence[Tag]
+    """All tags, in the order of the process image."""
 
 
 @dataclass(frozen=True)
@@ -29,22 +58,89 @@ class Shown:
 
     tick: int
     values: Mapping[str, float]
-    """Of all signals, and of all commands as they are in force, by name."""
+    """Of all signals as controllers read them, and of all commands as they are in force, by name."""
+    forced: frozenset[str] = frozenset()
+    """Signals that are forced."""
+    run: RunState = field(default_factory=lambda: RunState(RUNNING))
+    read_back: ReadBackColumns | None = None
+    """Who set the commands, and when; None: not known yet."""
+    alarms: AlarmColumns | None = None
+    """None: not known yet."""
+    lost: str = ""
+    """Why nothing newer will come before the source is back; empty: it is there."""
 
 
 class TagSource(Protocol):
     """Tags with their values, and a way in for inputs. Its methods may be called from any thread."""
 
     @property
-    def tags(self) -> Sequence[Tag]:
-        """All tags of the line, in the order of its process image."""
+    def about(self) -> About:
+        """What stays the same."""
 
     @property
     def shown(self) -> Shown:
         """The line as it was last."""
 
+    @property
+    def controls(self) -> frozenset[Control]:
+        """What `control` can do here."""
+
+    def events(self, after: int) -> tuple[int, Sequence[Event]]:
+        """How many events there were so far, and those after so many; the oldest may be forgotten."""
+
+    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+        """Have a function called after `shown` has changed, by any thread; what is returned ends that.
+
+        It must not block, and must not raise.
+        """
+
     def give(self, given: Input) -> str:
         """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+
+    def control(self, what: Control, value: float, by: str) -> str:
+        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+
+
+class Listeners:
+    """Functions that want to know that something has changed."""
+
+    def __init__(self) -> None:
+        """Nobody listens."""
+        self._all: tuple[Callable[[], None], ...] = ()
+
+    def add(self, heard: Callable[[], None]) -> Callable[[], None]:
+        """Call this one, too, from now on; what is returned ends that."""
+        self._all = (*self._all, heard)
+
+        def end() -> None:
+            self._all = tuple(other for other in self._all if other is not heard)
+
+        return end
+
+    def tell(self) -> None:
+        """Call them all."""
+        for heard in self._all:
+            heard()
+
+
+class RecentEvents:
+    """The last events of a line. One thread adds, any may read."""
+
+    def __init__(self) -> None:
+        """None so far."""
+        self._kept: tuple[int, tuple[Event, ...]] = (0, ())  # one attribute, so that both are of one moment
+
+    def add(self, events: Sequence[Event]) -> None:
+        """They have happened."""
+        if events:
+            total, last = self._kept
+            self._kept = total + len(events), (*last, *events)[-MOST_EVENTS:]
+
+    def after(self, count: int) -> tuple[int, Sequence[Event]]:
+        """How many there were so far, and those after so many."""
+        total, last = self._kept
+        new = min(max(total - count, 0), len(last))
+        return total, last[len(last) - new :]
 
 
 class TickSource:
@@ -53,23 +149,39 @@ class TickSource:
     That thread hands over the inputs before a tick, and takes a copy of the line after it.
     """
 
+    controls: frozenset[Control] = frozenset()
+    """None: whoever steps it decides when."""
+
     def __init__(self, simulation: Simulation) -> None:
         """Shows it as it is."""
         self._simulation = simulation
         self._waiting: deque[Input] = deque()
-        image = simulation.process_image
+        self._listeners = Listeners()
+        self._events = RecentEvents()
+        image, scene = simulation.process_image, simulation.scene
         self._names = (*image.signal_names, *image.command_names)
-        self.after_tick()
+        self._signal_names = image.signal_names
+        self._about = About(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
+        self._alarms, self._read_back = simulation.line.alarms.columns(), simulation.line.read_back.columns()
+        self._show()
 
     @property
-    def tags(self) -> Sequence[Tag]:
-        """All tags of the line, in the order of its process image."""
-        return self._simulation.process_image.tags
+    def about(self) -> About:
+        """What stays the same."""
+        return self._about
 
     @property
     def shown(self) -> Shown:
         """The line as it was at the end of the last tick."""
         return self._shown
+
+    def events(self, after: int) -> tuple[int, Sequence[Event]]:
+        """How many events there were since this source began, and those after so many."""
+        return self._events.after(after)
+
+    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
+        """Have a function called after each tick; what is returned ends that."""
+        return self._listeners.add(heard)
 
     def give(self, given: Input) -> str:
         """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
@@ -78,6 +190,10 @@ class TickSource:
         self._waiting.append(given)
         return ""
 
+    def control(self, what: Control, value: float, by: str) -> str:
+        """Refused."""
+        return f"{what}: the test decides when time passes, expected no control of the run"
+
     def before_tick(self) -> None:
         """Hand over what waits. By the thread that steps."""
         for _ in range(len(self._waiting)):
@@ -85,6 +201,22 @@ class TickSource:
 
     def after_tick(self) -> None:
         """Show the line as it is now. By the thread that steps."""
+        line = self._simulation.line
+        self._alarms = line.alarms.changes() or self._alarms
+        self._read_back = line.read_back.changes() or self._read_back
+        self._events.add(self._simulation.happened)
+        self._show()
+        self._listeners.tell()
+
+    def _show(self) -> None:
         simulation = self._simulation
-        values = [*simulation.signals().tolist(), *simulation.line.read_back.values]
-        self._shown = Shown(simulation.tick, dict(zip(self._names, values, strict=True)))
+        signals = simulation.line.signals()
+        values = [*signals.values.tolist(), *simulation.line.read_back.values]
+        self._shown = Shown(
+            simulation.tick,
+            dict(zip(self._names, values, strict=True)),
+            frozenset(self._signal_names[place] for place in signals.forced),
+            RunState(RUNNING),
+            self._read_back,
+            self._alarms,
+        )

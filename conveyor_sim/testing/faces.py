@@ -37,7 +37,7 @@ class ModbusFaces(AbstractContextManager["ModbusFaces"]):
 
         self._thread = self._thread or ServerThread()
         source = line.source()
-        server = ModbusServer(source, modbus_map(source.tags) if rows is None else rows, role)
+        server = ModbusServer(source, modbus_map(source.about.tags) if rows is None else rows, role)
         self._thread.run(server.start(port=0))
         self._servers.append(server)
         return server

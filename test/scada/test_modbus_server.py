@@ -77,7 +77,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[Line]:
     role: WriterKind | None = request.param
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     source = TickSource(simulation)
-    rows = modbus_map(source.tags)
+    rows = modbus_map(source.about.tags)
     server = ModbusServer(source, rows, role)
     with ServerThread() as thread:
         thread.run(server.start(port=0))

@@ -1,0 +1,67 @@
+"""The command run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from conveyor_sim.cli.output import OUTSIDE_TABLES, say
+from conveyor_sim.support.garbage import collected_later
+from conveyor_sim.support.progress import ProgressBar
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
+)
+@click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
+@click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
+@click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
+@click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def run(
+    scene: str,
+    out: Path | None,
+    duration: float | None,
+    no_record: bool,
+    no_pictures: bool,
+    threads: int | None,
+    outside_tables: bool,
+) -> None:
+    """Simulate SCENE without ROS, and record it.
+
+    It runs as fast as possible, and records what the node would.
+    """
+    with collected_later():
+        from conveyor_sim.bag.folder import require_recordable
+        from conveyor_sim.bag.recorder import run_folder
+        from conveyor_sim.explain.choices import setting_line
+        from conveyor_sim.model import build_model
+        from conveyor_sim.runs.compilation import Compilation
+        from conveyor_sim.runs.drawing import Drawing
+        from conveyor_sim.runs.report import report, report_unrecorded
+        from conveyor_sim.runs.runner import run_scene
+        from conveyor_sim.scene import load_scene
+        from conveyor_sim.support.resources import scene_path
+
+    loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
+    model = build_model(loaded)
+    click.echo(setting_line(model))
+    folder = drawing = None
+    if not no_record:
+        folder = click.get_current_context().with_resource(run_folder(out))
+        require_recordable(folder)  # not only once everything has been compiled
+        drawing = None if no_pictures else click.get_current_context().with_resource(Drawing())
+        if drawing is not None:
+            drawing.get_ready()
+    Compilation(loaded, say).run()
+    with ProgressBar(loaded.name, loaded.duration) as bar:
+        done = run_scene(loaded, folder, bar.update, threads)
+    if done.interrupted:
+        click.echo(f"interrupted at {done.simulated:.2f} s")
+    if done.bag is None:
+        report_unrecorded(loaded, model, done)
+    else:
+        report(done.bag, done.wall, drawing, done.spent)

@@ -1,0 +1,110 @@
+"""Commands on a scene: check, tags, explain."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from conveyor_sim.cli.output import OUTSIDE_TABLES, say, show
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.progress import ProgressBar
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--out", type=click.Path(path_type=Path), default=Path(), help="Folder for the picture (default: here).")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def check(scene: str, out: Path, outside_tables: bool) -> None:
+    """Validate SCENE and draw it.
+
+    SCENE is a file, or the name of a shipped scene. Its effects and its time step are listed with their reasons.
+    """
+    from conveyor_sim.explain.account import account
+    from conveyor_sim.model import build_model
+    from conveyor_sim.model.remedies import step_limit
+    from conveyor_sim.runs.report import plot_function
+    from conveyor_sim.runs.speed import expected
+    from conveyor_sim.runs.tags import tag_rows
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
+
+    path = scene_path(scene)
+    checked = load_scene(path, outside_tables=outside_tables)
+    model = build_model(checked)
+    tag_rows(checked)  # which finds alarms of tags that there are not
+    show(account(checked, model))
+    for line in expected(step_limit(checked)):
+        click.echo(line)
+    plot_scene = plot_function("plot_scene")
+    if plot_scene is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConveyorError(f"{out}: can't be made ({error.strerror}), expected a folder to draw into") from error
+        click.echo(f"drawn to {plot_scene(checked, out / f'{path.stem}.png')}")
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--csv", "as_csv", is_flag=True, help="As CSV, with all that is known of each tag.")
+@click.option("--modbus", is_flag=True, help="As the map of their Modbus addresses, as CSV.")
+@click.option("--map", "kept", type=click.Path(path_type=Path), help="With --modbus: a map to keep, which only grows.")
+@click.option("--word-order", type=click.Choice(["big", "little"]), default="big", help="Of Modbus: ABCD or CDAB.")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def tags(scene: str, outside_tables: bool, **chosen: Any) -> None:
+    """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
+    from conveyor_sim.runs.tags import listed
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
+
+    shown = listed(load_scene(scene_path(scene), outside_tables=outside_tables), **chosen)
+    click.echo(shown, nl=False) if isinstance(shown, str) else show(shown)
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--price",
+    is_flag=True,
+    help="Measure what each effect costs, in ns per bottle and step, and what each remedy saves.",
+)
+@click.option("--at", type=float, help="Simulated time in s at which to measure (default: half the duration).")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> None:
+    """Explain effects and time step of SCENE.
+
+    Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs.
+    """
+    from conveyor_sim.explain.choices import explanation, price_table
+    from conveyor_sim.model import build_model
+    from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.resources import scene_path
+
+    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    if at is not None and not price:
+        raise ConveyorError(f"--at: {at:g} given, expected --price with it, for it is the time to measure at")
+    if at is not None and not 0.0 < at <= loaded.duration:
+        raise ConveyorError(
+            f"--at: {at:g} given, expected a time greater than 0 and at most the duration, {loaded.duration:g} (s)"
+        )
+    show(explanation(loaded, build_model(loaded)))
+    if not price:
+        return
+    from conveyor_sim.explain.effect_cost import Pricing
+    from conveyor_sim.runs.compilation import Compilation
+
+    Compilation(loaded, say).run()
+    pricing = Pricing(loaded, at)
+    with ProgressBar(f"{loaded.name}, to a warm state", 0.0) as bar:
+        pricing.warm_up(bar.update)
+    with ProgressBar("compiling without each effect", 0.0, counted="variants") as bar:
+        pricing.prepare(bar.update)
+    with ProgressBar("with and without, in turn", 0.0, counted="measurements") as bar:
+        prices = pricing.measure(bar.update)
+    with ProgressBar("with what would take fewer steps", 0.0, counted="measurements") as bar:
+        gains = pricing.gains(bar.update)
+    show(price_table(prices))
+    for gain in gains:
+        click.echo(f"fewer steps: {gain.sentence}")
