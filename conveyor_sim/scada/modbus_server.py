@@ -9,6 +9,7 @@ other hands, or if too much waits already (Modbus Application Protocol 1.1b3, 7)
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from typing import Any
@@ -19,11 +20,11 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.tag import COMMANDS
+from conveyor_sim.scada.face import HERE, FaceError, Status
 from conveyor_sim.scada.modbus_map import Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
 
@@ -41,16 +42,15 @@ _TABLE_OF: dict[int, Table] = {
 _client: ContextVar[str] = ContextVar("client", default="?")
 
 
-class ServerError(ConveyorError):
-    """A face that can't be served."""
-
-
 class ModbusServer:
-    """Serves one source. To be used in one asyncio loop."""
+    """Serves one source: a Face."""
 
-    def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None = None) -> None:
-        """rows: the map. role: in which clients write; None: they may not."""
+    def __init__(
+        self, source: TagSource, rows: Sequence[Row], role: WriterKind | None = None, host: str = HERE, port: int = 0
+    ) -> None:
+        """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free."""
         self._image = _Image(source, rows, role)
+        self._at = host, port
         self._server: _Server | None = None
 
     @property
@@ -62,22 +62,22 @@ class ModbusServer:
         return int(sockets.sockets[0].getsockname()[1])
 
     @property
-    def clients(self) -> int:
-        """Connections that are open."""
-        return 0 if self._server is None else len(self._server.connected)
+    def address(self) -> str:
+        """Where clients find it."""
+        host, port = self._at
+        return f"modbus://{host}:{port if self._server is None else self.port}"
 
-    @property
-    def writes(self) -> int:
-        """Requests so far that were passed on to the line."""
-        return self._image.writes
+    def status(self) -> Status:
+        """Connections that are open; requests to write that were passed on, and that got an exception."""
+        server, image = self._server, self._image
+        if server is None:
+            return Status(0, 0, image.writes, image.refused, 0.0)
+        longest, server.longest = server.longest, 0.0
+        return Status(len(server.connected), 0, image.writes, image.refused, longest)
 
-    @property
-    def refused(self) -> int:
-        """Requests to write so far that were answered with an exception."""
-        return self._image.refused
-
-    async def start(self, host: str = "127.0.0.1", port: int = 502) -> None:
-        """Listen. port: 0 for any that is free. Raises ServerError if that is not possible."""
+    async def start(self) -> None:
+        """Listen. Raises FaceError if that is not possible."""
+        host, port = self._at
         _require_free(host, port)
         # The library wants a device of its own; the image takes its place.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
@@ -85,7 +85,7 @@ class ModbusServer:
         try:
             await server.serve_forever(background=True)
         except (OSError, RuntimeError) as error:
-            raise ServerError(f"modbus: {host}:{port} can't be listened on ({error})") from error
+            raise FaceError(f"modbus: {host}:{port} can't be listened on ({error})") from error
         self._server = server
 
     async def stop(self) -> None:
@@ -99,6 +99,7 @@ class _Server(ModbusTcpServer):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.connected: set[_Handler] = set()
+        self.longest = 0.0  # s of wall time from a request to its answer, since somebody asked
 
     def callback_new_connection(self) -> ServerRequestHandler:
         return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
@@ -124,6 +125,11 @@ class _Handler(ServerRequestHandler):
         super().callback_disconnected(exc)
 
     async def handle_request(self) -> None:
+        began = time.perf_counter()
+        await self._answer()
+        self.server.longest = max(self.server.longest, time.perf_counter() - began)
+
+    async def _answer(self) -> None:
         asked, peer = self.last_pdu, self.transport.get_extra_info("peername")
         if asked is not None and asked.function_code not in _TABLE_OF:
             # Of the library's own functions some would change how it serves all others.
@@ -202,4 +208,4 @@ def _require_free(host: str, port: int) -> None:
             probe.bind((host, port))
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ServerError(f"modbus: {host}:{port} can't be listened on ({reason}), expected a free port") from error
+        raise FaceError(f"modbus: {host}:{port} can't be listened on ({reason}), expected a free port") from error

@@ -68,6 +68,8 @@ class Shown:
     """None: not known yet."""
     lost: str = ""
     """Why nothing newer will come before the source is back; empty: it is there."""
+    run_id: str = ""
+    """Of the run: another one after a reset, to which nothing holds that the one before was told; "": unknown."""
 
 
 class TagSource(Protocol):

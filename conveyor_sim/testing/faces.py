@@ -31,14 +31,14 @@ class ModbusFaces(AbstractContextManager["ModbusFaces"]):
 
         role: what clients that write are, "controller" or "operator"; None: they can't. rows: the map of addresses;
         None: that of `conveyor-sim tags --modbus`. What clients write acts at the next tick that the test lets pass.
-        Raises ServerError if there is no port, ImportError without pymodbus.
+        Raises FaceError if there is no port, ImportError without pymodbus.
         """
         from conveyor_sim.scada.modbus_server import ModbusServer
 
         self._thread = self._thread or ServerThread()
         source = line.source()
         server = ModbusServer(source, modbus_map(source.about.tags) if rows is None else rows, role)
-        self._thread.run(server.start(port=0))
+        self._thread.run(server.start())
         self._servers.append(server)
         return server
 

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.modbus_map import Row, modbus_map
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING, TickSource
@@ -24,7 +25,7 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 
 from pymodbus.client import ModbusTcpClient
 
-from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer, ServerError
+from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY = 1, 2, 3, 6
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
@@ -80,7 +81,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[Line]:
     rows = modbus_map(source.about.tags)
     server = ModbusServer(source, rows, role)
     with ServerThread() as thread:
-        thread.run(server.start(port=0))
+        thread.run(server.start())
         with ModbusTcpClient("127.0.0.1", port=server.port, timeout=20) as client:
             yield Line(simulation, source, {row.name: row for row in rows}, server, client)
         thread.run(server.stop())
@@ -158,7 +159,9 @@ def test_what_can_not_be_gets_an_exception(line: Line) -> None:
     assert [answer.exception_code for answer, _ in answers] == [code for _, code in answers]
     line.advance()
     assert line.simulation.take_outcomes() == []
-    assert (line.server.writes, line.server.refused) == (0, 5)
+    status = line.server.status()
+    assert (status.writes, status.refused) == (0, 5)
+    assert status.latency > 0.0 == line.server.status().latency
 
 
 @pytest.mark.parametrize("line", [None], indirect=True)
@@ -204,7 +207,7 @@ def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
     many = [socket.create_connection(address, timeout=20) for _ in range(MOST_CLIENTS + 8)]
     many[-1].settimeout(20)
     assert many[-1].recv(1) == b""  # closed by the server
-    assert line.server.clients == MOST_CLIENTS
+    assert line.server.status().clients == MOST_CLIENTS
     for one in many:
         one.close()
     assert line.read(SPEED) == line.read(SPEED)
@@ -214,9 +217,9 @@ def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
 
 def test_a_port_that_is_taken_is_said(line: Line) -> None:
     taken = line.server.port
-    other = ModbusServer(line.source, list(line.rows.values()))
-    with ServerThread() as thread, pytest.raises(ServerError, match=f"modbus: 127.0.0.1:{taken} can't be listened on"):
-        thread.run(other.start(port=taken))
+    other = ModbusServer(line.source, list(line.rows.values()), port=taken)
+    with ServerThread() as thread, pytest.raises(FaceError, match=f"modbus: 127.0.0.1:{taken} can't be listened on"):
+        thread.run(other.start())
 
 
 @pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed: apt-get install mbpoll")

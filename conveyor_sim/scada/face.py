@@ -1,0 +1,67 @@
+"""`Face`: a server, or a client of a broker, that shows a tag source by one of the protocols that plants speak."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.inputs import WriterKind
+
+HERE = "127.0.0.1"
+"""Where faces listen unless they are told otherwise: only this machine reaches it."""
+
+Stamps = Literal["wall", "simulated"]
+"""What the times of values are: wall time, or simulated time on the scene's start_time."""
+
+
+class FaceError(ConveyorError):
+    """A face that can't be."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked of all faces, or of one."""
+
+    host: str = HERE
+    """Address to listen on."""
+    stamps: Stamps = "wall"
+    modbus_role: WriterKind | None = None
+    """In which Modbus clients write; None: they may not."""
+    modbus_map: Path | None = None
+    """File that keeps the map of addresses; None: made of the tags, and not kept."""
+
+
+@dataclass(frozen=True)
+class Status:
+    """What a face is doing."""
+
+    clients: int
+    """That are connected."""
+    subscriptions: int
+    """Values that they have asked to be told of; 0 where a protocol has no such thing."""
+    writes: int
+    """Requests so far that were passed on to the line: writes, and calls of methods."""
+    refused: int
+    """Such requests so far that were not."""
+    latency: float
+    """s of wall time, the longest since the status was last asked for: from a request to its answer, or from a change
+    of the source to its being shown, whichever took longer; 0 without any."""
+
+
+class Face(Protocol):
+    """One protocol at one address. All of it is used in one asyncio loop, which it must not hold up."""
+
+    @property
+    def address(self) -> str:
+        """Where clients find it, as they are told: "modbus://127.0.0.1:5020"."""
+
+    async def start(self) -> None:
+        """Serve from now on. Raises FaceError, in one sentence, if that can't be; nothing is left behind then."""
+
+    async def stop(self) -> None:
+        """End all connections. Harmless if it was not started, or is stopped already."""
+
+    def status(self) -> Status:
+        """What it is doing."""

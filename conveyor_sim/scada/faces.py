@@ -1,0 +1,54 @@
+"""The faces that there are: what serves one asks here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from conveyor_sim.scada.face import Face, FaceError, Settings
+from conveyor_sim.scada.source import MODBUS, TagSource
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One protocol."""
+
+    name: str
+    """Of the option of `serve`, which takes a port."""
+    port: int
+    """By default; its usual one may be for root only."""
+    library: str
+    """Without which it can't be; of the extra `scada`."""
+    make: Callable[[TagSource, int, Settings], Face]
+    """A face on a port, not started. Raises ConveyorError."""
+    exposes: Callable[[Settings], str]
+    """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
+
+    @property
+    def installed(self) -> bool:
+        """Whether its library is here."""
+        return find_spec(self.library) is not None
+
+    def require(self) -> None:
+        """Raises FaceError if it can't be here."""
+        if not self.installed:
+            raise FaceError(f"{self.name}: {self.library} is not installed: pip install 'conveyor_sim[scada]'")
+
+
+def _modbus(source: TagSource, port: int, settings: Settings) -> Face:
+    from conveyor_sim.scada.modbus_map import keep_map, modbus_map
+    from conveyor_sim.scada.modbus_server import ModbusServer
+
+    tags = source.about.tags
+    rows = modbus_map(tags) if settings.modbus_map is None else keep_map(settings.modbus_map, tags)
+    return ModbusServer(source, rows, settings.modbus_role, settings.host, port)
+
+
+def _modbus_exposes(settings: Settings) -> str:
+    if settings.modbus_role is None:
+        return "read all, and write nothing"
+    return f"read all, and write as {settings.modbus_role}, for Modbus asks nobody who they are"
+
+
+FACES: tuple[Kind, ...] = (Kind(MODBUS, 5020, "pymodbus", _modbus, _modbus_exposes),)
