@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from conveyor_sim.stepping.guard import GuardEvent
 
 
+_EVENTS = [(name, topic, topic.events) for name, topic in OUTPUTS.items() if topic.events is not None]
+
+
 class Sink(Protocol):
     """Takes serialized messages: the recorder, a node's publishers."""
 
@@ -56,11 +59,10 @@ class Outputs:
         beyond limits.
         """
         happened: dict[str, Sequence[Any]] = {}
-        for topic in OUTPUTS.values():
-            if topic.events is not None:
-                happened[topic.name] = topic.events(self._sim)
-                for event in happened[topic.name]:
-                    self._hand_out(topic.name, topic, self._header(event.tick), _itself, event)
+        for name, topic, events in _EVENTS:
+            happened[name] = found = events(self._sim)
+            for event in found if self._sinks else ():
+                self._hand_out(name, topic, self._header(event.tick), _itself, event)
         self._noticed += happened["guard"]
         return list(happened["outcomes"])
 
@@ -112,9 +114,8 @@ class Outputs:
 
 def forget_past(sim: Simulation) -> None:
     """Have a simulation that was loaded from a checkpoint report nothing that happened before."""
-    for topic in OUTPUTS.values():
-        if topic.events is not None:
-            topic.events(sim)
+    for _, _, events in _EVENTS:
+        events(sim)
 
 
 def _itself(what: Any) -> Any:

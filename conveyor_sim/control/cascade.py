@@ -47,12 +47,14 @@ class Cascade:
     _full: tuple[COVERED, ...] = field(init=False, repr=False)
     _ahead: tuple[TON, ...] = field(init=False, repr=False)
     _held: list[bool] = field(init=False, repr=False)
+    _names: tuple[tuple[str, str], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         require(bool(self.zones), "zones: none given, expected one or more")
         self._full = tuple(COVERED(self.full_delay, self.clear_delay) for _ in self.zones)
         self._ahead = tuple(TON(self.start_delay) for _ in self.zones)
         self._held = [False] * len(self.zones)
+        self._names = tuple((eye_signal(zone.eye), speed_command(zone.belt)) for zone in self.zones)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """A speed for each zone's belt: its own, or 0."""
@@ -60,10 +62,11 @@ class Cascade:
         room = inputs.on(self.takes)
         for index in reversed(range(len(self.zones))):
             zone = self.zones[index]
-            full = self._full[index](inputs.on(eye_signal(zone.eye)), inputs.time)
+            eye, command = self._names[index]
+            full = self._full[index](inputs.on(eye), inputs.time)
             released = self._ahead[index](room, inputs.time)
             # One that is not full itself runs on, whatever is ahead.
             self._held[index] = full and (not room or (self._held[index] and not released))
-            answer[speed_command(zone.belt)] = 0.0 if self._held[index] else zone.speed
+            answer[command] = 0.0 if self._held[index] else zone.speed
             room = not full
         return answer

@@ -30,13 +30,17 @@ class Beams(Device):
             used=np.zeros(len(ends), dtype=np.int64),
             state=np.zeros(len(ends), dtype=np.int64),
         )
+        self._room: F8 = np.empty((4, 0))
         self._began: F8 | None = None
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
         """Keep where bottles start."""
         bottles = now.state.world.bottles
-        self._began = np.stack((bottles.x, bottles.y, bottles.vx, bottles.vy))
+        if self._room.shape[1] != bottles.x.size:
+            self._room = np.empty((4, bottles.x.size))
+        self._began = began = self._room
+        began[0], began[1], began[2], began[3] = bottles.x, bottles.y, bottles.vx, bottles.vy
 
     def end(self, now: ScanContext) -> None:
         """Find out when in this tick each was blocked. At the very first there was no way: bottles stand."""

@@ -15,6 +15,11 @@ class BeltSurfaces:
     def __init__(self, state: State) -> None:
         self._state = state
         shapes = state.model.belt_shapes
+        straight = [index for index, shape in enumerate(shapes) if shape.kind == "straight"]
+        self._straight = np.array(straight, dtype=np.int64)
+        self._along_x = np.array([math.cos(shapes[index].angle) for index in straight])
+        self._along_y = np.array([math.sin(shapes[index].angle) for index in straight])
+        self._turning = [(index, shape) for index, shape in enumerate(shapes) if shape.kind != "straight"]
         self._centre_radius = [shape.centre_radius if shape.kind == "curved" else math.inf for shape in shapes]
         self._outermost = np.array([shape.outermost for shape in shapes])
         self.fastest = 0.0
@@ -30,13 +35,12 @@ class BeltSurfaces:
         world, surface = self._state.world, self._state.world.surface
         if surface is None or not self._state.model.belts:
             return
-        for index, shape in enumerate(self._state.model.belt_shapes):
-            speed = speeds[index]
-            if shape.kind == "straight":
-                surface.ux[index] = speed * math.cos(shape.angle)
-                surface.uy[index] = speed * math.sin(shape.angle)
-            elif surface.turn is not None:
-                turn = speed / self._centre_radius[index]
+        along = speeds[self._straight]
+        surface.ux[self._straight] = along * self._along_x
+        surface.uy[self._straight] = along * self._along_y
+        for index, shape in self._turning:
+            if surface.turn is not None:
+                turn = speeds[index] / self._centre_radius[index]
                 surface.turn[index] = turn
                 surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
         refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)

@@ -22,16 +22,16 @@ def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: S
         return f"no name and no value given, expected at least one {what}"
     seen: set[str] = set()
     for name, value in zip(names, values, strict=True):
-        if name.startswith(ALARMS) and what == "command":
+        command = known.get(name)
+        if command is None:
+            if not name.startswith(ALARMS) or what != "command":
+                return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
             if wrong := alarm_problem(name, value):
                 return wrong
             continue
-        if name not in known:
-            return f"{printable(name)}: no such {what}, expected {_listed(list(known))}"
         if name in seen:
             return f"{name}: given twice"
         seen.add(name)
-        command = known[name]
         if command.kind == "bool" and value not in (0.0, 1.0):
             return f"{name}: {value:g} given, expected 0 or 1"
         if command.kind in ("count", "enumeration") and not float(value).is_integer():

@@ -25,13 +25,18 @@ class CrossingLine:
     def __init__(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         along = np.array(end) - np.array(start)
         self._line = np.array([*start, *along, float(along @ along)])
+        self._room: tuple[F8, I8] = np.empty((2, 0)), np.empty(0, np.int64)
         self._before: tuple[F8, I8] | None = None
         self._found: tuple[I8, F8, I8] = (np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 
     def begin(self, now: ScanContext) -> None:
         """Note where the bottles are before the steps of a tick."""
         bottles = now.state.world.bottles
-        self._before = np.stack((bottles.x, bottles.y)), bottles.id.copy()
+        if self._room[1].size != bottles.id.size:
+            self._room = np.empty((2, bottles.id.size)), np.empty(bottles.id.size, np.int64)
+        self._before = self._room
+        places, ids = self._before
+        places[0], places[1], ids[:] = bottles.x, bottles.y, bottles.id
 
     def end(self, now: ScanContext) -> list[Passage]:
         """Who passed since then, in the order of time: straight between the two places, the time in proportion."""

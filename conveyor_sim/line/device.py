@@ -194,7 +194,7 @@ class Device:
         """
         return None
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """The values of the signals that add to "state", in their order; asked for at every tick."""
         signals = zip(self._signals, self.values(now), strict=True)
         return [value for signal, value in signals if signal.adds_to == "state"]

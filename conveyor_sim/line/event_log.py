@@ -24,7 +24,7 @@ class EventLog:
         """now: at the start, with the states that machines have at first."""
         # Each machine with its states.
         self._machines = [
-            (device, states)
+            (device.name, device, states)
             for device in devices
             if (states := [signal for signal in device.signals if signal.adds_to == "state"])
         ]
@@ -32,7 +32,7 @@ class EventLog:
         self.total = 0
         """Events so far."""
         self.bottles = {device.name: 0 for device in devices}
-        self.states = {device.name: [float(value) for value in device.states(now)] for device, _ in self._machines}
+        self.states = {name: [float(value) for value in device.states(now)] for name, device, _ in self._machines}
 
     def begin(self) -> None:
         """A tick begins."""
@@ -69,10 +69,11 @@ class EventLog:
 
     def note_states(self, now: ScanContext) -> None:
         """A tick has ended."""
-        for device, states in self._machines:
-            before, present = self.states[device.name], device.states(now)
-            if before != list(present):
-                self.states[device.name] = [float(value) for value in present]
+        kept = self.states
+        for name, device, states in self._machines:
+            before, present = kept[name], device.states(now)
+            if before != present:
+                kept[name] = [float(value) for value in present]
                 for state, old, value in zip(states, before, present, strict=True):
                     if old != value:
                         text = state.texts.get(int(value), "")

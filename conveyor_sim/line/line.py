@@ -1,6 +1,6 @@
 """`Line`: the devices of a scene, and the commands and faults that reach them at ticks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -40,6 +40,8 @@ from conveyor_sim.support.printable import SENTENCE, printable
 
 _Outcome = tuple[int, Input, bool, str, bool, bool, bool]
 
+_REMOVED: tuple[Adds, ...] = ("removed", "rejected")
+
 
 class Line:
     """Everything about a line but its bottles' motion: what acts at ticks."""
@@ -53,16 +55,23 @@ class Line:
         self._alarms = AlarmSystem(scene, devices, self._log.note_alarm)
         devices = (*devices, self._alarms.device) if devices else devices
         self._devices = devices
-        self._belts = [device for device in devices if isinstance(device, BeltDevice)]
+        belts = [device for device in devices if isinstance(device, BeltDevice)]
+        self._watched = [belt for belt in belts if belt.watchdog is not None]
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
         # Nothing is called that does nothing.
         self._beginning = [device for device in devices if type(device).begin is not Device.begin]
         self._ending = [device for device in devices if type(device).end is not Device.end]
         self._taking = [device for device in devices if type(device).take is not Device.take]
         self._feeding = [device for device in devices if type(device).feed is not Device.feed]
-        self._counting = [
-            device for device in devices if any(signal.adds_to not in ("", "state") for signal in device.signals)
-        ]
+        # Of each device that counts bottles, the places of the signals that do.
+        self._counting = {
+            adds_to: [
+                (device, places)
+                for device in devices
+                if (places := [place for place, signal in enumerate(device.signals) if signal.adds_to == adds_to])
+            ]
+            for adds_to in ("fed", "removed", "rejected")
+        }
         self.takes = bool(self._taking) and state.model.has("outfeed")
         """Whether any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
@@ -97,16 +106,20 @@ class Line:
     @property
     def fed(self) -> int:
         """Bottles put onto the line so far."""
-        return sum(self._counted("fed").values())
+        return sum(count for _, count in self._counted("fed"))
 
     @property
     def removed(self) -> int:
         """Bottles taken off the line so far."""
-        return sum(self.removed_by().values())
+        return sum(count for kind in _REMOVED for _, count in self._counted(kind))
 
     def removed_by(self) -> dict[str, int]:
         """Bottles taken off the line so far, by the names of the devices that take them."""
-        return self._counted("removed", "rejected")
+        by: dict[str, int] = {}
+        for kind in _REMOVED:
+            for name, count in self._counted(kind):
+                by[name] = by.get(name, 0) + count
+        return by
 
     @property
     def blocked_ticks(self) -> int:
@@ -195,7 +208,7 @@ class Line:
                 self._note(CommandOutcome(tick, rest, not reason, reason))
             if given.operation == SET:  # whatever became of the commands beside them
                 self._alarms.say(tick, given.names, given.values)
-        for belt in self._belts:
+        for belt in self._watched:
             if name := belt.watch(self.now):
                 stopped = Input(WATCHDOG, WATCHDOG, "line", SET, (name,), (0.0,))
                 self._outcomes.append(CommandOutcome(tick, stopped, True, ""))
@@ -360,15 +373,11 @@ class Line:
         self._outcomes.append(outcome)
         self._log.note_outcome(outcome)
 
-    def _counted(self, *sums_of: Adds) -> dict[str, int]:
-        """Sums of the signals that add to something, by the names of the devices that have such."""
-        sums = {}
-        for device in self._counting:
-            values = zip(device.signals, device.values(self.now), strict=True)
-            counts = [int(value) for signal, value in values if signal.adds_to in sums_of]
-            if counts:
-                sums[device.name] = sum(counts)
-        return sums
+    def _counted(self, adds_to: Adds) -> Iterator[tuple[str, int]]:
+        """Devices, and what their signals that add to something come to."""
+        for device, places in self._counting[adds_to]:
+            values = device.values(self.now)
+            yield device.name, sum([int(values[place]) for place in places])
 
     def _by_name(self) -> dict[str, Device]:
         return {device.name: device for device in self._devices}

@@ -52,6 +52,7 @@ class History:
         self._other_index = {name: column for column, name in enumerate((*image.command_names, *image.fault_names))}
         self._now: F8 = np.array([math.nan] * len(image.commands) + [0.0] * len(image.faults))
         self._others = np.empty((len(self._signals), len(self._now)))
+        self._given: dict[str, float] = {}
         self.marks: list[Mark] = []
         """Faults injected and commands given by the test, in order."""
 
@@ -117,7 +118,9 @@ class History:
         for name, value in zip(outcome.names, outcome.values, strict=True):
             if name.startswith(ALARMS):  # noted as the controller gave it
                 continue
-            self._set(name, value)
+            if self._given.get(name) != value:
+                self._given[name] = value
+                self._set(name, value)
             if from_test or outcome.operation == INJECT:
                 self.marks.append(Mark(self._times[-1], name, value))
 

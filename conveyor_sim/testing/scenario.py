@@ -362,13 +362,14 @@ class Scenario(AbstractContextManager["Scenario"]):
         if not isinstance(answer, Mapping):
             raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
         self._scan_read |= inputs.read
-        commands = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
+        alarms = {name: value for name, value in answer.items() if name.startswith(ALARMS)}
+        commands = {name: value for name, value in answer.items() if name not in alarms} if alarms else answer
         # A node answers what changes only, and nothing between its scans; alarms of a controller before it go.
         alone = self._node is None
-        changes = self._changes.of(answer if alone else {})
+        changes = self._changes.of(alarms if alone else {})
         self._answer = {**commands, **changes} if alone else {**changes, **answer}
         # The line is given them as the next tick begins; until then they are there, and don't stand.
-        if new := {name: 0.0 for name in self._answer if name.startswith(ALARMS) and name not in self._alarms}:
+        if new := {name: 0.0 for name in (*alarms, *changes) if name not in self._alarms}:
             self._alarms |= new
             self.history.alarms(new)
 

@@ -55,6 +55,9 @@ class DriveDevice(BeltDevice):
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take a setpoint (m/s), run, reverse, reset, or the fault trip."""
+        if name == self._speed_command:
+            super().command(name, value, now)
+            return
         what = name.removeprefix(f"{self.name}/")
         if what == "run":
             self.run = value != 0.0
@@ -64,17 +67,16 @@ class DriveDevice(BeltDevice):
             if self.reset.rises(value) and not self.trip:
                 self.tripped = False
                 now.alarm(self._tripped, False)
-        elif what == "trip":
+        else:
             self.trip = value != 0.0
             self.tripped = self.tripped or self.trip
             now.alarm(self._tripped, self.tripped)
-        else:
-            super().command(name, value, now)
 
     def begin(self, now: ScanContext) -> None:
         """Ramp for a tick."""
-        drive = self._drive
-        now.speeds[self._index] = self.ramp.approach(self.wanted(now), drive.acceleration, drive.jerk, now.length)
+        drive, ramp, wanted = self._drive, self.ramp, self.wanted(now)
+        if ramp.value != wanted or ramp.acceleration != 0.0:
+            now.speeds[self._index] = ramp.approach(wanted, drive.acceleration, drive.jerk, now.length)
 
     def end(self, now: ScanContext) -> None:
         """Count what was travelled in the tick."""
@@ -83,16 +85,16 @@ class DriveDevice(BeltDevice):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """As a belt, then running, at_speed, fault, and pulses."""
+        index, tripped = self._index, self.tripped
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
-        running, fault = self.states(now)
-        values = [*super().values(now), running, at_speed, fault]
+        values = [now.speeds[index], now.carried(index), self.run and not tripped, at_speed, tripped]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Running and fault."""
-        return self.run and not self.tripped, self.tripped
+        return [self.run and not self.tripped, self.tripped]
 
     def wanted(self, now: ScanContext) -> float:
         """The speed that it is commanded to run at, m/s: none while it is stopped or tripped."""

@@ -85,11 +85,12 @@ class InfeedDevice(Device):
 
     def _progress(self, state: State, time: float) -> float:
         """How far the bottle fed last has come along the in-line, m; one that is gone goes on at its speed."""
-        slot = np.flatnonzero(state.world.bottles.id == self.last)
-        if not slot.size:
+        bottles = state.world.bottles
+        slot = int((bottles.id == self.last).argmax())
+        if bottles.id[slot] != self.last:
             return self._infeed.speed * (time - self.due)
-        dx = float(state.world.bottles.x[slot[0]]) - self._infeed.position[0]
-        dy = float(state.world.bottles.y[slot[0]]) - self._infeed.position[1]
+        dx = float(bottles.x[slot]) - self._infeed.position[0]
+        dy = float(bottles.y[slot]) - self._infeed.position[1]
         return dx * self._direction[0] + dy * self._direction[1]
 
     def _way_to_rails(self, state: State, most: float) -> float:

@@ -46,9 +46,9 @@ class InspectionDevice(Device):
                 if passage.id in now.bad:
                     self.bad, self.bad_time = self.bad + 1, passage.time
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Running."""
-        return (not self.stop,)
+        return [not self.stop]
 
     def counts(self) -> tuple[int, int, int]:
         """Bottles that passed, and bad ones among them."""

@@ -105,9 +105,9 @@ class Mover(Device):
         share = min(1.0, max(0.0, self.position / self._shape.stroke))
         return share, float(share <= SWITCHED), float(share >= 1.0 - SWITCHED), float(self.blocked)
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Blocked."""
-        return (self.blocked,)
+        return [self.blocked]
 
     def _rails(self, now: ScanContext) -> MovingRails:
         moving = now.state.world.moving

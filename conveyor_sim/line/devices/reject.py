@@ -68,9 +68,9 @@ class RejectDevice(Device):
                 left.append(stroke)
         self.strokes = tuple(left)
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Running."""
-        return (not self.stop,)
+        return [not self.stop]
 
     def counts(self) -> tuple[int, int, int]:
         """Bottles thrown out, and bad ones among them."""

@@ -54,6 +54,6 @@ class SinkDevice(TakingDevice):
         starved, time = self.cause == STARVED, self.starved_ticks * now.length
         return self.works, self.removed, self.removed_bad, starved, time, *self.status()
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Running, starved, state, category and stop reason."""
-        return self.works, self.cause == STARVED, *self.condition
+        return [self.works, self.cause == STARVED, *self.condition]

@@ -52,7 +52,7 @@ class SourceDevice(MachineDevice):
         blocked = self.cause == BLOCKED
         return self.works and not blocked, self.fed, blocked, self.blocked_ticks * now.length, *self.status()
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Running, blocked, state, category and stop reason."""
         blocked = self.cause == BLOCKED
-        return self.works and not blocked, blocked, *self.condition
+        return [self.works and not blocked, blocked, *self.condition]

@@ -135,9 +135,9 @@ class StationDevice(TakingDevice):
             *self.status(),
         )
 
-    def states(self, now: ScanContext) -> Sequence[float]:
+    def states(self, now: ScanContext) -> list[float]:
         """Running, starved, blocked, state, category and stop reason."""
-        return self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition
+        return [self.works, self.cause == STARVED, self.cause == BLOCKED, *self.condition]
 
 
 class Work:
