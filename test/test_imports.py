@@ -35,16 +35,17 @@ MAY_IMPORT: Mapping[str, str] = {
     "stepping": "accounts engine errors model scene state | numpy",
     "simulation": "accounts engine line model observe scene state stepping | numpy",
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
-    "scada": "errors line observe simulation support | numpy pymodbus",
     "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
     "version | numpy rich ruamel scipy",
     "explain": "effects errors model scene simulation support timestep | rich",
     "plot": "accuracy bag errors line observe scene support | matplotlib numpy",
-    "runs": "bag engine errors line model observe plot scada scene simulation support timestep | click numpy rich",
-    "ros": "bag control errors explain line model observe runs scene simulation support version | "
+    "runs": "bag engine errors line model observe plot scene simulation support timestep | click numpy rich",
+    "live": "bag errors line observe runs simulation support",
+    "scada": "errors line observe simulation support | numpy pymodbus",
+    "ros": "bag control errors explain line live model runs scene simulation support version | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control engine errors line plot ros scada scene simulation support | numpy pytest",
-    "cli": "accuracy bag errors explain model ros runs scene support version | click rich",
+    "cli": "accuracy bag errors explain line model ros runs scada scene support version | click rich",
 }
 """By room, from the lowest up: the rooms of the project, then the packages of others that it imports."""
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from conveyor_sim.cli.output import OUTSIDE_TABLES, say, show
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from conveyor_sim.scada.modbus_map import WordOrder
 
 
 @click.command()
@@ -53,14 +56,25 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 @click.option("--map", "kept", type=click.Path(path_type=Path), help="With --modbus: a map to keep, which only grows.")
 @click.option("--word-order", type=click.Choice(["big", "little"]), default="big", help="Of Modbus: ABCD or CDAB.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def tags(scene: str, outside_tables: bool, **chosen: Any) -> None:
+def tags(
+    scene: str, as_csv: bool, modbus: bool, kept: Path | None, word_order: WordOrder, outside_tables: bool
+) -> None:
     """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
-    from conveyor_sim.runs.tags import listed
+    from conveyor_sim.line.line import image_of
+    from conveyor_sim.runs.tags import tag_csv, tag_table
+    from conveyor_sim.scada.modbus_map import keep_map, modbus_map, to_csv
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
-    shown = listed(load_scene(scene_path(scene), outside_tables=outside_tables), **chosen)
-    click.echo(shown, nl=False) if isinstance(shown, str) else show(shown)
+    loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
+    if modbus:
+        found = image_of(loaded).tags
+        rows = modbus_map(found, word_order=word_order) if kept is None else keep_map(kept, found, word_order)
+        click.echo(to_csv(rows), nl=False)
+    elif as_csv:
+        click.echo(tag_csv(loaded), nl=False)
+    else:
+        show(tag_table(loaded))
 
 
 @click.command()

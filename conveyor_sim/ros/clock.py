@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.ros.pacing import RateCap
+from conveyor_sim.live.pacing import RateCap
 from conveyor_sim.ros.publishers import ros_qos
 
 NS = 1_000_000_000

@@ -23,9 +23,9 @@ from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.lockstep_client import LockstepClient
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
+from conveyor_sim.support.stop_request import StopRequest
 
 LOOK = 0.01  # s of wall time between two looks for the simulation
 STOP_LOOK = 0.1  # s of wall time between two looks, while it waits for an answer, at whether it is to stop

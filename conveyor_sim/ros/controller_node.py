@@ -21,9 +21,9 @@ with while_importing():
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
     from conveyor_sim.ros.declared import Entry, declare_table
-    from conveyor_sim.ros.stop_request import StopRequest
     from conveyor_sim.scene.yaml_lines import Document
     from conveyor_sim.support.printable import printable_lines
+    from conveyor_sim.support.stop_request import StopRequest
 
 NAME = "controller"
 MODES = ("lockstep", "free")

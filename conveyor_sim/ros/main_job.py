@@ -21,13 +21,13 @@ with while_importing():
     from conveyor_sim.ros.child import Child
     from conveyor_sim.ros.domain import private_domain
     from conveyor_sim.ros.observer import Observer
-    from conveyor_sim.ros.stop_request import StopRequest
     from conveyor_sim.runs.drawing import Drawing
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.support.garbage import collected_later
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.progress import ProgressBar, told_if_long
     from conveyor_sim.support.resources import scene_path
+    from conveyor_sim.support.stop_request import StopRequest
 
 LOOK = 0.05  # s of wall time between two looks at the processes
 CONTROLLER = {"controller": "conveyor_sim.control.level:table_level", "scan_ticks": 10}

@@ -16,6 +16,9 @@ from conveyor_sim.bag.folder import require_recordable
 from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.explain.choices import setting_line
+from conveyor_sim.live.pacing import RateCap
+from conveyor_sim.live.session import Session, bag_folder
+from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
@@ -27,12 +30,9 @@ from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.operate_service import OperateService
-from conveyor_sim.ros.pacing import RateCap
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import Services
-from conveyor_sim.ros.session import Session
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.ros.stepper import Stepper
 from conveyor_sim.runs.compilation import Cancelled, Compilation
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -161,13 +161,6 @@ class SimNode:
     def _die(self, error: Exception) -> None:
         self.error = error
         self._on_stop()
-
-
-def bag_folder(record: Path | None, runs: int) -> Path | None:
-    """Where the run after so many others is recorded: `<record>`, then `<record>_1`, `<record>_2`, ..."""
-    if record is None or runs == 0:
-        return record
-    return record.with_name(f"{record.name}_{runs}")
 
 
 def _greeting(stepper: Stepper) -> str:

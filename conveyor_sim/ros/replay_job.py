@@ -14,8 +14,8 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.ros.context import start_ros
 from conveyor_sim.ros.keys import Keys, readable
 from conveyor_sim.ros.replay_node import ReplayNode
-from conveyor_sim.ros.stop_request import StopRequest
 from conveyor_sim.support.progress import ProgressBar
+from conveyor_sim.support.stop_request import StopRequest
 
 TERMINAL = 0  # the standard input
 LOOK = 0.1  # s of wall time between two looks at the keys

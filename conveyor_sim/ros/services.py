@@ -21,9 +21,9 @@ from rclpy.task import Future as RosFuture
 from std_srvs.srv import Trigger
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.ros.lockstep import Refused
-from conveyor_sim.ros.run_state import State
-from conveyor_sim.ros.stepper import Stepper
+from conveyor_sim.live.lockstep import Refused
+from conveyor_sim.live.run_state import State
+from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.version import __version__
 
 T = TypeVar("T")

@@ -12,8 +12,8 @@ with while_importing():
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.ros.context import start_ros
     from conveyor_sim.ros.node import SimNode
-    from conveyor_sim.ros.stop_request import StopRequest
     from conveyor_sim.support.printable import printable_lines
+    from conveyor_sim.support.stop_request import StopRequest
 
 
 def main() -> None:

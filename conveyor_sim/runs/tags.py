@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
 from typing import NamedTuple
 
 from rich.box import SIMPLE
@@ -13,7 +12,6 @@ from rich.table import Table
 
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.tag import MOST_COUNT, Tag
-from conveyor_sim.scada.modbus_map import WordOrder, keep_map, modbus_map, to_csv
 from conveyor_sim.scene import Scene
 
 NONE = "-"
@@ -65,13 +63,6 @@ def _row(tag: Tag, where: str) -> Row:
     )
 
 
-def listed(scene: Scene, as_csv: bool, modbus: bool, kept: Path | None, word_order: WordOrder) -> str | RenderableType:
-    """What the command `tags` shows, CSV as it is, by its options. Raises MapError."""
-    if modbus:
-        return modbus_csv(scene, kept, word_order)
-    return tag_csv(scene) if as_csv else tag_table(scene)
-
-
 def tag_table(scene: Scene) -> RenderableType:
     """For a terminal; what else is known is in `tag_csv`."""
     table = Table(box=SIMPLE, pad_edge=False, caption=scene.where or None, caption_justify="left", leading=1)
@@ -101,9 +92,3 @@ def tag_csv(scene: Scene) -> str:
     writer.writerow(Row._fields)
     writer.writerows(tag_rows(scene))
     return text.getvalue()
-
-
-def modbus_csv(scene: Scene, kept: Path | None, word_order: WordOrder) -> str:
-    """The map of Modbus addresses; kept: the file of a map to grow. Raises MapError."""
-    tags = image_of(scene).tags
-    return to_csv(modbus_map(tags, word_order=word_order) if kept is None else keep_map(kept, tags, word_order))

@@ -17,15 +17,15 @@ from typing import TypeVar
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import SET, CommandOutcome, Input
-from conveyor_sim.ros import ownership
-from conveyor_sim.ros.advance import Advance, refuse
-from conveyor_sim.ros.calls import Calls
-from conveyor_sim.ros.inbox import Inbox, sizes_of
-from conveyor_sim.ros.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
-from conveyor_sim.ros.pacing import Pacer
-from conveyor_sim.ros.reception import Reception
-from conveyor_sim.ros.run_state import Log, State, run_state_of
-from conveyor_sim.ros.session import Session
+from conveyor_sim.live import ownership
+from conveyor_sim.live.advance import Advance, refuse
+from conveyor_sim.live.calls import Calls
+from conveyor_sim.live.inbox import Inbox, sizes_of
+from conveyor_sim.live.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.live.pacing import Pacer
+from conveyor_sim.live.reception import Reception
+from conveyor_sim.live.run_state import Log, State, run_state_of
+from conveyor_sim.live.session import Session
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from conveyor_sim.ros.lockstep import Refused
-from conveyor_sim.ros.pacing import Pacer
-from conveyor_sim.ros.playback import Message, Playback
+from conveyor_sim.live.lockstep import Refused
+from conveyor_sim.live.pacing import Pacer
+from conveyor_sim.live.playback import Message, Playback
 
 IDLE = 0.01  # s of wall time between two beats while no tick is due
 

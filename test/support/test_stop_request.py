@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from conveyor_sim.ros.stop_request import StopRequest
+from conveyor_sim.support.stop_request import StopRequest
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -48,7 +48,7 @@ print("hangs", flush=True)
 while True:
     time.sleep(1.0)
 """
-IN_A_NODE = "from conveyor_sim.ros.stop_request import StopRequest\nstop = StopRequest()\n"
+IN_A_NODE = "from conveyor_sim.support.stop_request import StopRequest\nstop = StopRequest()\n"
 IN_A_RUN = "from conveyor_sim.runs.runner import _stop_request\nstop = _stop_request()\nstop.__enter__()\n"
 
 

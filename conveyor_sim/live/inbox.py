@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.ros.lockstep import Refused
+from conveyor_sim.live.lockstep import Refused
 
 MESSAGE_BYTES = 256 * 1024
 """Of one command as it is sent: thousands of names. What a PLC sends in a scan has some hundred bytes."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TypeVar
 
-from conveyor_sim.ros.lockstep import Refused
+from conveyor_sim.live.lockstep import Refused
 
 T = TypeVar("T")
 MOST_CALLS = 100

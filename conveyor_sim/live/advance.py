@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from conveyor_sim.ros.lockstep import Refused
+from conveyor_sim.live.lockstep import Refused
 
 
 @dataclass

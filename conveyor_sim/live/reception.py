@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, CommandOutcome, Input, arrival
-from conveyor_sim.ros.inbox import Inbox, size_of
-from conveyor_sim.ros.session import Session
+from conveyor_sim.live.inbox import Inbox, size_of
+from conveyor_sim.live.session import Session
 
 PERIOD = 1.0
 """s of wall time between two accounts of what was turned away, and between two counts of refusals not logged."""

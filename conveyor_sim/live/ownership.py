@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from conveyor_sim.line.inputs import DISOWN, OWN, Input
-from conveyor_sim.ros.lockstep import LOCKSTEP, LockstepRequest, Refused
+from conveyor_sim.live.lockstep import LOCKSTEP, LockstepRequest, Refused
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 
