@@ -70,6 +70,10 @@ class Shown:
     """Why nothing newer will come before the source is back; empty: it is there."""
     run_id: str = ""
     """Of the run: another one after a reset, to which nothing holds that the one before was told; "": unknown."""
+    owner: str = ""
+    """The controller that owns the line, as far as is known; empty: none."""
+    released: tuple[str, ...] = ()
+    """Patterns of the devices that it leaves to others."""
 
 
 class TagSource(Protocol):
@@ -221,4 +225,6 @@ class TickSource:
             RunState(RUNNING),
             self._read_back,
             self._alarms,
+            owner=simulation.line.modes.owner,
+            released=tuple(simulation.line.modes.released),
         )
