@@ -158,6 +158,18 @@ class Device:
         """Take an accepted command or fault of its own, by its whole name, as a tick begins."""
         raise NotImplementedError(f"{self.name} takes no commands")
 
+    def mode_objection(self) -> str:
+        """Why its mode can't change as it stands now, "" if it can."""
+        return ""
+
+    def stops(self, name: str, value: float) -> bool:
+        """Whether a command of its own stops it for safety: what people may give in any mode."""
+        return False
+
+    def stop_by_hand(self, name: str, value: float) -> None:
+        """Take such a command from a person who has no control of it."""
+        raise NotImplementedError(f"{self.name} takes no stops")
+
     def take_mode(self, mode: int, now: ScanContext) -> None:
         """It is in other hands (authority.MODES) from this tick on; commands in force stay."""
 

@@ -179,8 +179,11 @@ class Line:
         return self._alarms.said_problem(names, values)
 
     def _set(self, given: Input, now: ScanContext) -> None:
+        by_hand = self.modes.stops_by_hand(given)
         for name, value in zip(given.names, given.values, strict=True):
-            if name in self._owner:  # not an alarm
+            if name in by_hand:
+                self._owner[name].stop_by_hand(name, value)
+            elif name in self._owner:  # not an alarm
                 self._owner[name].command(name, value, now)
         self.read_back.note(given, now.tick)
 

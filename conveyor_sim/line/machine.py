@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.failures import Draws, FailureClock, PlannedTimes
-from conveyor_sim.line.packml import COMMAND_TEXTS, STATE_TEXTS, Command, State, StateMachine, objection
+from conveyor_sim.line.packml import COMMAND_TEXTS, STATE_TEXTS, Command, State, StateMachine, mode_objection, objection
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.stop_reason import (
     BLOCKED,
@@ -150,6 +150,19 @@ class MachineDevice(Device):
             return f"{name}: Unhold given while it is not repaired, expected {self.name}/fault to go first"
         return ""
 
+    def mode_objection(self) -> str:
+        """Why its mode can't change in the present state, "" if it can."""
+        return mode_objection(self.state)
+
+    def stops(self, name: str, value: float) -> bool:
+        """Whether a command of its own is Stop or Abort."""
+        return name.endswith("/cntrl_cmd") and value in (Command.STOP, Command.ABORT)
+
+    def stop_by_hand(self, name: str, value: float) -> None:
+        """Take Stop or Abort; cntrl_cmd stays as who has control gave it."""
+        self._take(int(value))
+        self._settle_state()
+
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take run, cntrl_cmd, rate (1/s), or the fault stop."""
         what = name.rpartition("/")[2]
@@ -226,12 +239,19 @@ class MachineDevice(Device):
             if on and not before:
                 self.planned = FIRST_PLANNED + index
                 self._stand(Command.STOP, self.planned)
-            elif before and not on and self.planned == FIRST_PLANNED + index:
-                self.planned = NONE
-                self.restart = self.run and self.state in (State.STOPPING, State.STOPPED)
+            elif before and not on and self.planned:
+                self._end_plan(tick)
             else:
                 continue
             self._settle_state()
+
+    def _end_plan(self, tick: int) -> None:
+        """A planned stop is over: stand for another one that is on, or be reset and started."""
+        self.planned = next((FIRST_PLANNED + index for index, plan in enumerate(self._plans) if plan.on(tick)), NONE)
+        if not self.planned:
+            self.restart = self.run and self.state in (State.STOPPING, State.STOPPED)
+        elif self.reason >= FIRST_PLANNED:
+            self.reason = self.planned
 
     def _settle_state(self) -> None:
         """Do what the machine does by itself in the state that it has come to."""

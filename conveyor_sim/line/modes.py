@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, OPERATORS_MODES, unauthorized, who
+from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, OPERATORS_MODES, PEOPLE, unauthorized, who
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input
@@ -86,7 +86,8 @@ class Modes:
         if kind == "test" or kind not in WRITER_KINDS or (quiet and kind == "controller" and self._is_free(given)):
             return None, given, ""
         later = self.later()
-        devices = {name: self._device_of[name] for name in given.names if name in self._device_of}
+        stops = self._stops(given)
+        devices = {name: self._device_of[name] for name in given.names if name in self._device_of and name not in stops}
         objections = {device: later._objection(given, device) for device in dict.fromkeys(devices.values())}
         foreign = [index for index, name in enumerate(given.names) if objections.get(devices.get(name, ""))]
         if not foreign:
@@ -98,6 +99,10 @@ class Modes:
         if kind != "controller" or not own:
             return given, None, reason
         return _of(given, foreign), _of(given, own), reason
+
+    def stops_by_hand(self, given: Input) -> Collection[str]:
+        """Commands of an input by which a person stops what is in other hands."""
+        return [name for name in self._stops(given) if self._objection(given, self._device_of[name])]
 
     def pattern_problem(self, patterns: Sequence[str]) -> str:
         """Why groups of devices can't be released by these patterns, "" if they can."""
@@ -153,6 +158,14 @@ class Modes:
         released = any(self._fits(pattern, device) for pattern in self.released)
         return "" if released else f"{device}: {self._owned}, expected its release"
 
+    def _stops(self, given: Input) -> Collection[str]:
+        """Commands of an input that stop devices, and may be given in any mode: if a person gives them."""
+        if given.writer_kind not in PEOPLE:
+            return ()
+        own = zip(given.names, given.values, strict=True)
+        devices, owner = self._devices, self._device_of
+        return [name for name, value in own if name in owner and devices[owner[name]].stops(name, value)]
+
     def _is_free(self, given: Input) -> bool:
         """Whether no other controller than the writer owns the line."""
         return self.owner in ("", given.writer)
@@ -182,6 +195,8 @@ class Modes:
             if given.writer_kind == "operator" and not {value, self.modes[device]} <= set(OPERATORS_MODES):
                 wrong = MODES[int(value)] if value not in OPERATORS_MODES else MODES[self.modes[device]]
                 return f"{device}: {wrong} is not for operators, expected an engineer"
+            if value != self.modes[device] and (reason := self._devices[device].mode_objection()):
+                return f"{device}: {reason}"
         return ""
 
     def _change(self, given: Input, now: ScanContext) -> None:

@@ -93,6 +93,11 @@ COMPLETES: Mapping[State, State] = {
 }
 """The acting states, each with the state that it leads to once it is complete."""
 
+MODE_STATES = (State.STOPPED, State.IDLE, State.ABORTED, State.COMPLETE)
+"""In which a machine's unit mode may change: it works on nothing, and does not go on by itself. PackML leaves it to the
+machine which these are (PML_UnitModeConfig of Beckhoff Tc3_PackML_V3).
+"""
+
 STATE_TEXTS: Mapping[int, str] = {0: "Undefined", **{state: state.name.capitalize() for state in State}}
 COMMAND_TEXTS: Mapping[int, str] = {0: "none", **{command: command.name.capitalize() for command in Command}}
 
@@ -105,6 +110,13 @@ def objection(command: int, state: int) -> str:
     allowed, refused = ([s for s in State if (s in FROM[given]) is taken] for taken in (True, False))
     expected = f"in {_listed(allowed)}" if len(allowed) <= len(refused) else f"outside {_listed(refused)}"
     return f"{COMMAND_TEXTS[given]} given in {STATE_TEXTS[now]}, expected {expected}"
+
+
+def mode_objection(state: int) -> str:
+    """Why a unit mode can't change in a state, "" if it can."""
+    if state in MODE_STATES:
+        return ""
+    return f"is in {STATE_TEXTS[state]}, expected {_listed(MODE_STATES)} for a change of mode"
 
 
 def _listed(states: Collection[State]) -> str:

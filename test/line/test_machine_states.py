@@ -377,6 +377,24 @@ def test_a_planned_stop_ends_early_by_command_and_does_not_start_what_an_operato
     assert at(sim) == ("Stopped", "idle", "command run")
 
 
+def test_one_planned_stop_ends_during_another_and_the_machine_stands_on() -> None:
+    """Whichever is first in the scene, and whichever begins first; those that follow at once make one stop."""
+    for lunch, reel, stops, end in (
+        ((2.0, 3.0), (2.0, 1.0), [(200, "lunch")], 500),
+        ((2.0, 3.0), (3.0, 1.0), [(200, "lunch")], 500),
+        ((3.0, 3.0), (2.0, 2.0), [(200, "reel"), (400, "lunch")], 600),
+        ((2.0, 1.0), (3.0, 1.0), [(200, "lunch"), (300, "reel")], 400),
+        ((3.0, 1.0), (2.0, 1.0), [(200, "reel"), (300, "lunch")], 400),
+    ):
+        planned = {
+            name: {"start": start, "duration": time} for name, (start, time) in (("lunch", lunch), ("reel", reel))
+        }
+        sim = line(machines={"packer": sink(planned_stops=planned, suspend_after=100.0)}, duration=100.0)
+        found = [(tick, state, reason) for tick, state, _, reason in stands(sim, 1000) if tick > 1]
+        expected = [(tick, "Stopped", f"planned stop {name}") for tick, name in stops]
+        assert found == [*expected, (end, "Execute", expected[-1][2])]
+
+
 def test_those_who_watch_are_told_of_changes_alone() -> None:
     sim = line(
         machines={"packer": sink(failures={"jam": {**JAM, "counted": "clock"}}, suspend_after=100.0)}, duration=100.0
