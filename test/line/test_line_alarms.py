@@ -9,7 +9,7 @@ from scenes import base, belt, simulation
 from testing.conftest import ON_TABLE, TABLE
 
 from conveyor_sim.errors import CheckpointError, SceneError
-from conveyor_sim.line.inputs import DECLARE, Input
+from conveyor_sim.line.inputs import DECLARE, FORCE, UNFORCE, Input
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -89,6 +89,27 @@ def test_the_scene_s_alarms_are_on_signals() -> None:
     came = sim.tick
     assert alarm_events(sim, 30) == [(came + 25, "raised", "full")]
     assert sim.alarms == {"full"} and value(sim, "alarms/full") == 1
+
+
+def test_an_alarm_with_a_limit_goes_by_what_is_read_the_line_s_own_by_what_is() -> None:
+    """Of the scene, and of a controller: a forced value is judged as controllers read it, until it is unforced."""
+    sim = line(alarms={"full": {"tag": ON_TABLE, "high": 40}}, belts={"feeder": {"drive": {"acceleration": 1.0}}})
+    declare(sim, empty={"tag": ON_TABLE, "low": -1.0})
+    sim.advance()
+    force(sim, (ON_TABLE, 41.0), ("belts/feeder/fault", 1.0))
+    assert alarm_events(sim, 2) == [(2, "raised", "full")]
+    force(sim, (ON_TABLE, -2.0))
+    assert alarm_events(sim, 2) == [(4, "cleared", "full"), (4, "raised", "empty")]
+    sim.give(Input("operate", "Jo", "engineer", UNFORCE, (), ()))
+    assert alarm_events(sim, 2) == [(6, "cleared", "empty")]
+    force(sim, ("alarms/full", 1.0))
+    sim.advance()
+    assert value(sim, "alarms/full") == 1 and not sim.alarms, "one that is forced is read, and does not stand"
+
+
+def force(sim: Simulation, *given: tuple[str, float]) -> None:
+    names, values = zip(*given, strict=True)
+    sim.give(Input("operate", "Jo", "engineer", FORCE, names, values))
 
 
 def test_a_limit_s_alarm_latches_until_it_is_acknowledged_and_reset() -> None:
