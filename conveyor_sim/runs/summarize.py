@@ -15,6 +15,7 @@ from conveyor_sim.bag.recorded_scene import recorded_scene
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import SceneError
 from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.inputs import ARRIVAL
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.model import Model, build_model
 from conveyor_sim.model.remedies import StepLimit, step_limit
@@ -55,6 +56,7 @@ class _Tally:
         self._signals: NDArray[np.float64] | None = None
         self._ledger: Ledger | None = None
         self._outcomes: Counter[bool] = Counter()
+        self._occasions = 0
         self._guard: list[tuple[str, str]] = []
         self._borne: LoadHistory | None = None
         self._passed: list[tuple[str, str]] = []
@@ -87,11 +89,13 @@ class _Tally:
             self._ledger = read
         elif topic == "events":
             for at, kind, name in zip(read.at, read.kind, read.name, strict=True):
+                self._occasions += kind == "command_refused"
                 self._alarms.event(self._bag.time(int(at)), kind, printable(name))
         elif topic == "alarm_states":
             self._alarms.states = read
         else:
             self._outcomes[bool(message.accepted)] += 1
+            self._occasions += message.source == ARRIVAL  # which the line knows nothing of
 
     def summary(self, wall: float | None) -> Summary:
         forces = np.concatenate(self._forces) if self._forces else np.zeros(0)
@@ -128,6 +132,7 @@ class _Tally:
             alarms=self._alarms.figures(seconds, int(line.tick_ns) * 1e-9) if "events" in self._bag.counts else None,
             commands=self._outcomes.total(),
             refused=self._outcomes[False],
+            occasions=self._occasions if "events" in self._bag.counts else None,
             topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},
         )
 

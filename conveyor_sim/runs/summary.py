@@ -133,6 +133,10 @@ class Summary:
     commands: int
     refused: int
     """Of the commands."""
+    occasions: int | None
+    """On how many occasions: what a controller has no control of counts once until hands change, however long it goes
+    on commanding it; None if events were not recorded.
+    """
     topics: dict[str, TopicCount]
 
     @property

@@ -60,8 +60,15 @@ def _account(summary: Summary) -> list[tuple[str, str]]:
         *([("limits passed", _told(summary.damage_events, summary.damage_texts))] if summary.damage_events else []),
         *([("alarms", summary.alarms.sentence)] if summary.alarms is not None and summary.alarms.any else []),
         *([] if summary.energy is None else [("energy", summary.energy.sentence)]),
-        ("commands", f"{summary.commands} recorded, {summary.refused} refused"),
+        ("commands", f"{summary.commands} recorded, {summary.refused} refused{_on_occasions(summary)}"),
     ]
+
+
+def _on_occasions(summary: Summary) -> str:
+    """Where fewer than the refusals: a controller goes on commanding what is in other hands."""
+    if summary.occasions in (None, summary.refused):
+        return ""
+    return f" on {summary.occasions} occasion{'s' * (summary.occasions != 1)}"
 
 
 def _told(kinds: dict[str, int], texts: list[str]) -> str:

@@ -10,13 +10,18 @@ from bag.editing import edited
 from bag.small_line import SMALL_LINE, record
 from rich.console import Console
 
+from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.line.authority import AUTOMATIC, MANUAL
+from conveyor_sim.line.inputs import MODE, Input
 from conveyor_sim.model import build_model
 from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.runs.summarize import summarize
 from conveyor_sim.runs.summary import Summary, write_summary
 from conveyor_sim.runs.summary_table import render
 from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.simulation import Simulation
 
 TICKS = 100
 
@@ -65,6 +70,25 @@ def test_counts_are_those_of_the_simulation(tmp_path: Path) -> None:
     on_belts = sum(flow.bottles for flow in summary.belts.values())
     assert on_belts + summary.on_floor == summary.present
     assert (summary.commands, summary.refused) == (5, 2)
+
+
+def test_a_long_hold_is_one_occasion(tmp_path: Path) -> None:
+    """A controller commands a belt in every scan that an operator holds, twice; a bad value beside that is a third."""
+    simulation = Simulation(load_scene(SMALL_LINE))
+    speed, device = "belts/straight/cmd_speed", "belts/straight"
+    with Recorder(tmp_path / "bag") as recorder:
+        outputs = Outputs(simulation, [recorder], run_id="run")
+        outputs.start()
+        for tick in range(60):
+            if tick % 20 == 0:
+                mode = MANUAL if tick % 40 == 0 else AUTOMATIC
+                simulation.give(Input("operate", "Jo", "operator", MODE, (device,), (float(mode),)))
+            simulation.command((speed,), (1e9 if tick == 30 else 0.2,))
+            simulation.advance()
+            outputs.after_tick()
+    summary = summarize(tmp_path / "bag")
+    assert (summary.commands, summary.refused, summary.occasions) == (63, 41, 3)
+    assert "63 recorded, 41 refused on 3 occasions" in shown(summary)
 
 
 def test_forces_are_of_all_recorded_peaks(bag: Path) -> None:
