@@ -31,3 +31,5 @@ class Production:
     """(n,), s, of each counters message."""
     good: NDArray[np.float64]
     """(n,), good bottles that had left the line by then, since the start of the recording."""
+    forced: Sequence[str] = ()
+    """Signals that were forced at any time."""

@@ -62,6 +62,7 @@ def plot_production(production: Production, out_dir: str | Path) -> list[Path]:
     """
     from conveyor_sim.observe.periods import stop_reasons
     from conveyor_sim.plot import style
+    from conveyor_sim.plot.heading import note_forced
     from conveyor_sim.plot.line_efficiency import efficiency_figure
     from conveyor_sim.plot.state_bars import state_bars_figure
     from conveyor_sim.plot.stop_reasons import stop_reasons_figure
@@ -76,6 +77,8 @@ def plot_production(production: Production, out_dir: str | Path) -> list[Path]:
             "stops": stop_reasons_figure(reasons, name),
             "efficiency": efficiency_figure(production.counters, production.time, production.good, name),
         }
+        for figure in figures.values():
+            note_forced(figure, production.forced)
         return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]
 
 

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.bag.forced import forced_signals
 from conveyor_sim.bag.messages import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.line.inputs import FORCE
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
 from conveyor_sim.observe.ledger import Ledger
@@ -21,7 +21,6 @@ from conveyor_sim.plot.data import Contacts, Damage, Energy, Floats, Flow, Frame
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.moving import moving_shapes
-from conveyor_sim.support.printable import printable
 
 Integers = NDArray[np.int64]
 
@@ -68,14 +67,7 @@ class Recording:
     @cached_property
     def forced(self) -> tuple[str, ...]:
         """Names of the signals that were forced at any time, in the order in which they were."""
-        names: dict[str, None] = {}
-        for frame in self._bag.messages("signals"):  # those of a checkpoint from which it began
-            names.update((self._bag.line.signal_names[place], None) for place in to_image(frame.data).forced)
-            break
-        for outcome in self._bag.outcomes():
-            if outcome.data.accepted and outcome.data.operation == FORCE:
-                names.update(dict.fromkeys(outcome.data.names))
-        return tuple(printable(name) for name in names)
+        return forced_signals(self._bag)
 
     @property
     def energy(self) -> Energy | None:

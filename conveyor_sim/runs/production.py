@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.bag.forced import forced_signals
 from conveyor_sim.bag.reader import Bag, Frame, open_bag
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError
@@ -55,6 +56,7 @@ def read_production(path: Path) -> Production:
             alarms.figures(end - frames[0].time, int(bag.line.tick_ns) * 1e-9),
             np.array([frame.time for frame in frames]),
             good,
+            forced_signals(bag),
         )
 
 

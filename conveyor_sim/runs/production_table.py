@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from rich.box import SIMPLE
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -35,7 +36,8 @@ def render(production: Production) -> Group:
         longest = _table("longest stops", "for", "from, s", "length, s")
         for stop in longest_stops(periods, MOST):
             longest.add_row(stop.machine, stop.why, f"{stop.begin:.2f}", f"{stop.length:.2f}")
-        parts += [_times(production.counters), reasons, longest]
+        counters = production.counters
+        parts += [_times(counters), _efficiency(counters), _failures(counters), reasons, longest]
     return Group(*parts, *_alarms(production.alarms), *([_definitions()] if production.periods else []))
 
 
@@ -51,27 +53,49 @@ def _headline(production: Production) -> Table:
         made = f"{_percent(counters.oee[-1])} of what the bottleneck makes in its planned busy time"
         rows.add_row("bottleneck", f"{slowest}: {3600.0 * counters.rate[-1]:g} bottles an hour")
         rows.add_row("efficiency", f"{made}, running all of it")
+    if production.forced:
+        more = f" and {len(production.forced) - MOST} more" if len(production.forced) > MOST else ""
+        rows.add_row("forced", f"{', '.join(production.forced[:MOST])}{more} (all figures are of the true values)")
     return rows
 
 
 def _bottles(counters: CounterColumns) -> Table:
-    table = _table("bottles", "processed", "good", "defective", "rejected", "failures", "MTBF, s", "MTTR, s")
-    columns = counters.processed, counters.good, counters.defective, counters.rejected, counters.failures
+    table = _table("bottles", "processed", "good", "defective", "rejected")
+    columns = counters.processed, counters.good, counters.defective, counters.rejected
     for row, name in enumerate(counters.name):
-        means = (_number(column[row]) for column in (counters.mtbf, counters.mttr))
-        table.add_row(printable(name), *(str(int(column[row])) for column in columns), *means)
+        table.add_row(printable(name), *(str(int(column[row])) for column in columns))
     return table
 
 
 def _times(counters: CounterColumns) -> Table:
-    """Shares of the time since the reset, and what follows from them."""
-    table = _table("share of time", *CATEGORIES, *FACTORS[:-1], "OEE")
-    for row, name in enumerate(counters.name):
+    """Shares of the time since the reset."""
+    table = _table("share of time", *CATEGORIES)
+    for row in _timed(counters):
         times = [float(getattr(counters, category)[row]) for category in CATEGORIES]
-        if sum(times) > 0.0:
-            shares = [_percent(time / sum(times)) for time in times]
-            table.add_row(printable(name), *shares, *(_percent(getattr(counters, factor)[row]) for factor in FACTORS))
+        table.add_row(printable(counters.name[row]), *(_percent(time / sum(times)) for time in times))
     return table
+
+
+def _efficiency(counters: CounterColumns) -> Table:
+    """What follows from times and bottles."""
+    table = _table("efficiency", *FACTORS[:-1], "OEE")
+    for row in _timed(counters):
+        table.add_row(printable(counters.name[row]), *(_percent(getattr(counters, factor)[row]) for factor in FACTORS))
+    return table
+
+
+def _failures(counters: CounterColumns) -> Table:
+    table = _table("failures", "times", "MTBF, s", "MTTR, s")
+    for row in _timed(counters):
+        means = (_number(column[row]) for column in (counters.mtbf, counters.mttr))
+        table.add_row(printable(counters.name[row]), str(int(counters.failures[row])), *means)
+    return table
+
+
+def _timed(counters: CounterColumns) -> list[int]:
+    """Rows of what has times."""
+    times = np.sum([getattr(counters, category) for category in CATEGORIES], axis=0)
+    return [int(row) for row in np.flatnonzero(times > 0.0)]
 
 
 def _alarms(alarms: AlarmFigures) -> list[RenderableType]:
@@ -106,11 +130,12 @@ def _percent(share: float) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "-"
+    return f"{value:.{0 if value >= 1e3 else 1}f}" if math.isfinite(value) else "-"
 
 
 def _table(*headings: str) -> Table:
     table = Table(box=SIMPLE)
     for index, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if index == 0 or heading == "for" else "right")
+        words = index == 0 or heading == "for"
+        table.add_column(heading, justify="left" if words else "right", overflow="fold", no_wrap=not words)
     return table

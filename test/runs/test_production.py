@@ -16,7 +16,7 @@ from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.counters import RESET_COUNTERS
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.inputs import FORCE, Input
 from conveyor_sim.line.time_account import CATEGORIES
 from conveyor_sim.observe.periods import longest_stops, stop_reasons
 from conveyor_sim.observe.production import Production
@@ -28,13 +28,17 @@ FAILING_LINE = Path(__file__).with_name("failing_line.yaml")
 MACHINES = ("machines/filler", "machines/capper", "machines/packer")
 
 
-def record(folder: Path, resets: tuple[int, ...] = (), ticks: int = 6000, start: Path | None = None) -> Path:
-    """The failing line, with its counters reset at some ticks."""
+def record(
+    folder: Path, resets: tuple[int, ...] = (), ticks: int = 6000, start: Path | None = None, forced: str = ""
+) -> Path:
+    """The failing line, with its counters reset at some ticks, and a signal forced to 1 from the start."""
     scene = load_scene(FAILING_LINE)
     sim = Simulation(scene) if start is None else Simulation.load(start, scene=scene)
     with Recorder(folder) as recorder:
         outputs = Outputs(sim, [recorder], run_id="run")
         outputs.start()
+        if forced:
+            sim.give(Input("operate", "Jo", "engineer", FORCE, (forced,), (1.0,)))
         while sim.tick < ticks:
             if sim.tick in resets:
                 sim.give(Input("commands", "shift", "operator", RESET_COUNTERS, (), ()))
@@ -128,6 +132,25 @@ def test_the_report_prints_and_draws_it(bag: Path, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {
         f"{stem}.{suffix}" for stem in ("states", "stops", "efficiency") for suffix in ("png", "svg")
     }
+
+
+def test_no_name_and_no_number_is_cut_on_a_terminal_of_80_columns(bag: Path) -> None:
+    shown = CliRunner().invoke(main, ["report", str(bag), "--no-pictures"], env={"COLUMNS": "80"}).output
+    assert "\N{HORIZONTAL ELLIPSIS}" not in shown
+    for machine in MACHINES:  # bottles, time, efficiency, failures, reasons, longest stops
+        assert len({line for line in shown.splitlines() if line.startswith(f"  {machine} ")}) >= 6
+
+
+def test_forced_signals_are_named_and_change_no_figure(bag: Path, tmp_path: Path) -> None:
+    """In the table and on every picture."""
+    name = "machines/capper/blocked"
+    forced = read_production(record(tmp_path / "bag", forced=name))
+    assert tuple(forced.forced) == (name,) and tuple(read_production(bag).forced) == ()
+    assert forced.periods == read_production(bag).periods
+    shown = CliRunner().invoke(main, ["report", str(tmp_path / "bag"), "--out", str(tmp_path)], catch_exceptions=False)
+    assert f"forced      {name}" in shown.output
+    pictures = [path for path in tmp_path.iterdir() if path.suffix == ".svg"]
+    assert len(pictures) == 3 and all("forced: " in path.read_text() for path in pictures)
 
 
 def test_the_same_report_gives_the_same_pictures(bag: Path, tmp_path: Path) -> None:

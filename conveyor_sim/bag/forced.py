@@ -1,0 +1,20 @@
+"""Which signals were forced in a recording."""
+
+from __future__ import annotations
+
+from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.line.inputs import FORCE
+from conveyor_sim.support.printable import printable
+
+
+def forced_signals(bag: Bag) -> tuple[str, ...]:
+    """Names of those that were forced at any time, in the order in which they were."""
+    names: dict[str, None] = {}
+    for frame in bag.messages("signals"):  # those of a checkpoint from which it began
+        names.update((bag.line.signal_names[place], None) for place in to_image(frame.data).forced)
+        break
+    for outcome in bag.outcomes():
+        if outcome.data.accepted and outcome.data.operation == FORCE:
+            names.update(dict.fromkeys(outcome.data.names))
+    return tuple(printable(name) for name in names)
