@@ -31,6 +31,12 @@ class Settings:
     """In which Modbus clients write; None: they may not."""
     modbus_map: Path | None = None
     """File that keeps the map of addresses; None: made of the tags, and not kept."""
+    opcua_users: Path | None = None
+    """File of those who may do more than read; None: nobody may."""
+    opcua_anonymous: bool = True
+    """Whether clients that give no name may read."""
+    opcua_certificates: Path | None = None
+    """Folder of the server's certificate and key; None: that of this user."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 from conveyor_sim.scada.face import Face, FaceError, Settings
-from conveyor_sim.scada.source import MODBUS, TagSource
+from conveyor_sim.scada.source import MODBUS, OPCUA, TagSource
 
 
 @dataclass(frozen=True)
@@ -51,4 +51,27 @@ def _modbus_exposes(settings: Settings) -> str:
     return f"read all, and write as {settings.modbus_role}, for Modbus asks nobody who they are"
 
 
-FACES: tuple[Kind, ...] = (Kind(MODBUS, 5020, "pymodbus", _modbus, _modbus_exposes),)
+def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
+    from conveyor_sim.scada.opcua.server import OpcUaServer
+    from conveyor_sim.scada.opcua.users import read_users
+
+    return OpcUaServer(
+        source,
+        {} if settings.opcua_users is None else read_users(settings.opcua_users),
+        anonymous=settings.opcua_anonymous,
+        stamps=settings.stamps,
+        certificates=settings.opcua_certificates,
+        host=settings.host,
+        port=port,
+    )
+
+
+def _opcua_exposes(settings: Settings) -> str:
+    readers = "read all" if settings.opcua_anonymous else "read nothing without a name and password"
+    return f"{readers}, and write only as one of the users" if settings.opcua_users else f"{readers}, and write nothing"
+
+
+FACES: tuple[Kind, ...] = (
+    Kind(OPCUA, 4840, "asyncua", _opcua, _opcua_exposes),
+    Kind(MODBUS, 5020, "pymodbus", _modbus, _modbus_exposes),
+)

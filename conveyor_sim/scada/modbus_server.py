@@ -20,11 +20,11 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status
+from conveyor_sim.scada.hands import objection
 from conveyor_sim.scada.modbus_map import Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
 
@@ -188,15 +188,16 @@ class _Image:
             words, address = words[row.words :], address + row.words
         if refusal(self._commands, "command", names, numbers):
             return ExcCodes.ILLEGAL_VALUE
-        if not all(self._in_control(name) for name in names):
+        writer = f"{MODBUS} {_client.get()}"
+        if not all(self._in_control(name, writer) for name in names):
             return ExcCodes.DEVICE_BUSY
-        given = Input(MODBUS, f"{MODBUS} {_client.get()}", self._role, SET, tuple(names), tuple(numbers))
+        given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
         return ExcCodes.DEVICE_BUSY if self._source.give(given) else None
 
-    def _in_control(self, name: str) -> bool:
-        """Whether the device of a command takes it from this role, as the line was last; the line itself decides."""
-        mode = self._source.shown.values.get(f"{self._commands[name].device}/mode", AUTOMATIC)
-        return self._role in IN_CONTROL[int(mode)]
+    def _in_control(self, name: str, writer: str) -> bool:
+        """Whether the device of a command takes it, as the line was last; the line itself decides."""
+        source, device = self._source, self._commands[name].device
+        return self._role is not None and not objection(source.shown, device, source.about.where, self._role, writer)
 
 
 def _require_free(host: str, port: int) -> None:

@@ -1,0 +1,22 @@
+"""In whose hands a device is, as a face sees it at once: the line itself decides at the tick."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES
+from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.source import Shown
+
+
+def objection(shown: Shown, device: str, where: str, kind: WriterKind, writer: str) -> str:
+    """Why a device takes no command from a writer, as the line was last; "" if it does. where: the line's place."""
+    mode = int(shown.values.get(f"{device}/mode", AUTOMATIC))
+    if kind not in IN_CONTROL[mode]:
+        return f"{device}: is in {MODES[mode]}"
+    if kind != "controller" or shown.owner in ("", writer):
+        return ""
+    names = (device, f"{where}/{device}")
+    if any(fnmatchcase(name, pattern) for name in names for pattern in shown.released):
+        return ""
+    return f"{device}: the line is owned by controller {shown.owner}"

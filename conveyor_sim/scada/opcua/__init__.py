@@ -1,0 +1,1 @@
+"""A line as an OPC UA server: `OpcUaServer`, its nodes, its users, and what they may do."""

@@ -1,0 +1,166 @@
+"""`Nodes`: makes the nodes of a line, with ids that are made of names and stay what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from asyncua import ua
+from asyncua.server.internal_server import InternalServer
+
+NAMESPACE = "urn:conveyor_sim:line"
+"""Of all that is here."""
+
+INDEX = 2
+"""Of this namespace, always: clients keep it, with the ids."""
+
+LINE = "line"
+"""Id of the object that stands for the line."""
+
+READ, READ_AND_WRITE = 1, 3
+"""AccessLevel."""
+
+
+def node_id(name: str) -> ua.NodeId:
+    """Of a tag, a device, or whatever else has a name here: `ns=2;s=belts/feeder/speed`."""
+    return ua.NodeId(name, INDEX, ua.NodeIdType.String)
+
+
+class Nodes:
+    """The address space, to be added to."""
+
+    def __init__(self, server: InternalServer) -> None:
+        """Of a server that has the standard's nodes."""
+        self._server = server
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a node of this name."""
+        return node_id(name) in self._server.aspace
+
+    def folder(self, name: str, shown: str, parent: ua.NodeId) -> ua.NodeId:
+        """An object that holds others."""
+        attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(shown))
+        return self._add(
+            name, shown, parent, ua.ObjectIds.Organizes, ua.NodeClass.Object, ua.ObjectIds.FolderType, attributes
+        )
+
+    def object(self, name: str, shown: str, parent: ua.NodeId, description: str) -> ua.NodeId:
+        """An object with variables and methods."""
+        attributes = ua.ObjectAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(description))
+        return self._add(
+            name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Object, ua.ObjectIds.BaseObjectType, attributes
+        )
+
+    def variable(
+        self,
+        name: str,
+        shown: str,
+        parent: ua.NodeId,
+        value: ua.Variant,
+        description: str,
+        type_id: int = ua.ObjectIds.BaseDataVariableType,
+        access: int = READ,
+    ) -> ua.NodeId:
+        """A variable with the first value that it has."""
+        attributes = _variable(shown, description, value, ua.NodeId(value.VariantType.value), access)
+        return self._add(name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Variable, type_id, attributes)
+
+    def property(
+        self, name: str, parent: ua.NodeId, value: Any, data_type: int, kind: ua.VariantType, index: int = 0
+    ) -> ua.NodeId:
+        """A property `name`, below its parent by its browse name. index: namespace of that; 0: the standard's."""
+        browse = name.rpartition("/")[2]
+        variant = ua.Variant(value, kind, is_array=isinstance(value, list))
+        attributes = _variable(browse, browse, variant, ua.NodeId(data_type), READ)
+        return self._add(
+            name,
+            browse,
+            parent,
+            ua.ObjectIds.HasProperty,
+            ua.NodeClass.Variable,
+            ua.ObjectIds.PropertyType,
+            attributes,
+            index,
+        )
+
+    def method(self, name: str, parent: ua.NodeId, description: str, arguments: Sequence[ua.Argument]) -> ua.NodeId:
+        """A method; whose calls the session handles."""
+        shown = name.rpartition("/")[2]
+        attributes = ua.MethodAttributes(
+            DisplayName=ua.LocalizedText(shown),
+            Description=ua.LocalizedText(description),
+            Executable=True,
+            UserExecutable=True,
+        )
+        method = self._add(
+            name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Method, ua.ObjectIds.Null, attributes
+        )
+        if arguments:
+            self.property(
+                f"{name}/InputArguments",
+                method,
+                list(arguments),
+                ua.ObjectIds.Argument,
+                ua.VariantType.ExtensionObject,
+            )
+        return method
+
+    def event_type(self, name: str, shown: str, base: int, fields: Sequence[tuple[str, ua.VariantType]]) -> ua.NodeId:
+        """A type of events, with properties beside those of its base."""
+        attributes = ua.ObjectTypeAttributes(DisplayName=ua.LocalizedText(shown), Description=ua.LocalizedText(shown))
+        made = self._add(
+            name,
+            shown,
+            ua.NodeId(base),
+            ua.ObjectIds.HasSubtype,
+            ua.NodeClass.ObjectType,
+            ua.ObjectIds.Null,
+            attributes,
+        )
+        for field, kind in fields:
+            self.property(f"{name}/{field}", made, None, kind.value, kind, INDEX)
+        return made
+
+    def refer(self, source: ua.NodeId, target: ua.NodeId, kind: int, target_class: ua.NodeClass) -> None:
+        """Have one node refer to another."""
+        item = ua.AddReferencesItem(source, ua.NodeId(kind), True, "", target, target_class)
+        for result in self._server.node_mgt_service.add_references([item]):
+            result.check()
+
+    def _add(
+        self,
+        name: str,
+        shown: str,
+        parent: ua.NodeId,
+        reference: int,
+        node_class: ua.NodeClass,
+        type_id: int,
+        attributes: Any,
+        index: int = INDEX,
+    ) -> ua.NodeId:
+        item = ua.AddNodesItem(
+            ParentNodeId=parent,
+            ReferenceTypeId=ua.NodeId(reference),
+            RequestedNewNodeId=node_id(name),
+            BrowseName=ua.QualifiedName(shown, index),
+            NodeClass=node_class,
+            NodeAttributes=attributes,
+            TypeDefinition=ua.NodeId(type_id),
+        )
+        (result,) = self._server.node_mgt_service.add_nodes([item])
+        result.StatusCode.check()
+        return node_id(name)
+
+
+def _variable(
+    shown: str, description: str, value: ua.Variant, data_type: ua.NodeId, access: int
+) -> ua.VariableAttributes:
+    return ua.VariableAttributes(
+        DisplayName=ua.LocalizedText(shown),
+        Description=ua.LocalizedText(description),
+        Value=value,
+        DataType=data_type,
+        ValueRank=ua.ValueRank.OneDimension if value.is_array else ua.ValueRank.Scalar,
+        AccessLevel=access,
+        UserAccessLevel=access,
+    )

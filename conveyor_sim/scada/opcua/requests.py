@@ -1,0 +1,175 @@
+"""`Requests`: what clients want of a line, judged at once as far as that is possible, and handed to its source.
+
+Nothing here waits for a tick. What the line makes of it then is in the read-back of each command, and in events.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from asyncua import ua
+from asyncua.crypto.permission_rules import User, UserRole
+
+from conveyor_sim.line.authority import MAY
+from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.inputs import SET, Input, WriterKind
+from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
+from conveyor_sim.line.tag import COMMANDS, Tag
+from conveyor_sim.scada.hands import objection
+from conveyor_sim.scada.opcua.nodes import INDEX
+from conveyor_sim.scada.opcua.values import type_of
+from conveyor_sim.scada.source import OPCUA, Control, TagSource
+
+Codes = ua.StatusCodes
+
+TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
+"""States of a run in which nothing that is given would ever act."""
+
+MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
+"""Who may pause a run, have it go on, and so on."""
+
+
+@dataclass
+class Client(User):
+    """Whoever is behind a session."""
+
+    kind: WriterKind | None = None
+    """None: only reads."""
+
+    @property
+    def writer(self) -> str:
+        """As inputs are recorded."""
+        return f"{OPCUA} {self.name}"
+
+
+def reader(name: str = "") -> Client:
+    """One who only reads."""
+    return Client(UserRole.User, name)
+
+
+class Requests:
+    """Of all clients of one source."""
+
+    def __init__(self, source: TagSource) -> None:
+        self._source = source
+        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self.writes = self.refused = 0
+        """Requests that were passed on to the line, and those that were not."""
+
+    def write(self, client: User, values: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+        """What becomes of each. Those that can be given are given together, as one input."""
+        codes: list[int] = []
+        together: dict[str, float] = {}
+        places: list[int] = []
+        for place, value in enumerate(values):
+            name = name_of(value.NodeId)
+            code, number = self._judge(client, value)
+            if name in together:
+                self._flush(client, together, places, codes)
+            if code == Codes.Good:
+                together[name] = number
+                places.append(place)
+            codes.append(code)
+        self._flush(client, together, places, codes)
+        self.writes += (given := codes.count(Codes.GoodCompletesAsynchronously))
+        self.refused += len(codes) - given
+        return [ua.StatusCode(code) for code in codes]
+
+    def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
+        """Give commands as one input, all or none; a status code. Names are of commands, each once."""
+        tags = [self._commands[name] for name in names]
+        codes = [self._judge_number(client, tag, value) for tag, value in zip(tags, values, strict=True)]
+        bad = next((code for code in codes if code != Codes.Good), None)
+        code = self._give(client, SET, tuple(names), tuple(values), ()) if bad is None else bad
+        self._count(code)
+        return code
+
+    def operate(
+        self,
+        client: User,
+        operation: str,
+        names: tuple[str, ...] = (),
+        values: tuple[float, ...] = (),
+        texts: tuple[str, ...] = (),
+    ) -> int:
+        """Give the line something to do; a status code. Arguments were checked."""
+        code = self._give(client, operation, names, values, texts)
+        self._count(code)
+        return code
+
+    def control(self, client: User, what: Control, value: float) -> int:
+        """Ask something of the run; a status code."""
+        if _kind(client) not in MAY_CONTROL:
+            code = int(Codes.BadUserAccessDenied)
+        elif what not in self._source.controls:
+            code = int(Codes.BadNotSupported)
+        else:
+            refused = self._source.control(what, value, f"{_kind(client)} {_writer(client)}")
+            code = int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
+        self._count(code)
+        return code
+
+    def may(self, client: User, operation: str) -> bool:
+        """Whether this client may ever do that."""
+        return operation in MAY and _kind(client) in MAY[operation].writers
+
+    def _count(self, code: int) -> None:
+        good = code == Codes.GoodCompletesAsynchronously
+        self.writes, self.refused = self.writes + good, self.refused + (not good)
+
+    def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
+        """Whether a value can be given, and as what number."""
+        if not self.may(client, SET):
+            return Codes.BadUserAccessDenied, 0.0
+        tag = self._commands.get(name_of(value.NodeId))
+        if tag is None or value.AttributeId != ua.AttributeIds.Value:
+            return Codes.BadNotWritable, 0.0
+        if value.IndexRange:
+            return Codes.BadIndexRangeInvalid, 0.0
+        variant = value.Value.Value
+        if variant is None or variant.VariantType is not type_of(tag) or isinstance(variant.Value, list):
+            return Codes.BadTypeMismatch, 0.0
+        number = float(variant.Value)
+        return self._judge_number(client, tag, number), number
+
+    def _judge_number(self, client: User, tag: Tag, number: float) -> int:
+        if refusal(self._commands, "command", [tag.name], [number]):
+            return Codes.BadOutOfRange
+        kind = _kind(client)
+        if kind is None or objection(self._source.shown, tag.device, self._source.about.where, kind, _writer(client)):
+            return Codes.BadInvalidState
+        return Codes.Good
+
+    def _flush(self, client: User, together: dict[str, float], places: list[int], codes: list[int]) -> None:
+        if together:
+            code = self._give(client, SET, tuple(together), tuple(together.values()), ())
+            for place in places:
+                codes[place] = code
+        together.clear()
+        places.clear()
+
+    def _give(
+        self, client: User, operation: str, names: tuple[str, ...], values: tuple[float, ...], texts: tuple[str, ...]
+    ) -> int:
+        kind = _kind(client)
+        if kind is None or not self.may(client, operation):
+            return Codes.BadUserAccessDenied
+        shown = self._source.shown
+        if shown.lost or shown.run.state in TAKES_NO_INPUT:
+            return Codes.BadInvalidState
+        given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
+        return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
+
+
+def name_of(node: ua.NodeId) -> str:
+    """What a node's id names; empty if it is not of a line."""
+    return node.Identifier if node.NamespaceIndex == INDEX and isinstance(node.Identifier, str) else ""
+
+
+def _kind(client: User) -> WriterKind | None:
+    return client.kind if isinstance(client, Client) else None
+
+
+def _writer(client: User) -> str:
+    return client.writer if isinstance(client, Client) else OPCUA

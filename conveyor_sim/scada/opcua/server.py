@@ -1,0 +1,151 @@
+"""`OpcUaServer`: a line as an OPC UA server, by names that stay."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from asyncua import ua
+from asyncua.common.utils import ServiceError
+from asyncua.crypto import uacrypto
+from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
+
+from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status
+from conveyor_sim.scada.opcua.certificates import default_folder, identity
+from conveyor_sim.scada.opcua.methods import Methods, add_methods
+from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
+from conveyor_sim.scada.opcua.requests import Client, Requests, reader
+from conveyor_sim.scada.opcua.session import SafeServer
+from conveyor_sim.scada.opcua.transport import BoundedServer
+from conveyor_sim.scada.opcua.tree import add_line
+from conveyor_sim.scada.opcua.updates import Updates
+from conveyor_sim.scada.opcua.users import User, authenticate
+from conveyor_sim.scada.opcua.values import Clock
+from conveyor_sim.scada.source import TagSource
+
+POLICIES = [
+    ua.SecurityPolicyType.NoSecurity,
+    ua.SecurityPolicyType.Basic256Sha256_Sign,
+    ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+    ua.SecurityPolicyType.Aes128Sha256RsaOaep_SignAndEncrypt,
+    ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
+]
+
+
+class OpcUaServer:
+    """Serves one source: a Face."""
+
+    def __init__(
+        self,
+        source: TagSource,
+        users: Mapping[str, User] | None = None,
+        *,
+        anonymous: bool = True,
+        stamps: Stamps = "wall",
+        certificates: Path | None = None,
+        host: str = HERE,
+        port: int = 0,
+    ) -> None:
+        """users: who may do more than read, by name. anonymous: whether those who give no name may read.
+        stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
+        port: 0 for any that is free.
+        """
+        self._source, self._users, self._anonymous, self._stamps = source, dict(users or {}), anonymous, stamps
+        self._certificates = certificates
+        self._at = host, port
+        self._requests = Requests(source)
+        self._server: BoundedServer | None = None
+        self._updates: asyncio.Task[None] | None = None
+
+    @property
+    def port(self) -> int:
+        """On which it listens. RuntimeError before `start`."""
+        if self._server is None or self._server.bserver is None:
+            raise RuntimeError("the server was not started")
+        return self._server.bserver.port
+
+    @property
+    def address(self) -> str:
+        """Where clients find it."""
+        host, port = self._at
+        return f"opc.tcp://{host}:{port if self._server is None else self.port}"
+
+    def status(self) -> Status:
+        """Connections, monitored items; writes and calls that were passed on, and those that were refused."""
+        server, requests = self._server, self._requests
+        if server is None or server.bserver is None:
+            return Status(0, 0, requests.writes, requests.refused, 0.0)
+        longest, server.longest[0] = server.longest[0], 0.0
+        subscriptions = server.iserver.subscription_service.subscriptions.values()
+        items = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
+        return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest)
+
+    async def start(self) -> None:
+        """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""
+        for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+        host, port = self._at
+        own = identity(self._certificates or default_folder())
+        internal = SafeServer(self)
+        server = BoundedServer(internal)
+        server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
+        server._application_uri = own.application_uri
+        server.application_type = ua.ApplicationType.Server
+        internal.bind_condition_methods = 1
+        await server.init()
+        await server.load_certificate(own.certificate, "der")
+        await server.load_private_key(own.key, format="pem")
+        server.set_endpoint(f"opc.tcp://{host}:{port}")
+        server.set_security_policy(POLICIES, SimpleRoleRuleset())
+        tokens = [ua.UserNameIdentityToken, *([ua.AnonymousIdentityToken] if self._anonymous else [])]
+        server.set_identity_tokens(tokens)
+        if own.trusted:
+            internal.certificate_validator = _Trusted(own.trusted)
+        if await server.register_namespace(NAMESPACE) != INDEX:
+            raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
+        nodes = Nodes(internal)
+        add_line(nodes, self._source.about)
+        add_methods(nodes, self._source)
+        internal.requests, internal.methods = self._requests, Methods(self._source, self._requests)
+        updates = Updates(self._source, internal, Clock(self._source.about, self._stamps))
+        await updates.bring_present()
+        try:
+            await server.listen(host, port)
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise FaceError(f"opcua: {host}:{port} can't be listened on ({reason}), expected a free port") from error
+        self._server = server
+        self._updates = asyncio.create_task(updates.run())
+
+    async def stop(self) -> None:
+        """End all sessions and connections."""
+        server, self._server = self._server, None
+        updates, self._updates = self._updates, None
+        if updates is not None:
+            updates.cancel()
+            await asyncio.gather(updates, return_exceptions=True)
+        if server is not None:
+            await server.stop()
+
+    def get_user(
+        self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None
+    ) -> Client | None:
+        """Who begins a session; None: nobody who may. Called by the library."""
+        if username is None:
+            return reader() if self._anonymous else None
+        user = authenticate(self._users, username, password or "")
+        return None if user is None else Client(UserRole.User, username, user.kind)
+
+
+class _Trusted:
+    """Lets certificates in that are in the folder."""
+
+    def __init__(self, known: frozenset[bytes]) -> None:
+        self._known = known
+
+    async def __call__(self, certificate: Any, _: ua.ApplicationDescription) -> None:
+        if uacrypto.der_from_x509(certificate) not in self._known:
+            raise ServiceError(ua.StatusCodes.BadCertificateUntrusted)

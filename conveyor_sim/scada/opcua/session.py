@@ -1,0 +1,158 @@
+"""What a client can do in its session: read, browse, subscribe; write and call as its user may; nothing else.
+
+The library lets whoever is let in write all variables that are not read-only, call all methods, and as "admin" change
+the address space. Here no write and no call reaches it, but the two that send conditions again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from struct import error as StructError
+from struct import unpack_from
+from typing import Any
+
+from asyncua import ua
+from asyncua.common.utils import ServiceError
+from asyncua.crypto import uacrypto
+from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.server.internal_server import InternalServer
+from asyncua.server.internal_session import InternalSession
+
+from conveyor_sim.line.inputs import SET
+from conveyor_sim.scada.opcua.methods import Methods
+from conveyor_sim.scada.opcua.nodes import READ, READ_AND_WRITE
+from conveyor_sim.scada.opcua.requests import Codes, Requests
+from conveyor_sim.scada.opcua.transport import channel
+
+MOST_ITEMS = 20_000
+"""Monitored items of all sessions; more are refused."""
+
+REFRESH = {
+    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
+    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh2),
+}
+
+_DECRYPTED = {
+    "http://www.w3.org/2001/04/xmlenc#rsa-oaep": uacrypto.decrypt_rsa_oaep,
+    "http://opcfoundation.org/UA/security/rsa-oaep-sha2-256": uacrypto.decrypt_rsa_oaep_sha256,
+}
+
+
+_NOBODY = User(role=UserRole.Anonymous)
+
+
+class SafeServer(InternalServer):
+    """The library's server with sessions of this kind."""
+
+    def __init__(self, user_manager: Any) -> None:
+        super().__init__(user_manager)
+        self.requests: Requests | None = None
+        self.methods: Methods | None = None
+
+    def create_session(self, name: str, user: User = _NOBODY, external: bool = False) -> InternalSession:
+        """One a connection: the library would keep those before it for ever."""
+        if not external:
+            return super().create_session(name, user, external)
+        connection = channel.get()
+        if connection is not None and connection.has_session:
+            raise ServiceError(Codes.BadTooManySessions)
+        return Session(self, self.aspace, self.subscription_service, name, user=user, external=external)
+
+    def register_server(self, *_: Any) -> None:
+        """This is no discovery server; the library asks nobody who they are for this."""
+        raise ServiceError(Codes.BadServiceUnsupported)
+
+    def register_server2(self, *_: Any) -> None:
+        """As `register_server`."""
+        raise ServiceError(Codes.BadServiceUnsupported)
+
+    def decrypt_user_token(self, isession: Any, token: ua.UserNameIdentityToken) -> tuple[str, str]:
+        """Name and password, which came encrypted, by itself or by the channel; a token that was heard is no use.
+
+        OPC 10000-4, 7.41.2.3.
+        """
+        name, secret = token.UserName or "", token.Password or b""
+        secret = secret.encode() if isinstance(secret, str) else secret
+        if not token.EncryptionAlgorithm:
+            connection = channel.get()
+            if connection is None or not connection.encrypts:
+                raise ServiceError(Codes.BadSecurityModeInsufficient)
+            return name, secret.decode()
+        decrypt = _DECRYPTED.get(token.EncryptionAlgorithm)
+        if decrypt is None:
+            raise ServiceError(Codes.BadIdentityTokenInvalid)
+        try:
+            plain = decrypt(self.private_key, secret)
+            (length,) = unpack_from("<I", plain)
+        except (ValueError, StructError) as error:
+            raise ServiceError(Codes.BadIdentityTokenInvalid) from error
+        nonce = isession.nonce or b""
+        content = plain[4 : 4 + length]
+        if len(content) != length or not nonce or not content.endswith(nonce):
+            raise ServiceError(Codes.BadIdentityTokenInvalid)
+        return name, content[: -len(nonce)].decode()
+
+
+class Session(InternalSession):
+    """Of one client."""
+
+    iserver: SafeServer
+
+    async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
+        """Commands, as `Requests.write` has it."""
+        if self.iserver.requests is None:
+            raise ServiceError(Codes.BadServerHalted)
+        return self.iserver.requests.write(self.user, params.NodesToWrite or [])
+
+    async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+        """Methods of this package; and those of the library that send conditions again."""
+        if self.iserver.methods is None:
+            raise ServiceError(Codes.BadServerHalted)
+        results = []
+        for request in params or []:
+            result = self.iserver.methods.call(self.user, request)
+            if result is None and request.MethodId in REFRESH:
+                (result,) = await super().call([request])
+            results.append(result or ua.CallMethodResult(ua.StatusCode(Codes.BadMethodInvalid), [], [], []))
+        return results
+
+    async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
+        """With UserAccessLevel as it is for this user."""
+        results = await super().read(params)
+        requests = self.iserver.requests
+        if requests is not None and not requests.may(self.user, SET):
+            for place, asked in enumerate(params.NodesToRead):
+                value = results[place].Value
+                if asked.AttributeId == ua.AttributeIds.UserAccessLevel and value and value.Value == READ_AND_WRITE:
+                    results[place] = replace(results[place], Value=ua.Variant(READ, ua.VariantType.Byte))
+        return results
+
+    async def create_monitored_items(
+        self, params: ua.CreateMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemCreateResult]:
+        """A bounded number of them."""
+        subscriptions = self.subscription_service.subscriptions.values()
+        there = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
+        if there + len(params.ItemsToCreate or []) > MOST_ITEMS:
+            raise ServiceError(Codes.BadTooManyMonitoredItems)
+        return await super().create_monitored_items(params)
+
+    async def history_update(self, params: ua.HistoryUpdateParameters) -> list[ua.HistoryUpdateResult]:
+        """Refused."""
+        raise ServiceError(Codes.BadUserAccessDenied)
+
+    async def add_nodes(self, params: list[ua.AddNodesItem]) -> list[ua.AddNodesResult]:
+        """Refused."""
+        raise ServiceError(Codes.BadUserAccessDenied)
+
+    async def delete_nodes(self, params: ua.DeleteNodesParameters) -> list[ua.StatusCode]:
+        """Refused."""
+        raise ServiceError(Codes.BadUserAccessDenied)
+
+    async def add_references(self, params: list[ua.AddReferencesItem]) -> list[ua.StatusCode]:
+        """Refused."""
+        raise ServiceError(Codes.BadUserAccessDenied)
+
+    async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
+        """Refused."""
+        raise ServiceError(Codes.BadUserAccessDenied)

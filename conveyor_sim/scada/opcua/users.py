@@ -1,0 +1,109 @@
+"""Who may do what over OPC UA: a file with a line for each user, and passwords that are checked against it.
+
+    jo:operator:scrypt:<salt>:<hash>
+
+Salt and hash are in base 64; the hash is scrypt's (RFC 7914), so a password can't be read from the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+import re
+from base64 import b64decode, b64encode
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal, NamedTuple, get_args
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.printable import printable
+
+Role = Literal["viewer", "operator", "engineer", "controller", "test"]
+"""A viewer only reads; the others may do what docs/line.md says of them."""
+
+ROLES: tuple[Role, ...] = get_args(Role)
+
+_NAME = re.compile(r"[A-Za-z0-9_.-]{1,40}")
+_METHOD = "scrypt"
+_BYTES = 32
+_LONGEST_PASSWORD = 200
+
+
+class UsersError(ConveyorError):
+    """A file of users that can't be read, or a user that can't be: file, line, what was given and expected."""
+
+
+class User(NamedTuple):
+    """One of them."""
+
+    role: Role
+    salt: bytes
+    hash: bytes
+
+    @property
+    def kind(self) -> WriterKind | None:
+        """As what they act on a line; None: they don't."""
+        return None if self.role == "viewer" else self.role
+
+
+def new_user(role: Role, password: str) -> User:
+    """A user with a password of at least one character."""
+    if not 1 <= len(password) <= _LONGEST_PASSWORD:
+        raise UsersError(f"password: {len(password)} characters given, expected 1 to {_LONGEST_PASSWORD}")
+    salt = os.urandom(16)
+    return User(role, salt, _hash(password, salt))
+
+
+def line_of(name: str, user: User) -> str:
+    """The line of the file. Raises UsersError for a name that can't be."""
+    if not _NAME.fullmatch(name):
+        raise UsersError(f"name: {printable(name)} given, expected 1 to 40 letters, digits, or any of _ . -")
+    return f"{name}:{user.role}:{_METHOD}:{b64encode(user.salt).decode()}:{b64encode(user.hash).decode()}"
+
+
+def read_users(path: Path) -> dict[str, User]:
+    """Users by name. Empty lines, and those that begin with #, count for nothing. Raises UsersError."""
+    try:
+        text = read_file(path, MB).decode()
+    except FileError as error:
+        raise UsersError(f"{path}: {error}, expected a file of users") from error
+    except UnicodeDecodeError as error:
+        raise UsersError(f"{path}: is not UTF-8, expected a file of users") from error
+    users: dict[str, User] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        where = f"{path}: line {number}"
+        cells = line.strip().split(":")
+        if len(cells) != 5 or not _NAME.fullmatch(cells[0]) or cells[2] != _METHOD:
+            raise UsersError(f"{where}: expected name:role:{_METHOD}:salt:hash, as `conveyor-sim user` writes it")
+        name, role, _, salt, hashed = cells
+        if role not in ROLES:
+            raise UsersError(f"{where}: role {printable(role)} given, expected one of {', '.join(ROLES)}")
+        if name in users:
+            raise UsersError(f"{where}: {name} given twice")
+        try:
+            user = User(role, b64decode(salt, validate=True), b64decode(hashed, validate=True))
+        except ValueError:
+            user = User(role, b"", b"")
+        if not user.salt or len(user.hash) != _BYTES:
+            raise UsersError(f"{where}: salt and hash of {name} can't be read, as `conveyor-sim user` writes them")
+        users[name] = user
+    return users
+
+
+def authenticate(users: Mapping[str, User], name: str, password: str) -> User | None:
+    """The user of this name, if that is the password. It takes as long whether there is such a user or not."""
+    user = users.get(name, _NOBODY)
+    given = _hash(password[: _LONGEST_PASSWORD + 1], user.salt)
+    return user if hmac.compare_digest(given, user.hash) and user is not _NOBODY else None
+
+
+def _hash(password: str, salt: bytes) -> bytes:
+    return hashlib.scrypt(password.encode(errors="surrogatepass"), salt=salt, n=2**14, r=8, p=1, dklen=_BYTES)
+
+
+_NOBODY = User("viewer", b"\0" * 16, b"\0" * _BYTES)
