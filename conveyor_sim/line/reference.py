@@ -6,6 +6,7 @@ from conveyor_sim.line.authority import MAY
 from conveyor_sim.line.inputs import WRITER_KINDS
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.line.weihenstephan import DATA_POINTS
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.parts.alarm import PREFIX
 
@@ -69,7 +70,7 @@ def tables() -> dict[str, str]:
         section: "\n".join(_rows([tag for tag in tags if tag.name.split("/")[0] in fields]))
         for section, fields in SECTIONS.items()
     }
-    return {"authority": "\n".join(_rights()), **sections}
+    return {"authority": "\n".join(_rights()), "weihenstephan": "\n".join(_data_points()), **sections}
 
 
 def _rights() -> Iterator[str]:
@@ -78,6 +79,13 @@ def _rights() -> Iterator[str]:
     yield "|---|" + "---|" * len(kinds) + "---|"
     for operation, right in MAY.items():
         yield f"| `{operation}` | {' | '.join('yes' * (kind in right.writers) for kind in kinds)} | {right.what} |"
+
+
+def _data_points() -> Iterator[str]:
+    yield "| data point | number | tags | what |"
+    yield "|---|---|---|---|"
+    for name, point in DATA_POINTS.items():
+        yield f"| `{name}` | {point.number} | {', '.join(f'`{tag}`' for tag in point.tags)} | {point.what} |"
 
 
 def _rows(tags: list[Tag]) -> Iterator[str]:

@@ -12,10 +12,11 @@ from rich.table import Table
 
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.tag import MOST_COUNT, Tag
+from conveyor_sim.line.weihenstephan import names_of
 from conveyor_sim.scene import Scene
 
 NONE = "-"
-"""Of what a tag can't have: a rate it is designed for, texts of what is no enumeration."""
+"""Of what a tag can't have: a rate it is designed for, texts of what is no enumeration, a name elsewhere."""
 
 
 class Row(NamedTuple):
@@ -37,6 +38,8 @@ class Row(NamedTuple):
     device: str
     device_class: str
     description: str
+    weihenstephan: str
+    """Data points of the Weihenstephan Standards that are made from it."""
 
 
 def tag_rows(scene: Scene) -> list[Row]:
@@ -60,6 +63,7 @@ def _row(tag: Tag, where: str) -> Row:
         tag.device,
         tag.device_class,
         tag.description,
+        ", ".join(names_of(tag)) or NONE,
     )
 
 
