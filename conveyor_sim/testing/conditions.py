@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
 from types import CodeType
 from typing import Any
 
@@ -58,6 +59,22 @@ def text_of(condition: Condition) -> str:
 def _constants(node: ast.Lambda) -> set[object]:
     inner = (part.value for part in ast.walk(node.body) if isinstance(part, ast.Constant))
     return {value for value in inner if isinstance(value, _PLAIN)}
+
+
+@dataclass(frozen=True)
+class Assertion:
+    """A condition that is asserted, from a time on."""
+
+    condition: Condition
+    word: str
+    """always, never, eventually or run_until."""
+    since: float
+    """s"""
+
+    @property
+    def text(self) -> str:
+        """What it says, as the test calls it."""
+        return f"{self.word}({text_of(self.condition)})"
 
 
 def values(

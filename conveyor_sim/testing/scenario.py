@@ -6,59 +6,31 @@ import math
 import uuid
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from conveyor_sim.bag.input_log import InputLog
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
+from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DECLARE, DISOWN, FAULT, INJECT, SET, CommandOutcome, Input
+from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, CommandOutcome, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.scada.source import FACES, TickSource
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.resources import scene_path
-from conveyor_sim.testing.conditions import Condition, Present, text_of, values
+from conveyor_sim.testing.conditions import Assertion, Condition, Present, values
 from conveyor_sim.testing.history import History
 from conveyor_sim.testing.person import Person
-
-if TYPE_CHECKING:
-    from conveyor_sim.ros.attached import AttachedNode
-
-CONTROLLER = "controller"
-"""Source of the attached controller's commands, in the bag's outcomes."""
-
-LOCKSTEP = "lockstep"
-"""The same of an attached node, as `sim_node` has it."""
+from conveyor_sim.testing.scan_cycle import PATIENCE, ScanCycle
 
 TEST = "test"
 """Source of commands that the test itself gives."""
 
-PATIENCE = 60.0
-"""s of wall time that an attached node has for each request."""
-
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True)
-class Assertion:
-    """A condition that is asserted, from a time on."""
-
-    condition: Condition
-    word: str
-    """always, never, eventually or run_until."""
-    since: float
-    """s"""
-
-    @property
-    def text(self) -> str:
-        """What it says, as the test calls it."""
-        return f"{self.word}({text_of(self.condition)})"
 
 
 class Scenario(AbstractContextManager["Scenario"]):
@@ -100,7 +72,6 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.failure = ""
         """What became of it, in words."""
         self._read: dict[str, None] = {}
-        self._scan_read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag)
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
         began = None if start is None else Path(start)
@@ -111,25 +82,20 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._outputs.start()
         self._outputs.show_run(RunState(RUNNING))
         self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
-        self._controller: Controller | None = None
-        self._node: AttachedNode | None = None
-        self._answer: dict[str, float] = {}
+        self._cycle = ScanCycle(self.simulation, self._give)
         self._alarms: dict[str, float] = {}
-        self._changes = AlarmChanges()
         self._standing: list[Assertion] = []
         self._sources: list[TickSource] = []
         self._signals: dict[str, float] = {}
         self._stopped = False  # by the guard
         self._look()
-        # Those of a controller before a checkpoint: one that is attached now and does not have them clears them.
-        self._changes.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in self.simulation.line.alarms if alarm.is_said})
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """End an attached node, and the recording, if there is one; it can't run on then."""
-        self._end_node()
+        self._cycle.close()
         if self._recorder is not None:
             if not self._stopped:
                 self._outputs.show_run(RunState(ENDED))
@@ -161,16 +127,12 @@ class Scenario(AbstractContextManager["Scenario"]):
     @property
     def read_by_controller(self) -> tuple[str, ...]:
         """Names of the signals that the controller has read."""
-        return tuple(self._scan_read)
+        return tuple(self._cycle.read)
 
     def attach(self, controller: Controller) -> None:
         """Have a controller scan at this tick and every one to come, in place of the one before."""
-        self._end_node()
-        self._controller = controller
-        if declared := declared_alarms(controller):
-            ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
-            self._give(Input(CONTROLLER, type(controller).__name__, "controller", DECLARE, ids, (), texts))
-        self._scan(controller)
+        self._cycle.attach(controller)
+        self._scan()
 
     def attach_node(
         self,
@@ -189,16 +151,8 @@ class Scenario(AbstractContextManager["Scenario"]):
         Raises ControlError without ROS 2, or if no request comes, as every later tick does; CommandError, ConveyorError
         and OSError as `AttachedNode`.
         """
-        try:
-            from conveyor_sim.ros.attached import AttachedNode
-        except ImportError as error:
-            raise ControlError(f"a node can't be attached here: {error}; expected ROS 2 and conveyor_msgs") from error
-        self._end_node()
-        self._node = node = AttachedNode(
-            self.simulation, command, namespace=namespace, domain=domain, patience=patience
-        )
-        self._controller = node
-        self._scan(node)
+        self._cycle.attach_node(command, namespace, domain, patience)
+        self._scan()
 
     def source(self) -> TickSource:
         """The line as a SCADA face sees it, from now on. What clients of that give is applied at the next tick.
@@ -302,13 +256,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         __tracebackhide__ = True
         for source in self._sources:
             source.before_tick()
-        if self._answer:
-            names, values = tuple(self._answer), tuple(self._answer.values())
-            if self._node is None:
-                writer = type(self._controller).__name__
-                self.simulation.command(names, values, CONTROLLER, writer=writer)
-            else:
-                self.simulation.command(names, values, LOCKSTEP, writer=self._node.writer)
+        self._cycle.give()
         if self._inputs is not None:
             self._inputs.before_tick()
         try:
@@ -324,8 +272,7 @@ class Scenario(AbstractContextManager["Scenario"]):
             self._inputs.after_tick()
         refused = []
         outcomes = self._outputs.after_tick()
-        if self._node is not None:
-            self._node.note(outcomes)
+        self._cycle.note(outcomes)
         for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
@@ -336,15 +283,10 @@ class Scenario(AbstractContextManager["Scenario"]):
             source.after_tick()
         if refused:
             raise CommandError(f"at {self.time - self.scene.tick:.2f} s a command was refused: {'; '.join(refused)}")
-        if self._controller is not None:
-            self._scan(self._controller)
+        if self._cycle.attached:
+            self._scan()
         for assertion in self._standing:
             self._check(assertion)
-
-    def _end_node(self) -> None:
-        if self._node is not None:
-            self._node.close()
-            self._node = None
 
     def _look(self) -> None:
         """Read the signals of a tick that is reached."""
@@ -356,20 +298,10 @@ class Scenario(AbstractContextManager["Scenario"]):
             self._alarms |= alarms.said()
             self.history.alarms(self._alarms)
 
-    def _scan(self, controller: Controller) -> None:
-        inputs = self._present(self._signals)
-        answer = controller.scan(inputs)
-        if not isinstance(answer, Mapping):
-            raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
-        self._scan_read |= inputs.read
-        alarms = {name: value for name, value in answer.items() if name.startswith(ALARMS)}
-        commands = {name: value for name, value in answer.items() if name not in alarms} if alarms else answer
-        # A node answers what changes only, and nothing between its scans; alarms of a controller before it go.
-        alone = self._node is None
-        changes = self._changes.of(alarms if alone else {})
-        self._answer = {**commands, **changes} if alone else {**changes, **answer}
+    def _scan(self) -> None:
+        said = self._cycle.scan(self._present(self._signals))
         # The line is given them as the next tick begins; until then they are there, and don't stand.
-        if new := {name: 0.0 for name in (*alarms, *changes) if name not in self._alarms}:
+        if new := {name: 0.0 for name in said if name not in self._alarms}:
             self._alarms |= new
             self.history.alarms(new)
 

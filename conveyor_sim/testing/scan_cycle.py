@@ -1,0 +1,101 @@
+"""`ScanCycle`: what controls a line under test: a controller that scans at every tick, or a node that does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
+from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.testing.conditions import Present
+
+if TYPE_CHECKING:
+    from conveyor_sim.ros.attached import AttachedNode
+
+CONTROLLER = "controller"
+"""Source of the attached controller's commands, in the bag's outcomes."""
+
+LOCKSTEP = "lockstep"
+"""The same of an attached node, as `sim_node` has it."""
+
+PATIENCE = 60.0
+"""s of wall time that an attached node has for each request."""
+
+
+class ScanCycle:
+    """One controller or none; what it answers at a tick is given to the line as the next one begins."""
+
+    def __init__(self, simulation: Simulation, give: Callable[[Input], None]) -> None:
+        """give: has the line take an input, or raises CommandError."""
+        self._simulation, self._give = simulation, give
+        self._controller: Controller | None = None
+        self._node: AttachedNode | None = None
+        self._answer: Mapping[str, float] = {}
+        self._changes = AlarmChanges()
+        self.read: dict[str, None] = {}
+        """Names of the signals that were read, in the order of the first reading."""
+        # Those of a controller before a checkpoint: one that is attached now and does not have them clears them.
+        self._changes.of({f"{ALARMS}{alarm.id}": 1.0 for alarm in simulation.line.alarms if alarm.is_said})
+
+    @property
+    def attached(self) -> bool:
+        """Whether anything scans."""
+        return self._controller is not None
+
+    def attach(self, controller: Controller) -> None:
+        """Have a controller scan, in place of what did."""
+        self.close()
+        self._controller = controller
+        if declared := declared_alarms(controller):
+            ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
+            self._give(Input(CONTROLLER, type(controller).__name__, "controller", DECLARE, ids, (), texts))
+
+    def attach_node(self, command: Sequence[str], namespace: str, domain: int | None, patience: float) -> None:
+        """Have a ROS node in lockstep scan, as `Scenario.attach_node` says."""
+        try:
+            from conveyor_sim.ros.attached import AttachedNode
+        except ImportError as error:
+            raise ControlError(f"a node can't be attached here: {error}; expected ROS 2 and conveyor_msgs") from error
+        self.close()
+        self._node = self._controller = AttachedNode(
+            self._simulation, command, namespace=namespace, domain=domain, patience=patience
+        )
+
+    def close(self) -> None:
+        """End the node, if one is attached."""
+        if self._node is not None:
+            self._node.close()
+            self._node = None
+
+    def scan(self, inputs: Present) -> Collection[str]:
+        """One scan; the names of the alarms that it says something of. Raises ControlError for what is no answer."""
+        controller = self._controller
+        assert controller is not None
+        answer = controller.scan(inputs)
+        if not isinstance(answer, Mapping):
+            raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
+        self.read |= inputs.read
+        alarms = {name: value for name, value in answer.items() if name.startswith(ALARMS)}
+        # A node answers what changes only, and nothing between its scans; alarms of a controller before it go.
+        if self._node is not None:
+            changes = self._changes.of({})
+            self._answer = {**changes, **answer}
+        else:
+            changes = self._changes.of(alarms)
+            self._answer = {name: value for name, value in answer.items() if name not in alarms} | changes
+        return (*alarms, *changes)
+
+    def give(self) -> None:
+        """Hand the answer of the last scan over to the line."""
+        if self._answer:
+            names, values = tuple(self._answer), tuple(self._answer.values())
+            if self._node is None:
+                self._simulation.command(names, values, CONTROLLER, writer=type(self._controller).__name__)
+            else:
+                self._simulation.command(names, values, LOCKSTEP, writer=self._node.writer)
+
+    def note(self, outcomes: Sequence[CommandOutcome]) -> None:
+        """What became of inputs at a tick."""
+        if self._node is not None:
+            self._node.note(outcomes)
