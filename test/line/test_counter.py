@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from line.eye_line import across, eye_line, read
-from scenes import bottle
+from scenes import base, belt, bottle, kind, simulation
 
 RUN = "belts/belt/cmd_speed"
 
@@ -69,3 +69,26 @@ def test_ten_bottles_a_tick_are_ten() -> None:
     sim.advance(60)
     assert read(sim, "counters/line/") == {"forward": 10.0, "backward": 0.0}
     assert read(sim, "photo_eyes/eye/")["edges"] == 2.0
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.5])
+@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (1, 30), (12, 9), (40, 40)])
+def test_the_range_of_a_count_is_what_a_region_can_hold(columns: int, rows: int, turned: float) -> None:
+    """Bottles in a hexagonal pattern, the densest there is, with axes on its edge; a belt of that size. A narrow region
+    is said to hold too many, for bottles beside it could use its ground.
+    """
+    radius, edge = 0.03, 1e-6
+    along = 2.0 * radius * (np.arange(columns)[None, :] + 0.5 * (np.arange(rows)[:, None] % 2))
+    across = np.sqrt(3.0) * radius * np.arange(rows)[:, None] + 0.0 * along
+    width, height = float(along.max()) + edge, float(across.max()) + edge
+    corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
+    turn = np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]])
+    sim = simulation(
+        bottle_types={"bottle": kind(radius), "large": kind(0.1)},
+        base=base(0.4),
+        zones={"z": {"region": (corners @ turn).tolist()}},
+        belts={"b": belt(0.0, (0.0, 0.0), width, height)},
+    )
+    most = {tag.name: tag.high for tag in sim.process_image.signals}
+    for name in ("zones/z/bottles", "belts/b/bottles"):
+        assert columns * rows <= most[name] <= 1.7 * columns * rows + 3

@@ -7,10 +7,12 @@ from conveyor_sim.line.alarms.declaration import Declared, error
 from conveyor_sim.line.authority import AUTOMATIC
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.process_image import speed_command
+from conveyor_sim.line.region import most_inside
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.tag import Tag, count, number
 from conveyor_sim.line.watchdog import Watchdog
 from conveyor_sim.scene.belts import CurvedBelt, StraightBelt
+from conveyor_sim.scene.geometry import belt_shape
 
 
 class BeltDevice(Device):
@@ -28,6 +30,7 @@ class BeltDevice(Device):
         short_name = name.rpartition("/")[2]
         setpoint, (low, high) = speed_command(short_name), belt.speed_limits
         reach = (low, high, -low, -high) if backward else (low, high)
+        most = most_inside(belt_shape(short_name, belt).outline(), float(setup.model.type_radius.min()))
         super().__init__(
             name,
             [
@@ -40,7 +43,7 @@ class BeltDevice(Device):
                     max(0.0, *reach),
                     belt.speed,
                 ),
-                count(f"{name}/bottles", "actual", "Bottles whose axis is on the belt."),
+                count(f"{name}/bottles", "actual", "Bottles whose axis is on the belt.", high=most),
                 number(setpoint, "setpoint", "Speed to run at, positive forward.", "m/s", low, high, belt.speed),
                 *more,
             ],

@@ -10,7 +10,7 @@ from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.entry import CLEAR, Quality
 from conveyor_sim.line.setup import BAD, JITTER, Setup
-from conveyor_sim.line.tag import count, switch
+from conveyor_sim.line.tag import MOST_COUNT, count, switch
 from conveyor_sim.scene.parts.infeed import Infeed
 from conveyor_sim.state import State
 
@@ -25,10 +25,11 @@ class InfeedDevice(Device):
     """One infeed while it runs."""
 
     def __init__(self, name: str, infeed: Infeed, setup: Setup) -> None:
+        most = MOST_COUNT if infeed.count is None else infeed.count
         super().__init__(
             name,
             [
-                count(f"{name}/fed", "counter", "Bottles let in.", adds_to="fed"),
+                count(f"{name}/fed", "counter", "Bottles let in.", high=most, adds_to="fed"),
                 switch(f"{name}/blocked", "status", "A bottle is due, and there is no room for it."),
             ],
         )

@@ -16,7 +16,7 @@ class SpillDevice(Device):
         super().__init__(
             name,
             [
-                count(f"{name}/dropped", "counter", "Bottles dropped.", adds_to="fed"),
+                count(f"{name}/dropped", "counter", "Bottles dropped.", high=spill.count, adds_to="fed"),
                 switch(f"{name}/drop", "fault", "As it rises, a bottle is dropped as soon as there is room."),
             ],
         )

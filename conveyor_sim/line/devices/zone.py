@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.region import Region
+from conveyor_sim.line.region import Region, most_inside
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.tag import count, number, switch
 from conveyor_sim.scene.parts.zone import Zone
@@ -25,9 +25,15 @@ class ZoneDevice(Device):
         self._region, self._full_at = Region(zone.region), zone.full_at
         x, y = self._region.corners.T
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
-        densest = max(1.0 / self._area, DENSEST / float(setup.model.type_radius.min()) ** 2)
+        radius = float(setup.model.type_radius.min())
+        densest = max(1.0 / self._area, DENSEST / radius**2)
         tags = [
-            count(f"{name}/bottles", "actual", "Bottles whose axis is in the region."),
+            count(
+                f"{name}/bottles",
+                "actual",
+                "Bottles whose axis is in the region.",
+                high=most_inside(zone.region, radius),
+            ),
             number(f"{name}/density", "actual", "Bottles by the area of the region.", "1/m^2", 0.0, densest),
             count(f"{name}/offset", "fault", "Added to the bottles that it counts.", -MOST_OFFSET, MOST_OFFSET),
         ]
