@@ -8,7 +8,10 @@ line stands after those before it. Watchdogs act after all inputs, devices after
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
+from conveyor_sim.line.alarms.declaration import as_sent
+from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.scene.types import Unchecked
+from conveyor_sim.support.printable import SENTENCE, printable
 
 WriterKind = Literal["controller", "operator", "engineer", "test", "line"]
 """Who acts; "line": the line itself, which replay and rerun bring about again without being given it."""
@@ -113,6 +116,23 @@ class CommandOutcome:
     def values(self) -> tuple[float, ...]:
         """That were given."""
         return self.input.values
+
+
+def as_kept(given: Input) -> Input:
+    """An input as it can be shown, and as a replay will find it: what does not print is escaped, what is too long cut.
+
+    Commands are not: a name that is none of the line's is refused as it is.
+    """
+    source, writer, kind, operation, names, values, texts = given
+    # Whoever names an alarm makes it up.
+    alarms = operation not in (SET, INJECT)
+    kept = tuple([printable(name) if alarms or name.startswith(PREFIX) else name for name in names])
+    numbers = tuple([float(value) for value in values])
+    if texts:
+        texts = tuple(as_sent(text) if operation == DECLARE else printable(text, SENTENCE) for text in texts)
+    source = printable(source)
+    writer = source if writer == source else printable(writer)
+    return Input(source, writer, printable(kind), printable(operation), kept, numbers, texts)
 
 
 def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...]) -> Input:

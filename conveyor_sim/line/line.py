@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.line.alarms.alarms import Alarms
-from conveyor_sim.line.alarms.declaration import as_sent
 from conveyor_sim.line.alarms.system import AlarmSystem
 from conveyor_sim.line.authority import unauthorized
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
-from conveyor_sim.line.commands import ALARMS, refusal, shown
+from conveyor_sim.line.commands import refusal, shown
 from conveyor_sim.line.counters import RESET_COUNTERS, Counters
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import build_devices
@@ -20,7 +19,7 @@ from conveyor_sim.line.devices.belt import BeltDevice
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
 from conveyor_sim.line.forcing import Forcing
-from conveyor_sim.line.inputs import DECLARE, FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input
+from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, as_kept
 from conveyor_sim.line.modes import Modes
 from conveyor_sim.line.operation import Operation
 from conveyor_sim.line.process_image import ProcessImage
@@ -36,7 +35,6 @@ from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state import State
 from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
 from conveyor_sim.state.state import FIRST_SLOTS
-from conveyor_sim.support.printable import SENTENCE, printable
 
 _Outcome = tuple[int, Input, bool, str, bool, bool, bool]
 
@@ -137,15 +135,7 @@ class Line:
 
     def queue(self, given: Input) -> None:
         """Have an input applied, or refused, as the next tick begins."""
-        source, writer, kind, operation, names, values, texts = given
-        # Whoever names an alarm makes it up, so it is kept as it can be shown.
-        kept = tuple([printable(name) if name.startswith(ALARMS) else name for name in names])
-        numbers = tuple([float(value) for value in values])
-        if texts:
-            texts = tuple(as_sent(text) if operation == DECLARE else printable(text, SENTENCE) for text in texts)
-        source = printable(source)
-        writer = source if writer == source else printable(writer)
-        self._pending.append(Input(source, writer, printable(kind), printable(operation), kept, numbers, texts))
+        self._pending.append(as_kept(given))
 
     @property
     def operations(self) -> tuple[str, ...]:
@@ -164,6 +154,9 @@ class Line:
 
     def refusal(self, given: Input) -> str:
         """Why an input can't be applied as the line stands now, "" if it can."""
+        return self._refusal(as_kept(given))
+
+    def _refusal(self, given: Input) -> str:
         if reason := unauthorized(given, self._operations):
             return reason
         _, rest, reason = self.modes.divide(given)
@@ -205,7 +198,7 @@ class Line:
                 repeated = not self.modes.report(foreign)
                 self._note(CommandOutcome(tick, foreign, False, objection, True, rest is not None, repeated))
             if rest is not None:
-                reason = self.refusal(rest)
+                reason = self._refusal(rest)
                 if not reason:
                     self._operations[rest.operation].apply(rest, self.now)
                 self._note(CommandOutcome(tick, rest, not reason, reason))

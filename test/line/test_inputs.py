@@ -8,7 +8,7 @@ from scenes import base, belt, bottle, simulation
 
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.drive import DriveDevice
-from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, SET, WATCHDOG, Input, arrival, recorded_input
+from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, SET, WATCHDOG, Input, arrival, as_kept, recorded_input
 from conveyor_sim.simulation import Simulation
 
 ONE, TWO = "belts/one/cmd_speed", "belts/two/cmd_speed"
@@ -175,3 +175,28 @@ def test_the_source_of_an_old_outcome_says_what_it_was() -> None:
     )
     assert recorded_input(WATCHDOG, ("c",), (0.0,)).by_line
     assert recorded_input(ARRIVAL, (), ()) == arrival("lost", 3).input
+
+
+def test_what_does_not_print_is_taken_as_a_replay_will_find_it() -> None:
+    """A writer, and the id of an alarm: the same answer before it is given, when it is, and from the record of it."""
+    sim, again = two_drives(), two_drives()
+    given = [
+        Input("operate", "\x1b[2J", "controller", "own", (), (), ()),
+        Input("operate", "\x1b[2J", "controller", "disown", (), (), ()),
+        Input("commands", "plc", "controller", "declare", ("\n",), (), ("{}",)),
+        Input("operate", "Jo", "operator", "acknowledge", ("\n",), ()),
+    ]
+    outcomes = []
+    for one in given:
+        told = sim.refusal(one)
+        sim.give(one)
+        sim.advance()
+        (outcome,) = sim.take_outcomes()
+        assert outcome.reason == told and outcome.input == as_kept(one)
+        outcomes.append(outcome)
+    assert [outcome.accepted for outcome in outcomes] == [True, True, True, False]
+    assert "\\n" in outcomes[3].reason and outcomes[3].reason.isprintable()
+    for outcome in outcomes:
+        again.give(outcome.input)
+        again.advance()
+        assert again.take_outcomes() == [outcome]
