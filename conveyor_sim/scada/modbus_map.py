@@ -11,7 +11,7 @@ import csv
 import io
 import math
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -20,6 +20,7 @@ import numpy as np
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.printable import printable
 
@@ -39,6 +40,9 @@ WORDS: dict[Type, int] = {"bool": 1, "uint16": 1, "uint32": 2, "int32": 2, "floa
 
 MOST_ADDRESSES = 65536
 """In each table."""
+
+HANDSHAKE = MOST_ADDRESSES - 2
+"""Address of the two tags of the handshake, behind all others."""
 
 GONE = "gone"
 """What stands in place of the description of a tag that the line no longer has: its address is not given to another."""
@@ -98,9 +102,15 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
 
     Signals are discrete inputs and input registers, commands coils and holding registers; faults are left out, for
     Modbus knows no users. word_order: of what is added. A kept tag that the line no longer has keeps its address, and
-    is marked as gone. Raises MapError for a tag that has become of another type or table, and if a table is full.
+    is marked as gone. The two tags of the handshake have the last addresses, always. Raises MapError for a tag that has
+    become of another type or table, and if a table is full.
     """
+    handshake = _handshake({row.name: row.word_order for row in kept}, word_order)
+    kept = [row for row in kept if row.name not in (TICK, TARGET)]
     placed = {row.name: row for row in kept}
+    for row in kept:
+        if row.addresses.stop > HANDSHAKE and row.table in ("input register", "holding register"):
+            raise MapError(f"{printable(row.name)}: address {row.address} given, expected one below {HANDSHAKE}")
     ends = {table: max((row.addresses.stop for row in kept if row.table == table), default=0) for table in _TABLES}
     found: dict[str, Row] = {}
     for tag in tags:
@@ -110,8 +120,8 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
         if (old := placed.get(tag.name)) is None:
             new = replace(new, address=ends[new.table])
             ends[new.table] += new.words
-            if ends[new.table] > MOST_ADDRESSES:
-                raise MapError(f"{tag.name}: no address left, expected at most {MOST_ADDRESSES} in a table")
+            if ends[new.table] > HANDSHAKE:
+                raise MapError(f"{tag.name}: no address left, expected at most {HANDSHAKE} in a table")
         elif (old.table, old.type) != (new.table, new.type):
             raise MapError(
                 f"{tag.name}: a {new.type} among the {new.table}s now, expected a {old.type} among the {old.table}s, "
@@ -121,7 +131,28 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
             new = replace(new, address=old.address, word_order=old.word_order)
         found[tag.name] = new
     gone = {row.name: replace(row, description=GONE, access="read") for row in kept if row.name not in found}
-    return sorted((found | gone).values(), key=lambda row: (_TABLES.index(row.table), row.address))
+    rows = [*found.values(), *gone.values(), *handshake]
+    return sorted(rows, key=lambda row: (_TABLES.index(row.table), row.address))
+
+
+def _handshake(kept: Mapping[str, WordOrder], word_order: WordOrder) -> list[Row]:
+    most = float(2**32 - 1)
+    read, write = "The tick that all values are of.", "To which tick a line in lockstep is to go on, written last."
+    return [
+        Row(TICK, "input register", HANDSHAKE, "uint32", kept.get(TICK, word_order), "1", "read", 0.0, most, read),
+        Row(
+            TARGET,
+            "holding register",
+            HANDSHAKE,
+            "uint32",
+            kept.get(TARGET, word_order),
+            "1",
+            "read and write",
+            0.0,
+            most,
+            write,
+        ),
+    ]
 
 
 def encode(row: Row, value: float) -> list[int]:

@@ -25,6 +25,7 @@ from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status
 from conveyor_sim.scada.hands import objection
+from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.scada.modbus_map import Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
 
@@ -163,7 +164,8 @@ class _Image:
             row = self._rows.get((table, at))
             if row is None:
                 return ExcCodes.ILLEGAL_ADDRESS
-            words = encode(row, shown.values.get(row.name, 0.0))  # 0 for one that is gone
+            value = float(shown.tick) if row.name in (TICK, TARGET) else shown.values.get(row.name, 0.0)
+            words = encode(row, value)  # 0 for one that is gone
             values += words[at - row.address :]
         values = values[:count]
         return [bool(value) for value in values] if table in ("coil", "discrete input") else values
@@ -186,13 +188,21 @@ class _Image:
             names.append(row.name)
             numbers.append(decode(row, words[: row.words]))
             words, address = words[row.words :], address + row.words
-        if refusal(self._commands, "command", names, numbers):
+        # It has the last address, so it is the last that one request writes.
+        target = numbers.pop() if names[-1] == TARGET and names.pop() else None
+        if names and refusal(self._commands, "command", names, numbers):
             return ExcCodes.ILLEGAL_VALUE
         writer = f"{MODBUS} {_client.get()}"
         if not all(self._in_control(name, writer) for name in names):
             return ExcCodes.DEVICE_BUSY
+        if target is not None and "target" not in self._source.controls:
+            return ExcCodes.DEVICE_BUSY
         given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
-        return ExcCodes.DEVICE_BUSY if self._source.give(given) else None
+        if names and self._source.give(given):
+            return ExcCodes.DEVICE_BUSY
+        if target is None:
+            return None
+        return ExcCodes.ILLEGAL_VALUE if self._source.control("target", target, writer) else None
 
     def _in_control(self, name: str, writer: str) -> bool:
         """Whether the device of a command takes it, as the line was last; the line itself decides."""

@@ -32,8 +32,9 @@ MOST_WAITING = 1000
 MOST_EVENTS = 10_000
 """That a source keeps, the last ones."""
 
-Control = Literal["pause", "resume", "step", "reset", "seek", "speed", "loop"]
-"""What can be asked of a run. step: so many ticks; seek: to a simulated time, s; speed: times real time; loop: 1, 0."""
+Control = Literal["pause", "resume", "step", "reset", "seek", "speed", "loop", "target"]
+"""What can be asked of a run. step: so many ticks; seek: to a simulated time, s; speed: times real time; loop: 1, 0;
+target: the tick up to which a line in lockstep goes (handshake.py)."""
 
 
 @dataclass(frozen=True)
@@ -207,12 +208,20 @@ class TickSource:
 
     def after_tick(self) -> None:
         """Show the line as it is now. By the thread that steps."""
+        self._look()
+        self._show()
+        self._listeners.tell()
+
+    @property
+    def _run(self) -> RunState:
+        return RunState(RUNNING)
+
+    def _look(self) -> None:
+        """Take what is told of a tick only if it changed in it."""
         line = self._simulation.line
         self._alarms = line.alarms.changes() or self._alarms
         self._read_back = line.read_back.changes() or self._read_back
         self._events.add(self._simulation.happened)
-        self._show()
-        self._listeners.tell()
 
     def _show(self) -> None:
         simulation = self._simulation
@@ -222,7 +231,7 @@ class TickSource:
             simulation.tick,
             dict(zip(self._names, values, strict=True)),
             frozenset(self._signal_names[place] for place in signals.forced),
-            RunState(RUNNING),
+            self._run,
             self._read_back,
             self._alarms,
             owner=simulation.line.modes.owner,

@@ -1,4 +1,4 @@
-"""`ScanCycle`: what controls a line under test: a controller that scans at every tick, or a node that does."""
+"""`ScanCycle`: what controls a line under test: a controller that scans at every tick, a node, or a PLC."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from conveyor_sim.testing.conditions import Present
 
 if TYPE_CHECKING:
     from conveyor_sim.ros.attached import AttachedNode
+    from conveyor_sim.scada.face import Face
+    from conveyor_sim.scada.source import TagSource
+    from conveyor_sim.testing.plc import AttachedPlc
 
 CONTROLLER = "controller"
 """Source of the attached controller's commands, in the bag's outcomes."""
@@ -31,6 +34,7 @@ class ScanCycle:
         self._simulation, self._give = simulation, give
         self._controller: Controller | None = None
         self._node: AttachedNode | None = None
+        self._plc: AttachedPlc | None = None
         self._answer: Mapping[str, float] = {}
         self._changes = AlarmChanges()
         self.read: dict[str, None] = {}
@@ -62,11 +66,31 @@ class ScanCycle:
             self._simulation, command, namespace=namespace, domain=domain, patience=patience
         )
 
+    def attach_plc(
+        self,
+        make: Callable[[TagSource], Face],
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        patience: float,
+    ) -> str:
+        """Have a PLC scan that is a client of a server, as `AttachedPlc` says; where the server is."""
+        from conveyor_sim.testing.plc import AttachedPlc
+
+        self.close()
+        self._plc = self._controller = AttachedPlc(self._simulation, make, command, environment, patience)
+        return self._plc.address
+
     def close(self) -> None:
-        """End the node, if one is attached."""
-        if self._node is not None:
-            self._node.close()
-            self._node = None
+        """End the node or the PLC, if one is attached."""
+        for outsider in (self._node, self._plc):
+            if outsider is not None:
+                outsider.close()
+        self._node = self._plc = None
+
+    def answers_for(self, outcome: CommandOutcome) -> bool:
+        """Whether that was of the PLC which is attached, and not of another client of a server."""
+        plc = self._plc
+        return plc is not None and (outcome.source, outcome.input.writer) == (plc.source, plc.writer)
 
     def scan(self, inputs: Present) -> Collection[str]:
         """One scan; the names of the alarms that it says something of. Raises ControlError for what is no answer."""
@@ -90,10 +114,12 @@ class ScanCycle:
         """Hand the answer of the last scan over to the line."""
         if self._answer:
             names, values = tuple(self._answer), tuple(self._answer.values())
-            if self._node is None:
-                self._simulation.command(names, values, CONTROLLER, writer=type(self._controller).__name__)
-            else:
-                self._simulation.command(names, values, LOCKSTEP, writer=self._node.writer)
+            source, writer = CONTROLLER, type(self._controller).__name__
+            if self._node is not None:
+                source, writer = LOCKSTEP, self._node.writer
+            elif self._plc is not None:
+                source, writer = self._plc.source, self._plc.writer
+            self._simulation.command(names, values, source, writer=writer)
 
     def note(self, outcomes: Sequence[CommandOutcome]) -> None:
         """What became of inputs at a tick."""

@@ -48,6 +48,8 @@ def test_each_kind_of_tag_has_its_table_and_type() -> None:
         STATE.name: ("input register", 8, "uint16", "read"),
         PULSES.name: ("input register", 9, "int32", "read"),
         SETPOINT.name: ("holding register", 0, "float32", "read and write"),
+        "run/tick": ("input register", 65534, "uint32", "read"),
+        "run/target_tick": ("holding register", 65534, "uint32", "read and write"),
     }  # and no fault: Modbus knows no users
 
 
@@ -101,8 +103,17 @@ def test_a_tag_of_another_type_is_refused() -> None:
 
 
 def test_a_full_table_is_refused() -> None:
-    with pytest.raises(MapError, match="no address left, expected at most 65536 in a table"):
+    with pytest.raises(MapError, match="no address left, expected at most 65534 in a table"):
         modbus_map(replace(ROSE, name=f"eyes/{i}") for i in range(16385))
+
+
+def test_the_handshake_keeps_the_last_addresses_as_a_map_grows() -> None:
+    grown = modbus_map([*TAGS, replace(COUNT, name="zones/y/bottles")], modbus_map(TAGS))
+    assert row_of(grown, replace(COUNT, name="zones/y/bottles")).address == 11
+    assert row_of(grown, replace(COUNT, name="run/tick")).address == 65534
+    taken = [replace(row, address=65533) if row.name == COUNT.name else row for row in modbus_map(TAGS)]
+    with pytest.raises(MapError, match="zones/z/bottles: address 65533 given, expected one below 65534"):
+        modbus_map(TAGS, taken)
 
 
 @pytest.mark.parametrize("order", ["big", "little"])

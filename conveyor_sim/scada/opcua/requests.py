@@ -17,6 +17,7 @@ from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.scada.hands import objection
+from conveyor_sim.scada.handshake import TARGET
 from conveyor_sim.scada.opcua.nodes import INDEX
 from conveyor_sim.scada.opcua.values import type_of
 from conveyor_sim.scada.source import OPCUA, Control, TagSource
@@ -28,6 +29,9 @@ TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
 
 MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
 """Who may pause a run, have it go on, and so on."""
+
+MAY_GO_ON: tuple[WriterKind, ...] = ("controller", "test")
+"""Who may say how far a line in lockstep goes."""
 
 
 @dataclass
@@ -64,6 +68,10 @@ class Requests:
         places: list[int] = []
         for place, value in enumerate(values):
             name = name_of(value.NodeId)
+            if name == TARGET:
+                self._flush(client, together, places, codes)
+                codes.append(self._go_on(client, value))
+                continue
             code, number = self._judge(client, value)
             if name in together:
                 self._flush(client, together, places, codes)
@@ -117,6 +125,18 @@ class Requests:
     def _count(self, code: int) -> None:
         good = code == Codes.GoodCompletesAsynchronously
         self.writes, self.refused = self.writes + good, self.refused + (not good)
+
+    def _go_on(self, client: User, value: ua.WriteValue) -> int:
+        """Have a line in lockstep go on up to a tick."""
+        if _kind(client) not in MAY_GO_ON:
+            return int(Codes.BadUserAccessDenied)
+        variant = value.Value.Value
+        if variant is None or variant.VariantType is not ua.VariantType.Int64 or isinstance(variant.Value, list):
+            return int(Codes.BadTypeMismatch)
+        if "target" not in self._source.controls:
+            return int(Codes.BadInvalidState)
+        refused = self._source.control("target", variant.Value, _writer(client))
+        return int(Codes.BadOutOfRange if refused else Codes.GoodCompletesAsynchronously)
 
     def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
         """Whether a value can be given, and as what number."""

@@ -6,6 +6,7 @@ from asyncua import ua
 
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.scada.handshake import TARGET
 from conveyor_sim.scada.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id
 from conveyor_sim.scada.opcua.values import as_variant, range_of, unit_of
 from conveyor_sim.scada.source import About
@@ -39,6 +40,9 @@ def add_line(nodes: Nodes, about: About) -> None:
     run = node_id(RUN) if RUN in nodes else nodes.object(RUN, RUN, node_id(LINE), "The simulation itself.")
     for name, (kind, description) in RUN_VARIABLES.items():
         nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(_FIRST.get(kind), kind), description)
+    first = ua.Variant(0, ua.VariantType.Int64)
+    text = "To which tick a line in lockstep is to go on: what was written before it acts as one set, with it."
+    nodes.variable(TARGET, TARGET.rpartition("/")[2], run, first, text, access=READ_AND_WRITE)
 
 
 def is_shown(tag: Tag) -> bool:

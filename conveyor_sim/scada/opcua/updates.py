@@ -14,6 +14,7 @@ from asyncua.server.internal_server import InternalServer
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.observe.read_back import ReadBackColumns
+from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.scada.opcua.nodes import node_id
 from conveyor_sim.scada.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.scada.opcua.values import Clock, as_variant, status_of
@@ -111,7 +112,8 @@ class Updates:
                 await self._write(node_id(f"{tag.name}/{VALUE_AS_TEXT}"), text, stamp)
         if last is None or last.tick != tick:
             now = self._clock.simulated(tick)
-            await self._write(node_id(f"{RUN}/tick"), ua.Variant(tick, ua.VariantType.Int64), stamp)
+            for name in (TICK, TARGET):
+                await self._write(node_id(name), ua.Variant(tick, ua.VariantType.Int64), stamp)
             seconds = tick * self._source.about.tick
             await self._write(node_id(f"{RUN}/time"), ua.Variant(seconds, ua.VariantType.Double), stamp)
             await self._write(node_id(f"{RUN}/date_time"), ua.Variant(now, ua.VariantType.DateTime), stamp)

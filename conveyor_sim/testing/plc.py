@@ -1,0 +1,130 @@
+"""`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
+
+It goes in lockstep by two tags (scada/handshake.py), so the test has the same bits however fast the PLC is.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+
+from conveyor_sim.control.scan import ControlError, Inputs
+from conveyor_sim.line.inputs import SET
+from conveyor_sim.ros.child import Process
+from conveyor_sim.scada.face import Face
+from conveyor_sim.scada.handshake import TARGET, HandshakeSource
+from conveyor_sim.scada.modbus_map import Row, modbus_map
+from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.scada.source import TagSource
+from conveyor_sim.simulation import Simulation
+
+ADDRESS = "CONVEYOR_SIM_ADDRESS"
+"""Environment variable of the PLC's process: where the server is, "modbus://127.0.0.1:49152"."""
+
+PASSWORD = "CONVEYOR_SIM_PASSWORD"
+"""The same of an OPC UA client: the password of the user "plc"."""
+
+USER = "plc"
+
+LOOK = 0.2  # s of wall time between two looks at whether the PLC's process still runs
+
+
+class AttachedPlc(AbstractContextManager["AttachedPlc"]):
+    """To the test, a controller; it is to be scanned at every tick."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        make: Callable[[TagSource], Face],
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        patience: float,
+    ) -> None:
+        """make: the server, not started. command: starts the PLC; empty: others do. environment: of it, besides.
+        patience: s of wall time that it has for each scan.
+
+        Raises FaceError if the server can't be, OSError if the command can't be run.
+        """
+        self.writer = "plc"
+        """Who its commands are recorded under: the client that wrote last."""
+        self.source = ""
+        """By which way they came."""
+        self._simulation = simulation
+        self._patience = patience
+        self._tags = HandshakeSource(simulation)
+        self._process: Process | None = None
+        self._shown = simulation.tick
+        with ExitStack() as stack:
+            logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_")))
+            thread = stack.enter_context(ServerThread())
+            face = make(self._tags)
+            thread.run(face.start())
+            stack.callback(lambda: thread.run(face.stop()))
+            self.address = face.address
+            """Where the server is."""
+            if command:
+                whole = {**os.environ, **environment, ADDRESS: face.address, "PYTHONUNBUFFERED": "1"}
+                self._process = Process("PLC", command, whole, logs)
+                stack.callback(self._process.stop)
+            self._open = stack.pop_all()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the PLC's process and the server."""
+        self._open.close()
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """What the PLC wrote before it let the line go beyond this tick; waits until it does.
+
+        Raises ControlError if it does not.
+        """
+        if inputs.tick != self._shown:
+            self._shown = inputs.tick
+            self._tags.after_tick()
+        end = time.monotonic() + self._patience
+        while (taken := self._tags.take(min(LOOK, self._patience))) is None:
+            self._require_going_on(inputs, time.monotonic() > end)
+        commands: dict[str, float] = {}
+        for given in taken:
+            if given.operation == SET and given.writer_kind == "controller":
+                commands.update(zip(given.names, given.values, strict=True))
+                self.writer, self.source = given.writer, given.source
+            else:
+                self._simulation.give(given)
+        return commands
+
+    def _require_going_on(self, inputs: Inputs, late: bool) -> None:
+        if self._process is not None and self._process.exit_code is not None:
+            raise ControlError(f"at {inputs.time:.2f} s no PLC: {self._process.obituary()}")
+        if late:
+            text = (
+                f"at {inputs.time:.2f} s no {TARGET} after {inputs.tick} within {self._patience:g} s of wall time, "
+                f"expected from a PLC at {self.address}"
+            )
+            if self._process is not None:
+                text += f"; the end of its log:\n{self._process.last_words()}"
+            raise ControlError(text)
+
+
+def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource], Face]:
+    """What makes the server of a Modbus client. Raises ImportError without pymodbus."""
+    from conveyor_sim.scada.modbus_server import ModbusServer
+
+    return lambda source: ModbusServer(
+        source, modbus_map(source.about.tags) if rows is None else rows, "controller", port=port
+    )
+
+
+def opcua(password: str, port: int) -> Callable[[TagSource], Face]:
+    """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
+    from conveyor_sim.scada.opcua.server import OpcUaServer
+    from conveyor_sim.scada.opcua.users import new_user
+
+    users = {USER: new_user("controller", password)}
+    return lambda source: OpcUaServer(source, users, port=port)
