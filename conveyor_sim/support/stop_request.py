@@ -32,15 +32,15 @@ class StopRequest(AbstractContextManager["StopRequest"]):
     @property
     def requested(self) -> bool:
         """Whether there was a request."""
-        return bool(select.select([self._reader], [], [], 0.0)[0])
+        return self.wait(0.0)
 
     def request(self) -> None:
         """From any thread."""
         self._writer.send(b"\0")
 
-    def wait(self) -> None:
-        """Return once there was a request."""
-        select.select([self._reader], [], [])
+    def wait(self, seconds: float | None = None) -> bool:
+        """Until there was a request, or so long (None: for ever), s of wall time; whether there was one."""
+        return bool(select.select([self._reader], [], [], seconds)[0])
 
     def __exit__(self, *_: object) -> None:
         self._signals.__exit__()

@@ -1,0 +1,299 @@
+"""The process that simulates a scene for a `SceneSource`: it steps and records it, and sends copies of what it shows.
+
+The stepping thread only leaves copies behind; another one sends them, the newest of each. So whoever receives them,
+slowly or not at all, holds up no tick and fills no memory.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.live.inbox import size_of
+from conveyor_sim.live.session import Session, bag_folder
+from conveyor_sim.live.stepper import Stepper
+from conveyor_sim.runs.compilation import Cancelled, Compilation
+from conveyor_sim.scada.source import MOST_EVENTS, Control
+from conveyor_sim.scada.view import HEARD
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.stop_request import StopRequest
+
+SHORTEST = 0.005
+"""s of wall time between two copies: twice as often as a line in real time has ticks."""
+
+LIFE_SIGN = 0.5
+"""s of wall time after which a copy is sent though nothing is new, as long as the stepping thread is alive."""
+
+MOST_NOTES = 100
+
+PATIENCE = 20.0
+"""s of wall time for an orderly end once nobody is there any more."""
+
+FRAME = "world"
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the process is to do, the first thing that it is sent."""
+
+    scene: Scene
+    record: Path | None
+    """Folder; None: not recorded."""
+    number: int
+    """Of the first run, by which its folder is named, as those after resets are."""
+    real_time_factor: float
+    threads: int | None
+
+
+class Give(NamedTuple):
+    """Sent to the process: an input for the next tick."""
+
+    given: Input
+
+
+class Ask(NamedTuple):
+    """Sent to the process: something to do with the run."""
+
+    what: Control
+    value: float
+    by: str
+
+
+class Copy(NamedTuple):
+    """Sent by the process: serialized messages, and how far it is with inputs."""
+
+    states: Mapping[str, bytes]
+    """By topic, the newest."""
+    events: Sequence[bytes]
+    handed: int
+    """Inputs that have reached the stepper so far."""
+    waiting: int
+    """Of these, those that no tick has taken yet."""
+
+
+class Note(NamedTuple):
+    """Sent by the process: a sentence for people."""
+
+    text: str
+    bad: bool = False
+
+
+class Failed(NamedTuple):
+    """Sent by the process, the last thing: why it can't go on."""
+
+    reason: str
+
+
+class Copies:
+    """A sink whose messages are sent by a thread of its own."""
+
+    def __init__(self, pipe: Connection) -> None:
+        """It sends from now on."""
+        self._pipe = pipe
+        self._now: dict[str, bytes] = {}
+        self._now_events: list[bytes] = []
+        self._states: dict[str, bytes] = {}
+        self._events: deque[bytes] = deque(maxlen=MOST_EVENTS)
+        self._others: deque[Note | Failed] = deque(maxlen=MOST_NOTES)
+        self._counts = (0, 0)
+        self._new = self._closed = False
+        self._sent = 0.0  # s of wall time
+        self._wake = threading.Condition()
+        self._thread = threading.Thread(target=self._send, name="copies", daemon=True)
+        self._thread.start()
+
+    def wants(self, topic: str) -> bool:
+        """What faces show; signals are theirs at every tick, whatever the scene's rate."""
+        return topic in HEARD and topic != "signals"
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        """Keep one message until its tick is whole. By the stepping thread."""
+        if topic == "events":
+            self._now_events.append(data)
+        else:
+            self._now[topic] = data
+
+    def cut(self, handed: int, waiting: int) -> None:
+        """What was written since the last time belongs together; it may be sent. By the stepping thread."""
+        counts, now = (handed, waiting), time.monotonic()
+        with self._wake:
+            if "line" in self._now:  # another run
+                self._states.clear()
+            if self._now or self._now_events or counts != self._counts or now > self._sent + LIFE_SIGN:
+                self._states |= self._now
+                self._events += self._now_events
+                self._counts, self._new = counts, True
+                self._wake.notify()
+        self._now, self._now_events = {}, []
+
+    def tell(self, other: Note | Failed) -> None:
+        """Send something else. From any thread."""
+        with self._wake:
+            self._others.append(other)
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Return once all was sent, or nobody takes it."""
+        with self._wake:
+            self._closed = True
+            self._wake.notify()
+        self._thread.join(PATIENCE)
+
+    def _send(self) -> None:
+        with suppress(OSError):  # nobody is there any more
+            while True:
+                with self._wake:
+                    while not (self._new or self._others or self._closed):
+                        self._wake.wait()
+                    done = self._closed
+                    others = list(self._others)
+                    copy = Copy(self._states, list(self._events), *self._counts)
+                    self._states, self._new, self._sent = {}, False, time.monotonic()
+                    self._events.clear()
+                    self._others.clear()
+                self._pipe.send(copy)
+                for other in others:
+                    self._pipe.send(other)
+                if done:
+                    return
+                time.sleep(SHORTEST)
+
+
+class _Log:
+    """Of the stepper: notes."""
+
+    def __init__(self, copies: Copies) -> None:
+        self._copies = copies
+
+    def info(self, message: str) -> None:
+        self._copies.tell(Note(message))
+
+    def warning(self, message: str) -> None:
+        self._copies.tell(Note(message, bad=True))
+
+    error = warning
+
+
+class _Process:
+    """One run after another, until the pipe ends."""
+
+    def __init__(self, pipe: Connection, task: Task, stop: StopRequest) -> None:
+        self._pipe, self._task, self._stop = pipe, task, stop
+        self._copies = Copies(pipe)
+        self._compilation = Compilation(task.scene, lambda sentence: self._copies.tell(Note(sentence)))
+        self._stepper: Stepper | None = None
+        self._handed = 0
+        self._shown = ("", -1)  # run and tick of the signals that were copied last
+
+    def run(self) -> None:
+        """Until somebody asks for the end."""
+        threading.Thread(target=self._listen, name="requests", daemon=True).start()
+        try:
+            self._compilation.run()
+            self._stepper = self._new_stepper()
+        except Cancelled:
+            return
+        except ConveyorError as error:
+            self._fail(error)
+            self._copies.close()
+            return
+        self._stepper.start()
+        self._stop.wait()
+        self._stepper.shutdown()
+        self._beat()
+        self._copies.close()
+
+    def _new_stepper(self) -> Stepper:
+        task, distro = self._task, default_distro()
+
+        def open_session(runs: int, loaded: Simulation | None) -> Session:
+            simulation = loaded or Simulation(task.scene, task.threads)
+            return Session(simulation, self._copies, bag_folder(task.record, task.number + runs), FRAME, distro)
+
+        return Stepper(
+            open_session,
+            real_time_factor=task.real_time_factor,
+            playing=True,
+            lockstep_max_ticks=1,
+            beat=lambda stamp_ns, now: self._beat(),
+            died=self._fail,
+            log=_Log(self._copies),
+        )
+
+    def _beat(self) -> None:
+        if (stepper := self._stepper) is None:
+            return
+        simulation = stepper.simulation
+        if self._shown != (now := (stepper.run_id, simulation.tick)):
+            self._shown = now
+            header = Header(simulation.tick, simulation.stamp_ns, FRAME)
+            self._copies.write("signals", TOPICS["signals"].pack(simulation.line.signals(), header), header.stamp_ns)
+        self._copies.cut(self._handed, stepper.inbox.counts.waiting)
+
+    def _fail(self, error: Exception) -> None:
+        text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
+        self._copies.tell(Failed(text))
+        self._stop.request()
+
+    def _listen(self) -> None:
+        """Do what is sent; at None, or the end of the pipe by the parent's death, end in order, or else at once."""
+        with suppress(EOFError, OSError):
+            while (request := self._pipe.recv()) is not None:
+                self._do(request)
+        self._compilation.cancel()
+        self._stop.request()
+        time.sleep(PATIENCE)
+        os._exit(1)
+
+    def _do(self, request: Give | Ask) -> None:
+        stepper = self._stepper
+        if stepper is None:  # nobody knows the line yet
+            return
+        if isinstance(request, Give):
+            if request.given.operation == SET:  # commands are counted
+                stepper.inbox.receive()
+            stepper.give(request.given, size_of(request.given))
+            self._handed += 1
+            return
+        what, value, by = request
+        todo: Mapping[Control, Any] = {
+            "pause": stepper.pause,
+            "resume": stepper.play,
+            "step": lambda: stepper.step(int(value)),
+            "reset": stepper.reset,
+            "speed": lambda: stepper.set_real_time_factor(value),
+        }
+
+        def done(future: Future[Any]) -> None:
+            error = future.exception()
+            told = f"{what}, asked for by {by}"
+            self._copies.tell(Note(told) if error is None else Note(f"{told}, refused: {error}", bad=True))
+
+        stepper.call(todo[what]).add_done_callback(done)
+
+
+def main() -> None:
+    """Be that process; the argument is the descriptor of the pipe."""
+    pipe = Connection(int(sys.argv[1]))
+    with StopRequest() as stop:
+        try:
+            task = pipe.recv()
+        except EOFError:  # the parent was interrupted before it could say
+            return
+        _Process(pipe, task, stop).run()

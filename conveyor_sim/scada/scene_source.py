@@ -1,0 +1,227 @@
+"""`SceneSource`: a scene, simulated by a process of its own, as a tag source."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
+from dataclasses import replace
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
+from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
+from conveyor_sim.live.session import bag_folder
+from conveyor_sim.scada.scene_process import PATIENCE, Ask, Copy, Failed, Give, Note, Task
+from conveyor_sim.scada.source import MOST_WAITING, Control
+from conveyor_sim.scada.view import HEARD, View
+
+SILENCE = 5.0
+"""s of wall time without a sign of life after which what is shown is stale."""
+
+LOOK = 0.5
+"""s of wall time between two looks at that."""
+
+ENDED_HERE = "serving has ended"
+
+CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.scada.scene_process import main; main()"
+
+
+class SceneSource(View, AbstractContextManager["SceneSource"]):
+    """Simulated from its start until close(). If its process dies, another one begins the scene anew."""
+
+    controls: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
+
+    def __init__(self, task: Task, say: Callable[[str], object]) -> None:
+        """say: called with a sentence whenever there is something to tell people, by a thread of this source.
+
+        It returns at once; `wait_for_line` says whether it has come to anything.
+        """
+        super().__init__()
+        self._task, self._say = task, say
+        self._closing = False
+        self._failure = ""  # why there is nothing to wait for
+        self._lock = threading.Lock()
+        self._given = self._handed = self._waiting = 0
+        self._requests: SimpleQueue[Task | Give | Ask | None] = SimpleQueue()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._pipe: Connection | None = None
+        self._thread = threading.Thread(target=self._supervise, name="scene", daemon=True)
+        self._thread.start()
+
+    def wait_for_line(self) -> None:
+        """Return once its tags are known, which takes as long as its kernels take to compile.
+
+        Raises ConveyorError if it comes to nothing.
+        """
+        while not self.wait(LOOK):
+            if self._failure:
+                raise ConveyorError(self._failure)
+
+    @property
+    def pid(self) -> int:
+        """The process that simulates. RuntimeError if there is none."""
+        if self._process is None:
+            raise RuntimeError("no process")
+        return self._process.pid
+
+    @property
+    def recordings(self) -> list[Path]:
+        """The folders of those that there are so far, one for each run."""
+        found: list[Path] = []
+        while (folder := bag_folder(self._task.record, len(found))) and folder.is_dir() and any(folder.iterdir()):
+            found.append(folder)
+        return found
+
+    def give(self, given: Input) -> str:
+        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+        shown = self.shown
+        if shown.lost:
+            return shown.lost
+        if shown.run.state in (ENDED, STOPPED):
+            return f"the run has {shown.run.text}, expected a reset"
+        if size_of(given) > MESSAGE_BYTES:
+            return TOO_LARGE
+        with self._lock:
+            if self._given - self._handed + self._waiting >= MOST_WAITING:
+                return f"{MOST_WAITING} inputs wait for the next tick already"
+            self._given += 1
+            self._requests.put(Give(given))
+        return ""
+
+    def control(self, what: Control, value: float, by: str) -> str:
+        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+        shown = self.shown
+        if what not in self.controls:
+            return f"{what}: expected one of {', '.join(sorted(self.controls))} of a scene that is simulated"
+        if shown.lost:
+            return shown.lost
+        if what != "reset" and shown.run.state in (ENDED, STOPPED):
+            return f"the run has {shown.run.text}, expected a reset"
+        if what == "step" and shown.run.state != PAUSED:
+            return f"step: the run is {shown.run.text}, expected it to be paused"
+        if what == "step" and not (value >= 1.0 and float(value).is_integer()):
+            return f"step: {value:g} given, expected a whole number of ticks of at least 1"
+        if what == "speed" and not 0.0 <= value <= 1e6:
+            return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
+        with self._lock:
+            self._requests.put(Ask(what, value, by))
+        return ""
+
+    def close(self) -> None:
+        """End the simulation in order, and its recording."""
+        self._closing = True
+        self._end_process()
+        self._thread.join()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _end_process(self) -> None:
+        with self._lock:
+            process = self._process
+            self._requests.put(None)
+        if process is None:
+            return
+        try:
+            process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+    # The thread that hears
+
+    def _supervise(self) -> None:
+        while not self._closing:
+            reason = self._simulate()
+            self.lose(reason)
+            if self._closing or not self._begun:
+                self._failure = reason
+                return
+            self._say(f"{reason}; the scene begins anew")
+
+    def _simulate(self) -> str:
+        """Let a process run until it ends; why it did."""
+        self._begun, failure = False, ""
+        here, there = Pipe()
+        with here, there:
+            with self._lock:
+                if self._closing:
+                    return ENDED_HERE
+                self._given = self._handed = self._waiting = 0
+                self._requests = SimpleQueue()
+                # A session of its own: Ctrl-C at the terminal is this process's affair.
+                self._process = process = subprocess.Popen(
+                    [sys.executable, "-c", CODE.format(path=sys.path), str(there.fileno())],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    start_new_session=True,
+                    pass_fds=[there.fileno()],
+                )
+            there.close()
+            self._requests.put(replace(self._task, number=len(self.recordings)))
+            threading.Thread(target=_pass_on, args=(self._requests, here), name="requests", daemon=True).start()
+            with suppress(EOFError, OSError):
+                failure = self._hear(here)
+            self._requests.put(None)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE)
+        process.kill()
+        code = process.wait()
+        if failure or self._closing:
+            return failure or ENDED_HERE
+        how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+        return f"the process that simulates {self._task.scene.name} {how}"
+
+    def _hear(self, pipe: Connection) -> str:
+        """What it sends until it fails, and why that was; EOFError when it ends otherwise."""
+        heard = time.monotonic()
+        while True:
+            if not pipe.poll(LOOK):
+                if self._begun and time.monotonic() > heard + SILENCE:
+                    self.lose(f"nothing was heard of the simulation for {SILENCE:g} s")
+                continue
+            message, heard = pipe.recv(), time.monotonic()
+            match message:
+                case Copy():
+                    self._take_copy(message)
+                case Note():
+                    if message.bad or not self._closing:
+                        self._say(message.text)
+                case Failed():
+                    return message.reason
+
+    def _take_copy(self, copy: Copy) -> None:
+        for topic in HEARD:
+            if (data := copy.states.get(topic)) is not None:
+                self.take(topic, _decoded(topic, data))
+        for data in copy.events:
+            self.take("events", _decoded("events", data))
+        with self._lock:
+            self._handed, self._waiting = copy.handed, copy.waiting
+        self._begun = self._begun or bool(copy.states)
+        if copy.states or copy.events or self.shown.lost:
+            self.show()
+
+
+def _decoded(topic: str, data: bytes) -> Any:
+    return typestore().deserialize_cdr(data, TOPICS[topic].type)
+
+
+def _pass_on(requests: SimpleQueue[Any], pipe: Connection) -> None:
+    """What is asked of the process, the last of it None; it may not read."""
+    with suppress(OSError):
+        while True:
+            request = requests.get()
+            pipe.send(request)
+            if request is None:
+                return
