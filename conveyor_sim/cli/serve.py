@@ -29,6 +29,10 @@ PORT = click.IntRange(0, 65535)
 
 @click.command()
 @click.argument("what", metavar="SCENE")
+@click.option("--opcua", type=PORT, is_flag=False, flag_value=4840, help="Serve OPC UA on this port.")
+@click.option("--opcua-users", type=click.Path(path_type=Path), help="File of its users, who may do more than read.")
+@click.option("--opcua-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
+@click.option("--opcua-anonymous/--no-opcua-anonymous", default=True, help="Whether all may read (default: they may).")
 @click.option("--modbus", type=PORT, is_flag=False, flag_value=5020, help="Serve Modbus TCP on this port.")
 @click.option("--modbus-role", type=click.Choice(["controller", "operator"]), help="As what its clients may write.")
 @click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")
@@ -44,6 +48,10 @@ PORT = click.IntRange(0, 65535)
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def serve(
     what: str,
+    opcua: int | None,
+    opcua_users: Path | None,
+    opcua_certificates: Path | None,
+    opcua_anonymous: bool,
     modbus: int | None,
     modbus_role: WriterKind | None,
     modbus_map: Path | None,
@@ -67,12 +75,12 @@ def serve(
         from conveyor_sim.scada.serving import Serving
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
-    ports = {"modbus": modbus}
+    ports = {"opcua": opcua, "modbus": modbus}
     chosen = [(kind, port) for kind in FACES if (port := ports[kind.name]) is not None]
     chosen = chosen or [(kind, kind.port) for kind in FACES if kind.installed]
     if not chosen:
         FACES[0].require()
-    settings = Settings(bind, stamps, modbus_role, modbus_map)
+    settings = Settings(bind, stamps, modbus_role, modbus_map, opcua_users, opcua_anonymous, opcua_certificates)
     with (
         _simulated(what, console, out, no_record, duration, real_time_factor, threads, outside_tables) as source,
         Serving(source, chosen, settings) as serving,
