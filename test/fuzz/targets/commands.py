@@ -30,6 +30,7 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
+from conveyor_sim.line.authority import MAY
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import in_environment, own_domain
 
@@ -335,6 +336,30 @@ def _fault(station: Station, rng: random.Random, _: Path) -> str:
     return "faults"
 
 
+def _operate(station: Station, rng: random.Random, _: Path) -> str:
+    """What operators and engineers do, and what they may not. Speeds are not forced: belts are judged by them."""
+    operation = rng.choice([*MAY, "mode", "set", *TEXTS])
+    if operation == "set":
+        names, values = _odd(rng)
+        _note_if_valid(station, names, values)
+    else:
+        known = ("belts/feeder", "belts/table", "photo_eyes/entry/blocked", "belts/feeder/watchdog", "line", *TEXTS)
+        names = [rng.choice(known) for _ in range(rng.choice([0, 1, 1, 2]))]
+        values = [rng.choice([1.0, 3.0, *VALUES]) for _ in names] if rng.random() < 0.8 else []
+    station.others += 1
+    station.ask(
+        srv.Operate,
+        "operate",
+        writer=rng.choice(["Jo", "Jo", *TEXTS]),
+        writer_kind=rng.choice(["operator", "engineer", "controller", *TEXTS]),
+        operation=operation,
+        names=names,
+        values=values,
+        texts=[rng.choice(TEXTS) for _ in range(rng.choice([0, 0, 0, 2]))],
+    )
+    return "operated"
+
+
 def _go(station: Station, rng: random.Random, _: Path) -> str:
     station.ask(Trigger, rng.choice(["pause", "pause", "resume"]))
     return "went"
@@ -393,7 +418,7 @@ def _parameter(station: Station, rng: random.Random, _: Path) -> str:
 
 ACTIONS = (
     _good, _good, _speed, _names, _names, _many_names, _long_name, _garbage, _garbage, _garbage, _flood, _lockstep,
-    _lockstep, _lockstep, _fault, _go, _step, _step, _set_state, _reset, _checkpoint, _parameter,
+    _lockstep, _lockstep, _fault, _operate, _operate, _go, _step, _step, _set_state, _reset, _checkpoint, _parameter,
 )  # fmt: skip
 
 
