@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -116,9 +117,22 @@ class Device:
         self._take_tags([replace(tag, device=self._name, device_class=kind) for tag in self._tags])
 
     def _take_tags(self, tags: Sequence[Tag]) -> None:
-        self._tags = tuple(tags)
-        self._signals, self._commands = of_roles(tags, SIGNALS), of_roles(tags, COMMANDS)
+        shown = [tag.shows for tag in of_roles(tags, SIGNALS)]
+        # Signals that are attributes come after those that `values` gives.
+        self._tags = tuple(tags) if all(shown) else tuple(sorted(tags, key=lambda tag: tag.shows != ""))
+        self._signals, self._commands = of_roles(self._tags, SIGNALS), of_roles(tags, COMMANDS)
         self._faults = of_roles(tags, ("fault",))
+        self._read = self._reader([name for name in shown if name])
+
+    def _reader(self, shown: Sequence[str]) -> Callable[[ScanContext], Sequence[float]]:
+        if not shown:
+            return self.values
+        get: Any = attrgetter(*shown)
+        if len(shown) == 1:
+            return lambda now: (*self.values(now), get(self))
+        if len(shown) == len(self._signals):
+            return lambda now: get(self)
+        return lambda now: (*self.values(now), *get(self))
 
     @property
     def name(self) -> str:
@@ -197,8 +211,13 @@ class Device:
         """Put bottles onto the line. Also once at the start."""
 
     def values(self, now: ScanContext) -> Sequence[float]:
-        """The signals' values, in their order."""
+        """The values of the signals that are no attributes (`Tag.shows`), in their order."""
         return ()
+
+    @property
+    def read(self) -> Callable[[ScanContext], Sequence[float]]:
+        """What gives the values of all signals, in their order."""
+        return self._read
 
     def counts(self) -> tuple[int, int, int] | None:
         """Bottles that it has processed, defective ones among them, and bottles that it has thrown out; None: what it
@@ -208,5 +227,5 @@ class Device:
 
     def states(self, now: ScanContext) -> list[float]:
         """The values of the signals that add to "state", in their order; asked for at every tick."""
-        signals = zip(self._signals, self.values(now), strict=True)
+        signals = zip(self._signals, self._read(now), strict=True)
         return [value for signal, value in signals if signal.adds_to == "state"]

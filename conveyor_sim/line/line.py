@@ -56,6 +56,7 @@ class Line:
         belts = [device for device in devices if isinstance(device, BeltDevice)]
         self._watched = [belt for belt in belts if belt.watchdog is not None]
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
+        self._reading = [device.read for device in devices]
         # Nothing is called that does nothing.
         self._beginning = [device for device in devices if type(device).begin is not Device.begin]
         self._ending = [device for device in devices if type(device).end is not Device.end]
@@ -274,7 +275,7 @@ class Line:
     def signals(self) -> Image:
         """Values of all signals, in the order of the process image."""
         self.now.begin_scan()
-        values = [value for device in self._devices for value in device.values(self.now)]
+        values = [value for read in self._reading for value in read(self.now)]
         return self.forcing.image(np.array(values + self.modes.values, dtype=np.float64))
 
     def counters(self) -> CounterColumns | None:
@@ -372,7 +373,7 @@ class Line:
     def _counted(self, adds_to: Adds) -> Iterator[tuple[str, int]]:
         """Devices, and what their signals that add to something come to."""
         for device, places in self._counting[adds_to]:
-            values = device.values(self.now)
+            values = device.read(self.now)
             yield device.name, sum([int(values[place]) for place in places])
 
     def _by_name(self) -> dict[str, Device]:

@@ -1,7 +1,9 @@
 """`Tag`: what there is to know of one value of a line, whether it is read, written, or injected by a test."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from conveyor_sim.line.units import UNITS, Unit
@@ -53,10 +55,16 @@ class Tag:
     texts: Mapping[int, str] = field(default_factory=dict, hash=False)
     """Of an enumeration: what each value stands for."""
     adds_to: Adds = ""
+    shows: str = ""
+    """Attribute of its device that is its value; "": what the device's `values` gives."""
     device: str = ""
     """Filled in by the line, as `device_class`: the device that it belongs to."""
     device_class: str = ""
     """What kind of a device that is: "photo_eye"."""
+
+    def of(self, attribute: str) -> Tag:
+        """The same, of a signal whose value is an attribute of its device."""
+        return replace(self, shows=attribute)
 
     @property
     def unece(self) -> Unit:

@@ -1,10 +1,12 @@
 """Tags: of no value of a shipped line anything is left empty, and what is said of it holds."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from scenes import SHIPPED, base, belt, bottle, shipped_name, simulation
 
+from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices import DEVICES, build_devices
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import MOST_COUNT, Tag, choice, count, number, seconds, switch
@@ -92,3 +94,32 @@ def test_initial_values_are_those_of_a_line_without_bottles() -> None:
     assert sim.take_outcomes()[0].accepted
     assert sim.belts().commanded.tolist() == [0.2, -0.3]
     assert sim.signals()[image.signal_names.index("gates/open/is_open")] == 1.0
+
+
+class Lamp(Device):
+    """Of which one signal is an attribute, and one is computed."""
+
+    def __init__(self, name: str, *more: Tag) -> None:
+        super().__init__(
+            name, [*more, switch(f"{name}/on", "status", "It shines."), switch(f"{name}/go", "command", "Shines.")]
+        )
+        self.lit, self.hours = True, 7
+
+    def values(self, now: ScanContext) -> Sequence[float]:
+        return (self.lit,)
+
+
+def test_a_tag_that_is_an_attribute_costs_one_line() -> None:
+    """It stands after the signals that the device gives by itself, whatever its place in the list."""
+    now = simulation().line.now
+    plain, one = Lamp("lamps/a"), Lamp("lamps/a", count("lamps/a/hours", "counter", "Hours.").of("hours"))
+    assert (names(plain), list(plain.read(now))) == (["lamps/a/on"], [True])
+    assert (names(one), list(one.read(now))) == (["lamps/a/on", "lamps/a/hours"], [True, 7])
+    two = Lamp("lamps/a", *(count(f"lamps/a/{what}", "counter", "Hours.").of("hours") for what in "xy"))
+    two.classify("lamp")
+    assert (names(two), list(two.read(now))) == (["lamps/a/on", "lamps/a/x", "lamps/a/y"], [True, 7, 7])
+    assert ProcessImage(two.tags).signals == two.signals
+
+
+def names(device: Device) -> list[str]:
+    return [tag.name for tag in device.signals]

@@ -28,7 +28,7 @@ class Measured:
             self._find()
         changed: dict[str, bool] = {}
         for device, watched in self._watched:
-            values = device.values(now)
+            values = device.read(now)
             for alarm, column in watched:
                 value = forced.get(alarm.fields.tag or "") if forced else None
                 holds = beyond(alarm, float(values[column]) if value is None else value)

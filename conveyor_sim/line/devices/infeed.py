@@ -1,7 +1,6 @@
 """Infeeds: bottles enter from a tightly packed in-line (`gap`) or at a rate; never onto another bottle."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +28,8 @@ class InfeedDevice(Device):
         super().__init__(
             name,
             [
-                count(f"{name}/fed", "counter", "Bottles let in.", high=most, adds_to="fed"),
-                switch(f"{name}/blocked", "status", "A bottle is due, and there is no room for it."),
+                count(f"{name}/fed", "counter", "Bottles let in.", high=most, adds_to="fed").of("fed"),
+                switch(f"{name}/blocked", "status", "A bottle is due, and there is no room for it.").of("blocked"),
             ],
         )
         self._infeed, self._entry = infeed, setup.entry(infeed.bottle, infeed.direction, infeed.speed)
@@ -165,7 +164,3 @@ class InfeedDevice(Device):
     def counts(self) -> tuple[int, int, int]:
         """Bottles fed, and bad ones among them."""
         return self.fed, self.quality.bad, 0
-
-    def values(self, now: ScanContext) -> Sequence[float]:
-        """Bottles fed so far, and whether one waits for room."""
-        return self.fed, self.blocked

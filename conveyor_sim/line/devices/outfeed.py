@@ -1,7 +1,5 @@
 """Outfeeds: regions that remove the bottles whose axis is inside."""
 
-from collections.abc import Sequence
-
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.region import Region
 from conveyor_sim.line.setup import Setup
@@ -13,7 +11,9 @@ class OutfeedDevice(Device):
     """One outfeed while it runs."""
 
     def __init__(self, name: str, outfeed: Outfeed, setup: Setup) -> None:
-        super().__init__(name, [count(f"{name}/removed", "counter", "Bottles taken away.", adds_to="removed")])
+        super().__init__(
+            name, [count(f"{name}/removed", "counter", "Bottles taken away.", adds_to="removed").of("removed")]
+        )
         self._region = Region(outfeed.region)
         self.removed = 0
 
@@ -26,7 +26,3 @@ class OutfeedDevice(Device):
     def counts(self) -> tuple[int, int, int]:
         """Bottles removed; it looks at none of them."""
         return self.removed, 0, 0
-
-    def values(self, now: ScanContext) -> Sequence[float]:
-        """Bottles removed so far."""
-        return (self.removed,)

@@ -1,7 +1,5 @@
 """Spills: bottles that a test has dropped onto the line."""
 
-from collections.abc import Sequence
-
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.edge import RisingEdge
 from conveyor_sim.line.setup import Setup
@@ -16,7 +14,7 @@ class SpillDevice(Device):
         super().__init__(
             name,
             [
-                count(f"{name}/dropped", "counter", "Bottles dropped.", high=spill.count, adds_to="fed"),
+                count(f"{name}/dropped", "counter", "Bottles dropped.", high=spill.count, adds_to="fed").of("fed"),
                 switch(f"{name}/drop", "fault", "As it rises, a bottle is dropped as soon as there is room."),
             ],
         )
@@ -36,7 +34,3 @@ class SpillDevice(Device):
             self._entry.enter(now.state, *self._spill.position)
             self.due -= 1
             self.fed += 1
-
-    def values(self, now: ScanContext) -> Sequence[float]:
-        """Bottles dropped so far."""
-        return (self.fed,)
