@@ -1,0 +1,74 @@
+"""The page as one file: its modules in one script, its styles and its data inside, and a policy against all else."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+
+PAGE = Path(__file__).parent / "page"
+_IMPORT = re.compile(r'^import \{[^}]*\} from "\./([\w.]+)";\n', re.MULTILINE)
+_EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
+_STYLE = re.compile(r'<link rel="stylesheet" href="([\w./]+)">')
+_SCRIPT = re.compile(r'<script( type="module")? src="([\w./]+)"></script>')
+
+
+def one_file(parts: Mapping[str, bytes], title: str) -> str:
+    """The page with its data: bytes by name, deflated. title: shown until the data are read."""
+    scripts: list[str] = []
+    styles: list[str] = []
+
+    def style(found: re.Match[str]) -> str:
+        styles.append(text(found[1]))
+        return f"<style>{styles[-1]}</style>"
+
+    def script(found: re.Match[str]) -> str:
+        scripts.append(joined(found[2]) if found[1] else text(found[2]))
+        return f"<script{found[1] or ''}>{scripts[-1]}</script>"
+
+    page = _SCRIPT.sub(script, _STYLE.sub(style, text("index.html")))
+    policy = (
+        f"default-src 'none'; script-src {_hashes(scripts)}; style-src {_hashes(styles)}; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    data = "\n".join(
+        f'<script type="text/plain" data-part="{escape(name)}">{base64.b64encode(part).decode()}</script>'
+        for name, part in parts.items()
+    )
+    page = page.replace("<title>Line view</title>", f"<title>{escape(title)}</title>")
+    page = page.replace("<!--policy-->", f'<meta http-equiv="Content-Security-Policy" content="{policy}">')
+    return page.replace("<!--recording-->", data)
+
+
+def joined(module: str) -> str:
+    """A module and all that it imports, in one script: each a function that returns what it exports.
+
+    What is exported has names that are unique among them.
+    """
+    done: dict[str, str] = {}
+
+    def take(name: str) -> None:
+        if name not in done:
+            source = text(name)
+            done[name] = ""
+            for other in _IMPORT.findall(source):
+                take(other)
+            names = ", ".join(_EXPORT.findall(source))
+            body = _EXPORT.sub("", _IMPORT.sub("", source))
+            done[name] = done.pop(name) + f"const {{ {names} }} = (() => {{\n{body}return {{ {names} }};\n}})();\n"
+
+    take(module)
+    return "".join(done.values())
+
+
+def text(name: str) -> str:
+    """A file of the page."""
+    return (PAGE / name).read_text(encoding="utf-8")
+
+
+def _hashes(texts: list[str]) -> str:
+    digests = (hashlib.sha256(entry.encode()).digest() for entry in texts)
+    return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)

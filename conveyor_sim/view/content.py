@@ -1,0 +1,54 @@
+"""What a block is made of, taken from messages in the order of time, at most so many a second."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.view.block import Content
+
+DRAWN = ("bottles", "contacts", "belts", "signals")
+"""Topics of which blocks are made."""
+
+
+class Collector:
+    """Fills a Content."""
+
+    def __init__(self, bag: Bag, start: int, gaps: Mapping[str, int]) -> None:
+        """start: the block's first tick. gaps: by topic, ticks from one that is taken to the next, at least."""
+        self.content = Content()
+        self._bag = bag
+        self._start = start
+        self._gaps = gaps
+        self._taken = dict.fromkeys(DRAWN, -1)
+        self._peaks: dict[int, float] = {}
+
+    def add(self, topic: str, tick: int, raw: bytes) -> None:
+        """A message; whether it is taken depends on the ticks since the block's first, which all topics share."""
+        slot = (tick - self._start) // self._gaps[topic]
+        is_due = slot != self._taken[topic]
+        self._taken[topic] = slot
+        if topic == "bottles":
+            self._add_bottles(tick, raw, is_due)
+        elif is_due and topic == "contacts":
+            self.content.contacts.append((tick, TOPICS[topic].unpack(self._bag.decode(topic, raw))))
+        elif is_due and topic == "belts":
+            self.content.belts.append((tick, self._bag.decode(topic, raw).actual))
+        elif is_due:
+            self.content.signals.append((tick, to_image(self._bag.decode(topic, raw)).values))
+
+    def _add_bottles(self, tick: int, raw: bytes, is_due: bool) -> None:
+        """Peak forces of those that are not taken go into the next that is."""
+        bottles: BottleColumns = TOPICS["bottles"].unpack(self._bag.decode("bottles", raw))
+        ids = bottles.id.tolist()
+        for bottle, force in zip(ids, bottles.peak_force.tolist(), strict=True):
+            self._peaks[bottle] = max(force, self._peaks.get(bottle, 0.0))
+        if is_due:
+            force = np.array([self._peaks[bottle] for bottle in ids], dtype=np.float64)
+            self.content.bottles.append((tick, BottleColumns(**{**vars(bottles), "peak_force": force})))
+            self._peaks = {}

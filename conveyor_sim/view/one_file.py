@@ -1,0 +1,50 @@
+"""A recording as one HTML file, which opens without a network."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.view.bundle import one_file
+from conveyor_sim.view.recording import Detail, Recording, text
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A condition that failed."""
+
+    time: float
+    """s"""
+    text: str
+
+
+def write_page(bag: Path, file: Path, last: float | None = None, failures: Sequence[Failure] = ()) -> Path:
+    """Write a recording as one HTML file, and return it.
+
+    last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning.
+    Raises BagError, SceneError, and ConveyorError if the file can't be written.
+    """
+    with open_bag(bag) as opened:
+        end = opened.span_ns[1] * 1e-9
+        recording = Recording(opened, Detail(), None if last is None else end - last)
+        parts = {name: zlib.compress(part, 9) for name, part in _parts(recording, failures)}
+        page = one_file(parts, recording.name)
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_file(file, page.encode())
+    except (FileError, OSError) as error:
+        raise ConveyorError(f"{file}: {getattr(error, 'strerror', None) or error}, expected a file to write") from error
+    return file
+
+
+def _parts(recording: Recording, failures: Sequence[Failure]) -> Iterator[tuple[str, bytes]]:
+    head = {**recording.head(), "failures": [vars(failure) for failure in failures]}
+    yield "head", text(head)
+    yield "story", recording.story()
+    for number in range(recording.blocks):
+        yield f"block/{number}", recording.block(number)

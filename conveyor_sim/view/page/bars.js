@@ -1,0 +1,67 @@
+// State bars: what machines do over the whole time, a bar each.
+
+import { lastUpTo } from "./block.js";
+import { palette } from "./colours.js";
+import { stateColour } from "./devices.js";
+import { element, sharp } from "./dom.js";
+import { stateName } from "./story.js";
+
+const ROW = 26, NAME = 96;
+
+export class Bars {
+  constructor(view) {
+    this.view = view;
+    this.names = [...view.story.machines.keys()];
+    this.canvas = element("canvas", {
+      class: "bars", height: 1, role: "img", "aria-label": `States over time of ${this.names.join(", ") || "no machine"}`,
+      onclick: (event) => this._jump(event),
+    });
+    this.canvas.style.height = `${this.names.length * ROW + 4}px`;
+    this.note = element("p", { class: "muted" }, this.names.length ? "A click on a bar jumps to that time." : "No machine has changed its state.");
+    this.root = element("section", {}, element("h2", {}, "Machines"), this.canvas, this.note);
+  }
+
+  _span() {
+    const { story, recording } = this.view;
+    return [Math.min(recording.start, story.events[0]?.time ?? recording.start), recording.end];
+  }
+
+  _jump(event) {
+    const [from, to] = this._span(), box = this.canvas.getBoundingClientRect();
+    const share = (event.clientX - box.left - NAME) / (box.width - NAME);
+    if (share >= 0) this.view.jump(from + share * (to - from));
+  }
+
+  draw() {
+    const context = sharp(this.canvas);
+    if (!context) return;
+    const { story, clock } = this.view, colours = palette(), [from, to] = this._span(), width = this.canvas.clientWidth;
+    const x = (time) => NAME + ((time - from) / Math.max(to - from, 1e-9)) * (width - NAME);
+    context.font = "12px system-ui, sans-serif";
+    context.textBaseline = "middle";
+    this.names.forEach((name, row) => {
+      const changes = story.machines.get(name), top = row * ROW + 4;
+      context.fillStyle = colours.ink;
+      context.fillText(name.split("/").pop(), 0, top + 9, NAME - 6);
+      const initial = this.view.recording.tags.get(`${name}/state`)?.initial;
+      const all = initial === undefined || initial === null ? changes : [{ time: from, state: initial }, ...changes];
+      all.forEach((change, i) => {
+        const end = all[i + 1]?.time ?? to;
+        context.fillStyle = stateColour(change.state);
+        context.fillRect(x(change.time), top, Math.max(1, x(end) - x(change.time)), 18);
+      });
+      const now = all[lastUpTo(all.map(({ time }) => time), clock.time)];
+      if (now) {
+        const text = stateName(now.state);
+        context.fillStyle = colours.halo;
+        context.globalAlpha = 0.85;
+        context.fillRect(NAME + 4, top + 2, context.measureText(text).width + 8, 14);
+        context.globalAlpha = 1;
+        context.fillStyle = colours.ink;
+        context.fillText(text, NAME + 8, top + 9.5);
+      }
+    });
+    context.fillStyle = colours.ink;
+    context.fillRect(x(clock.time) - 1, 0, 2, this.names.length * ROW);
+  }
+}

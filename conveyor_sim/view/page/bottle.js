@@ -1,0 +1,55 @@
+// One bottle: what it is, how fast, and its forces over the last seconds.
+
+import { palette } from "./colours.js";
+import { element, seconds, sharp } from "./dom.js";
+
+const SHOWN = 10; // s
+
+export class Bottle {
+  constructor(view) {
+    this.view = view;
+    this.facts = element("dl", { class: "facts" });
+    this.follow = element("input", { type: "checkbox", id: "follow", onchange: (event) => view.setFollowing(event.target.checked) });
+    this.speed = element("canvas", { class: "spark", role: "img", "aria-label": "Speed over the last 10 s" });
+    this.force = element("canvas", { class: "spark", role: "img", "aria-label": "Peak force over the last 10 s" });
+    this.root = element("section", {}, element("h2", {}, "Bottle"), this.facts,
+      element("label", { class: "check" }, this.follow, " Follow it (F)"), this.speed, this.force);
+  }
+
+  draw() {
+    const { view } = this, { clock, recording, story } = view;
+    if (view.bottle === null) {
+      this.facts.replaceChildren(element("dd", { class: "muted" }, "Click a bottle on the plan."));
+      return;
+    }
+    const points = recording.trace(view.bottle, clock.time - SHOWN, clock.time), now = points[points.length - 1];
+    const frame = view.plan.frame?.bottles.find(({ id }) => id === view.bottle);
+    const fed = story.fed.get(view.bottle), most = Math.max(0, ...points.map(({ force }) => force));
+    const rows = [["id", `${view.bottle}`], ["type", frame ? recording.head.types[frame.type].name : "–"],
+      ["on the line since", fed === undefined ? "before the start" : seconds(fed)],
+      ["place", frame ? `${frame.x.toFixed(3)}, ${frame.y.toFixed(3)} m` : "not on the line now"],
+      ["speed", frame ? `${frame.speed.toFixed(2)} m/s` : "–"], ["force", frame ? `${frame.force.toPrecision(3)} N` : "–"],
+      [`peak of ${SHOWN} s`, `${most.toPrecision(3)} N`], ["thrown out", story.rejected.has(view.bottle) ? "yes" : "no"]];
+    this.facts.replaceChildren(...rows.flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)]));
+    this.follow.checked = view.following;
+    if (now) {
+      this._chart(this.speed, points.map(({ time, speed }) => [time, speed]), "speed", "m/s");
+      this._chart(this.force, points.map(({ time, force }) => [time, force]), "force", "N");
+    }
+  }
+
+  _chart(canvas, points, name, unit) {
+    const context = sharp(canvas);
+    if (!context) return;
+    const colours = palette(), { clientWidth: width, clientHeight: height } = canvas, to = this.view.clock.time;
+    const most = Math.max(1e-3, ...points.map(([, value]) => value));
+    context.strokeStyle = "#0072b2";
+    context.lineWidth = 1.5;
+    context.beginPath();
+    points.forEach(([time, value], k) => context[k ? "lineTo" : "moveTo"](width * (1 - (to - time) / SHOWN), height - 4 - (value / most) * (height - 22)));
+    context.stroke();
+    context.fillStyle = colours.muted;
+    context.font = "12px system-ui, sans-serif";
+    context.fillText(`${name}, up to ${most.toPrecision(3)} ${unit}`, 4, 12);
+  }
+}

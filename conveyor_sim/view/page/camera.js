@@ -1,0 +1,106 @@
+// From metres to pixels of the canvas, and back: zoomed by the wheel, two fingers or keys, moved by dragging.
+
+const MOST = 20000; // px a metre
+
+export class Camera extends EventTarget {
+  constructor(bounds) {
+    super();
+    this.bounds = bounds; // least x, y, greatest x, y, m
+    this.scale = 100;
+    this.x = (bounds[0] + bounds[2]) / 2;
+    this.y = (bounds[1] + bounds[3]) / 2;
+    this.width = this.height = 1;
+  }
+
+  resize(width, height) {
+    const first = this.width === 1;
+    [this.width, this.height] = [width, height];
+    if (first) this.fit();
+    else this._changed();
+  }
+
+  fit(box = this.bounds, margin = 40) {
+    const [x0, y0, x1, y1] = box;
+    this.x = (x0 + x1) / 2;
+    this.y = (y0 + y1) / 2;
+    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - 2 * margin) / Math.max(y1 - y0, 0.01));
+    this.scale = Math.min(MOST, Math.max(1, fitting));
+    this._changed();
+  }
+
+  toX(x) {
+    return this.width / 2 + (x - this.x) * this.scale;
+  }
+
+  toY(y) {
+    return this.height / 2 - (y - this.y) * this.scale;
+  }
+
+  at(px, py) {
+    return [this.x + (px - this.width / 2) / this.scale, this.y - (py - this.height / 2) / this.scale];
+  }
+
+  zoom(factor, px = this.width / 2, py = this.height / 2) {
+    const [x, y] = this.at(px, py);
+    this.scale = Math.min(MOST, Math.max(1, this.scale * factor));
+    this.x = x - (px - this.width / 2) / this.scale;
+    this.y = y + (py - this.height / 2) / this.scale;
+    this._changed();
+  }
+
+  pan(dx, dy) {
+    this.x -= dx / this.scale;
+    this.y += dy / this.scale;
+    this._changed();
+  }
+
+  centre(x, y) {
+    [this.x, this.y] = [x, y];
+    this._changed();
+  }
+
+  _changed() {
+    this.dispatchEvent(new Event("change"));
+  }
+
+  // What pointers do on a canvas; clicked(px, py) is called for a press without a move, moved() as somebody pans.
+  listen(canvas, clicked, moved) {
+    const down = new Map();
+    let far = 0, apart = 0;
+    const local = (event) => {
+      const box = canvas.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0016)), ...local(event));
+    }, { passive: false });
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      down.set(event.pointerId, local(event));
+      if (down.size === 1) far = 0;
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      const before = down.get(event.pointerId);
+      if (!before) return;
+      const now = local(event);
+      down.set(event.pointerId, now);
+      far += Math.hypot(now[0] - before[0], now[1] - before[1]);
+      if (far < 4) return;
+      if (down.size === 1) this.pan(now[0] - before[0], now[1] - before[1]);
+      else {
+        const [a, b] = [...down.values()];
+        const distance = Math.hypot(a[0] - b[0], a[1] - b[1]);
+        if (apart) this.zoom(distance / apart, (a[0] + b[0]) / 2, (a[1] + b[1]) / 2);
+        apart = distance;
+      }
+      moved();
+    });
+    const up = (event) => {
+      if (down.delete(event.pointerId) && far < 4 && event.type === "pointerup") clicked(...local(event));
+      apart = 0;
+    };
+    canvas.addEventListener("pointerup", up);
+    canvas.addEventListener("pointercancel", up);
+  }
+}

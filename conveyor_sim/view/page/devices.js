@@ -1,0 +1,156 @@
+// Eyes, zones, machines, counters, and gates, pushers and diverters where they are.
+
+import { CATEGORIES } from "./colours.js";
+import { stateName } from "./story.js";
+
+const FOLDERS = {
+  photo_eye: "photo_eyes", zone: "zones", counter: "counters", infeed: "infeeds", outfeed: "outfeeds", spill: "spills",
+  station: "machines", source: "machines", sink: "machines", inspection: "machines", reject: "machines",
+};
+
+const SHOWN_BAD = 0.5; // s that an inspection is lit after a bad bottle
+
+export const deviceOf = (mark) => `${FOLDERS[mark.kind] ?? `${mark.kind}s`}/${mark.name}`;
+
+// PackML states by what they are to somebody who looks: it works, it could, it waits, it is down.
+const LOOKS = { 6: "running", 5: "starved", 11: "down", 9: "down", 8: "down", 10: "down", 2: "idle", 4: "idle", 17: "planned" };
+export const stateColour = (state) => CATEGORIES[LOOKS[state] ?? "blocked"];
+
+export function middle(points) {
+  return points.reduce((sum, [x, y]) => [sum[0] + x / points.length, sum[1] + y / points.length], [0, 0]);
+}
+
+function outline(context, camera, points, close) {
+  context.beginPath();
+  points.forEach(([x, y], k) => context[k ? "lineTo" : "moveTo"](camera.toX(x), camera.toY(y)));
+  if (close) context.closePath();
+}
+
+export function drawAreas(context, camera, colours, view) {
+  for (const mark of view.recording.head.marks) {
+    if (mark.look !== "region" && mark.look !== "exit") continue;
+    const device = deviceOf(mark), state = view.signal(`${device}/state`);
+    let colour = mark.look === "region" ? colours.zone : colours.exit, share = 0.06, note = "";
+    if (mark.look === "region") {
+      const bottles = view.signal(`${device}/bottles`), full = view.signal(`${device}/full`);
+      share = full ? 0.4 : Math.min(0.25, 0.06 + 0.01 * (bottles ?? 0));
+      note = bottles === undefined ? "" : ` ${bottles}${full ? " full" : ""}`;
+    } else if (state !== undefined) {
+      colour = stateColour(state);
+      share = 0.25;
+      note = ` · ${stateName(state)}`;
+    }
+    outline(context, camera, mark.points, true);
+    context.globalAlpha = share;
+    context.fillStyle = colour;
+    context.fill();
+    context.globalAlpha = 1;
+    context.setLineDash(mark.look === "region" ? [2, 3] : []);
+    context.lineWidth = state === undefined ? 1.5 : 2;
+    context.strokeStyle = colour;
+    context.stroke();
+    context.setLineDash([]);
+    label(view, camera, mark, note, mark.look === "region" ? 3 : 6, mark.look === "region" ? colour : colours.ink);
+  }
+}
+
+function label(view, camera, mark, note, importance, colour) {
+  const [x, y] = middle(mark.points);
+  const reach = Math.max(...mark.points.map(([, py]) => Math.abs(py - y))) * camera.scale;
+  view.labels.add(mark.name + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80), colour, bold: importance > 5 });
+}
+
+export function drawLines(context, camera, colours, view) {
+  for (const mark of view.recording.head.marks) {
+    const device = deviceOf(mark);
+    if (mark.look === "beam") drawEye(context, camera, colours, view, mark, device);
+    else if (mark.look === "passage" || mark.look === "check") drawPassage(context, camera, colours, view, mark, device);
+    else if (mark.look === "entry") drawEntry(context, camera, colours, view, mark, device);
+  }
+}
+
+function drawEye(context, camera, colours, view, mark, device) {
+  const blocked = view.signal(`${device}/blocked`) === 1;
+  const colour = blocked ? colours.lit : colours.eye;
+  outline(context, camera, mark.points, false);
+  if (blocked) {
+    context.globalAlpha = 0.25;
+    context.lineWidth = 9;
+    context.strokeStyle = colour;
+    context.stroke();
+    context.globalAlpha = 1;
+  }
+  context.setLineDash(blocked ? [] : [5, 4]);
+  context.lineWidth = blocked ? 3 : 1.5;
+  context.strokeStyle = colour;
+  context.stroke();
+  context.setLineDash([]);
+  for (const [x, y] of mark.points) {
+    const size = blocked ? 9 : 7;
+    context.fillStyle = blocked ? colour : colours.paper;
+    context.lineWidth = 2;
+    context.fillRect(camera.toX(x) - size / 2, camera.toY(y) - size / 2, size, size);
+    context.strokeRect(camera.toX(x) - size / 2, camera.toY(y) - size / 2, size, size);
+  }
+  label(view, camera, mark, blocked ? " ■" : "", 4, colour);
+}
+
+function drawPassage(context, camera, colours, view, mark, device) {
+  const since = view.clock.time - view.signal(`${device}/bad_time`);
+  const bad = view.signal(`${device}/bad`) > 0 && since >= 0 && since < SHOWN_BAD;
+  outline(context, camera, mark.points, false);
+  context.lineWidth = bad ? 4 : 2;
+  context.strokeStyle = bad ? colours.lit : colours.passage;
+  context.stroke();
+  const passed = view.signal(`${device}/forward`) ?? view.signal(`${device}/count`);
+  label(view, camera, mark, passed === undefined ? "" : ` ${passed}`, 2, colours.passage);
+}
+
+function drawEntry(context, camera, colours, view, mark, device) {
+  const state = view.signal(`${device}/state`), colour = state === undefined ? colours.entry : stateColour(state);
+  const [x, y] = mark.points[0], size = Math.max(9, Math.min(18, 0.06 * camera.scale));
+  const at = (along, across) => {
+    const cos = Math.cos(mark.direction), sin = Math.sin(mark.direction);
+    return [camera.toX(x) + along * cos - across * sin, camera.toY(y) - along * sin - across * cos];
+  };
+  context.beginPath();
+  context.moveTo(...at(0, 0));
+  context.lineTo(...at(-1.1 * size, 0.6 * size));
+  context.lineTo(...at(-1.1 * size, -0.6 * size));
+  context.closePath();
+  context.fillStyle = colour;
+  context.fill();
+  context.lineWidth = 1;
+  context.strokeStyle = colours.halo;
+  context.stroke();
+  const isStation = mark.kind === "station"; // its region has its name and state
+  if (!isStation) label(view, camera, mark, state === undefined ? "" : ` · ${stateName(state)}`, 6, colours.ink);
+}
+
+// Where the ends of a rail that moves are.
+export function moverEnds(mover, position) {
+  const [x, y] = [mover.from[0] + mover.along[0] * position, mover.from[1] + mover.along[1] * position];
+  const [dx, dy] = [mover.to[0] - mover.from[0], mover.to[1] - mover.from[1]];
+  const cos = Math.cos(mover.turning * position), sin = Math.sin(mover.turning * position);
+  return [[x, y], [x + dx * cos - dy * sin, y + dx * sin + dy * cos]];
+}
+
+export function drawMovers(context, camera, colours, view) {
+  for (const mover of view.recording.head.movers) {
+    const share = view.signal(`${mover.name}/position`);
+    const position = share === undefined ? mover.first : share * mover.stroke;
+    for (const [at, width, alpha] of [[0, 1, 0.5], [mover.stroke, 1, 0.5], [position, Math.max(4, 0.014 * camera.scale), 1]]) {
+      outline(context, camera, moverEnds(mover, at), false);
+      context.globalAlpha = alpha;
+      context.setLineDash(alpha < 1 ? [3, 4] : []);
+      context.lineCap = "round";
+      context.lineWidth = width;
+      context.strokeStyle = colours.mover;
+      context.stroke();
+    }
+    context.setLineDash([]);
+    context.lineCap = "butt";
+    const [x, y] = middle(moverEnds(mover, position));
+    view.labels.add(mover.name.split("/")[1], camera.toX(x), camera.toY(y), { importance: 4, reach: 8, colour: colours.mover });
+  }
+}

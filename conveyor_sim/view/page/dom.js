@@ -1,0 +1,44 @@
+// Elements; what they say is text, never markup.
+
+export function element(tag, properties = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name === "class") made.className = value;
+    else if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name === "dataset") Object.assign(made.dataset, value);
+    else if (value !== null && value !== false) made.setAttribute(name, value === true ? "" : value);
+  }
+  made.append(...children.filter((child) => child !== null));
+  return made;
+}
+
+export const byId = (id) => document.getElementById(id);
+
+export function seconds(time, digits = 2) {
+  return `${time.toFixed(digits)} s`;
+}
+
+// A value of a tag in words.
+export function shown(value, tag) {
+  if (value === undefined) return "…";
+  if (value === null || Number.isNaN(value)) return "–";
+  if (tag?.texts) {
+    const found = tag.texts.split(", ").find((text) => text.startsWith(`${value} `));
+    if (found) return found.slice(`${value} `.length);
+  }
+  if (tag?.kind === "bool") return value ? "on" : "off";
+  const number = Math.abs(value) >= 1000 || Number.isInteger(value) ? `${+value.toFixed(1)}` : `${+value.toPrecision(4)}`;
+  return tag?.unit && tag.unit !== "1" ? `${number} ${tag.unit}` : number;
+}
+
+// A canvas as large as its box, for a context in CSS pixels; null while it has no box.
+export function sharp(canvas) {
+  const ratio = devicePixelRatio || 1, { clientWidth, clientHeight } = canvas;
+  if (!clientWidth || !clientHeight) return null;
+  const [width, height] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, clientWidth, clientHeight);
+  return context;
+}

@@ -1,0 +1,46 @@
+// Keys, as in a video player.
+
+import { byId, element } from "./dom.js";
+
+const TABLE = [
+  ["Space, K", "play or pause"], ["← →", "one second back, ahead"], ["Shift ← →", "ten seconds back, ahead"], [", .", "one frame back, ahead"],
+  ["< >", "slower, faster"], ["Home End", "to the start, the end"], ["0 to 9", "to tenths of the recording"], ["N P", "next, previous alarm, fault or failure"],
+  ["+ −", "zoom"], ["W A S D", "move the plan"], ["Z", "whole plant"], ["F", "follow the chosen bottle"], ["C", "next colouring of bottles"], ["T", "trends"], ["Esc", "let go of what is chosen"], ["?", "these keys"],
+];
+
+export function listenToKeys(view) {
+  const { clock, camera, recording } = view, dialog = byId("keys");
+  dialog.append(element("h2", {}, "Keys"), element("table", {}, ...TABLE.map(([keys, what]) => element("tr", {}, element("th", {}, keys), element("td", {}, what)))),
+    element("button", { onclick: () => dialog.close() }, "Close"));
+  byId("help").addEventListener("click", () => dialog.showModal());
+  const seek = (time) => {
+    clock.seek(time);
+    view.snap();
+  };
+  const pan = (x, y) => {
+    view.setFollowing(false);
+    camera.pan(x, y);
+  };
+  const actions = {
+    " ": () => clock.toggle(), k: () => clock.toggle(),
+    ArrowLeft: (event) => seek(clock.time - (event.shiftKey ? 10 : 1)), ArrowRight: (event) => seek(clock.time + (event.shiftKey ? 10 : 1)),
+    ",": () => clock.step(-1), ".": () => clock.step(1), "<": () => clock.faster(-1), ">": () => clock.faster(1),
+    Home: () => seek(recording.start), End: () => seek(recording.end), n: () => view.nextMark(1), p: () => view.nextMark(-1),
+    "+": () => camera.zoom(1.25), "=": () => camera.zoom(1.25), "-": () => camera.zoom(0.8), z: () => view.wholePlant(),
+    w: () => pan(0, 60), s: () => pan(0, -60), a: () => pan(60, 0), d: () => pan(-60, 0),
+    f: () => view.setFollowing(!view.following), c: () => view.nextColouring(), t: () => byId("toggle_trends").click(),
+    Escape: () => view.letGo(), "?": () => dialog.showModal(),
+  };
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || dialog.open) return;
+    const target = event.target, typing = target.matches("input[type=search], input[list], select");
+    const pressing = target.matches("button, input[type=checkbox], [role=tab]") && [" ", "Enter"].includes(event.key);
+    const tabbing = target.matches("[role=tab]") && event.key.startsWith("Arrow");
+    if (typing || pressing || tabbing) return;
+    const digit = /^[0-9]$/.test(event.key);
+    const action = digit ? () => seek(recording.start + (+event.key / 10) * (recording.end - recording.start)) : actions[event.key] ?? actions[event.key.toLowerCase()];
+    if (!action) return;
+    event.preventDefault();
+    action(event);
+  });
+}

@@ -1,0 +1,292 @@
+// The page: a recording, its clock, the plan, and the panels around it.
+
+import { Alarms } from "./alarms.js";
+import { Bars } from "./bars.js";
+import { Bottle } from "./bottle.js";
+import { Camera } from "./camera.js";
+import { Clock, SPEEDS } from "./clock.js";
+import { COLOURINGS, isDark } from "./colours.js";
+import { deviceOf, middle } from "./devices.js";
+import { byId, element, seconds } from "./dom.js";
+import { Events } from "./events.js";
+import { Faceplate } from "./faceplate.js";
+import { listenToKeys } from "./keys.js";
+import { Plan } from "./plan.js";
+import { Recording } from "./recording.js";
+import { Scrubber } from "./scrubber.js";
+import { openSource } from "./source.js";
+import { Story } from "./story.js";
+import { Tabs } from "./tabs.js";
+import { Tiles } from "./tiles.js";
+import { Trends } from "./trends.js";
+
+const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
+
+class View {
+  constructor(recording, story) {
+    Object.assign(this, { recording, story, bottle: null, following: false, colouring: "type", showForces: true, showNames: true, dirty: true });
+    this.fastest = 1;
+    this.strongest = 10;
+    this.oldest = Math.max(1, Math.min(60, recording.end - recording.start));
+    this.clock = new Clock(recording);
+    this.camera = new Camera(boundsOf(recording.head));
+    this.plan = new Plan(byId("plan"), this);
+    this.scrubber = new Scrubber(this);
+    this.trends = new Trends(this);
+    this.faceplate = new Faceplate(this);
+    this.alarms = new Alarms(this);
+    const line = { title: "Line", parts: [new Bars(this), new Tiles(this)] };
+    const panels = { line, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [new Events(this)] },
+      device: { title: "Device", parts: [this.faceplate] }, bottle: { title: "Bottle", parts: [new Bottle(this)] } };
+    this.tabs = new Tabs(panels, "line");
+    for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
+    recording.addEventListener("loaded", () => this._loaded());
+    recording.addEventListener("failed", (event) => this.say(event.detail));
+    this.snapping = false;
+  }
+
+  touch() {
+    this.dirty = true;
+  }
+
+  say(text) {
+    byId("notice").textContent = text;
+  }
+
+  badge(name, count) {
+    this.tabs?.badge(name, count);
+  }
+
+  signal(name) {
+    return this.recording.signal(name, this.clock.time);
+  }
+
+  _loaded() {
+    if (this.snapping) this.snap();
+    this._measure();
+    this.touch();
+  }
+
+  // Scales that only grow, so that a colour means the same from frame to frame.
+  _measure() {
+    for (const block of this.recording.blocks.values()) {
+      if (block.measured) continue;
+      block.measured = true;
+      for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
+      const forces = block.contacts.flatMap(({ force }) => Array.from(force)).sort((a, b) => a - b);
+      const strong = forces[Math.floor(0.99 * forces.length)] ?? 0;
+      this.strongest = Math.max(this.strongestSeen ?? 1, strong);
+      this.strongestSeen = this.strongest;
+    }
+    this.legend();
+  }
+
+  // Time stands at a frame of the recording, once that is there.
+  snap() {
+    if (this.clock.playing) return;
+    const at = this.recording.place(this.clock.time);
+    this.snapping = !at;
+    if (at && this.clock.time !== at.block.times[at.frame]) this.clock.seek(at.block.times[at.frame]);
+  }
+
+  // To a time, and to the place of a tag or a bottle.
+  jump(time, tag = "", bottle = -1) {
+    this.clock.pause();
+    this.clock.seek(time);
+    if (bottle >= 0) this.selectBottle(bottle, false);
+    const mark = this.recording.head.marks.find((other) => tag && (tag === deviceOf(other) || tag.startsWith(`${deviceOf(other)}/`)));
+    if (!mark) return;
+    const [x, y] = middle(mark.points);
+    this.setFollowing(false);
+    this.camera.centre(x, y);
+    this.faceplate.show(deviceOf(mark));
+  }
+
+  nextMark(by) {
+    const marks = this.story.marks.filter(({ time }) => time >= this.recording.start), { time } = this.clock;
+    const found = by > 0 ? marks.find((mark) => mark.time > time + 1e-3) : marks.reverse().find((mark) => mark.time < time - 1e-3);
+    if (found) {
+      this.jump(found.time);
+      this.say(found.text);
+    }
+  }
+
+  selectBottle(id, show = true) {
+    this.bottle = id;
+    if (show) this.tabs.show("bottle");
+    byId("said").textContent = id === null ? "" : `bottle ${id} chosen`;
+    this.touch();
+  }
+
+  selectDevice(name) {
+    this.faceplate.show(name);
+    const mark = this.recording.head.marks.find((other) => deviceOf(other) === name);
+    if (mark) this.camera.centre(...middle(mark.points));
+    this.touch();
+  }
+
+  setFollowing(on) {
+    this.following = on && this.bottle !== null;
+    this.touch();
+  }
+
+  letGo() {
+    this.setFollowing(false);
+    this.selectBottle(null, false);
+  }
+
+  wholePlant() {
+    this.setFollowing(false);
+    this.camera.fit();
+  }
+
+  setColouring(name) {
+    this.colouring = byId("colour").value = name;
+    this.legend();
+    this.touch();
+  }
+
+  nextColouring() {
+    const names = Object.keys(COLOURINGS);
+    this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
+  }
+
+  legend() {
+    const colouring = COLOURINGS[this.colouring], box = byId("legend");
+    if (colouring.ramp) {
+      const [low, high] = colouring.ends(this), bar = element("span", { class: "ramp" });
+      bar.style.background = `linear-gradient(to right, ${colouring.ramp.join(", ")})`;
+      box.replaceChildren(`${low} `, bar, ` ${high}`);
+      return;
+    }
+    box.replaceChildren(...colouring.legend(this).map(([colour, name]) => {
+      const swatch = element("span", { class: "swatch" });
+      swatch.style.background = colour;
+      return element("span", { class: "entry" }, swatch, name);
+    }));
+  }
+
+  clicked(px, py) {
+    const bottle = this.plan.bottleAt(px, py);
+    if (bottle !== null) {
+      this.selectBottle(bottle);
+      return;
+    }
+    const [x, y] = this.camera.at(px, py), near = 12 / this.camera.scale;
+    const mark = this.recording.head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
+    const belt = mark ? null : [...this.recording.head.belts].reverse().find(({ outline }) => inside(outline, x, y));
+    const device = mark ? deviceOf(mark) : belt ? `belts/${belt.name}` : null;
+    if (device) {
+      this.faceplate.show(device);
+      this.tabs.show("device");
+    }
+  }
+
+  draw(now) {
+    this._follow();
+    this.plan.draw();
+    this._follow();
+    this.scrubber.draw();
+    const { clock, camera } = this, play = byId("play");
+    byId("clock").textContent = seconds(clock.time);
+    play.textContent = clock.playing ? "❚❚" : "▶";
+    play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    byId("speed").value = clock.speed;
+    byId("plan").dataset.camera = [camera.x, camera.y, camera.scale, camera.width, camera.height].join(" ");
+    byId("plan").dataset.frame = this.plan.frame ? this.plan.frame.time.toFixed(6) : "";
+    document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
+    if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
+    this.panelsDrawn = now;
+    this.alarms.draw();
+    this.tabs.draw();
+    this.trends.draw();
+  }
+
+  _follow() {
+    if (!this.following) return;
+    const bottle = this.plan.frame?.bottles.find(({ id }) => id === this.bottle);
+    if (bottle && (bottle.x !== this.camera.x || bottle.y !== this.camera.y)) this.camera.centre(bottle.x, bottle.y);
+  }
+}
+
+function boundsOf(head) {
+  const points = [...head.belts.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)];
+  const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k]));
+  const least = (list) => list.reduce((a, b) => Math.min(a, b), Infinity), most = (list) => list.reduce((a, b) => Math.max(a, b), -Infinity);
+  return points.length ? [least(xs), least(ys), most(xs), most(ys)] : [-1, -1, 1, 1];
+}
+
+function inside(points, x, y) {
+  let found = false;
+  points.forEach(([ax, ay], k) => {
+    const [bx, by] = points[(k + 1) % points.length];
+    if (ay > y !== by > y && x < ((bx - ax) * (y - ay)) / (by - ay) + ax) found = !found;
+  });
+  return found;
+}
+
+function awayFrom([ax, ay], [bx, by], x, y) {
+  const length = (bx - ax) ** 2 + (by - ay) ** 2;
+  const share = length ? Math.min(1, Math.max(0, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length)) : 0;
+  return Math.hypot(ax + share * (bx - ax) - x, ay + share * (by - ay) - y);
+}
+
+function wire(view) {
+  const { clock, camera, recording } = view, { head } = recording;
+  byId("scene").textContent = document.title = head.scene;
+  byId("where").textContent = head.where || head.description || "";
+  byId("end").textContent = seconds(recording.end);
+  byId("colour").append(...Object.entries(COLOURINGS).map(([name, { label }]) => element("option", { value: name }, label)));
+  byId("colour").addEventListener("change", (event) => view.setColouring(event.target.value));
+  byId("speed").append(...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
+  byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
+  const clicks = {
+    play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
+    to_start: () => { clock.seek(recording.start); view.snap(); },
+    theme: () => { document.documentElement.dataset.theme = isDark() ? "light" : "dark"; view.touch(); },
+    toggle_trends: () => {
+      const hidden = byId("drawer").toggleAttribute("hidden");
+      byId("toggle_trends").setAttribute("aria-expanded", !hidden);
+    },
+  };
+  for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
+  for (const [id, field] of [["forces", "showForces"], ["names", "showNames"]]) {
+    byId(id).addEventListener("change", (event) => { view[field] = event.target.checked; view.touch(); });
+  }
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view.touch());
+  camera.listen(byId("plan"), (px, py) => view.clicked(px, py), () => view.setFollowing(false));
+  listenToKeys(view);
+  new ResizeObserver(() => { view.plan.resize(); view.touch(); }).observe(byId("stage"));
+  view.setColouring("type");
+}
+
+async function start() {
+  const source = openSource(), read = async (name) => JSON.parse(new TextDecoder().decode(await source.bytes(name)));
+  const [head, story] = await Promise.all([read("head"), read("story")]);
+  const recording = new Recording(source, head), view = new View(recording, new Story({ ...story, failures: head.failures }));
+  wire(view);
+  view.plan.resize();
+  const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
+  if (failure) {
+    view.say(failure.text);
+    view.clock.seek(Math.max(recording.start, failure.time - 5));
+  }
+  await recording.load(recording.number(view.clock.time));
+  view.snap();
+  let before = performance.now();
+  const loop = (now) => {
+    view.clock.advance(Math.min(0.25, (now - before) / 1000));
+    before = now;
+    if (view.dirty) {
+      view.dirty = false;
+      view.draw(now);
+    }
+    requestAnimationFrame(loop);
+  };
+  requestAnimationFrame(loop);
+  document.body.dataset.ready = "yes";
+}
+
+start().catch((error) => {
+  byId("notice").textContent = `This recording can't be shown: ${error.message}`;
+});

@@ -1,0 +1,183 @@
+// The plan: what is drawn of the line at a moment, in one pass over the canvas.
+
+import { Belts } from "./belts.js";
+import { COLOURINGS, palette } from "./colours.js";
+import { drawAreas, drawLines, drawMovers } from "./devices.js";
+import { Labels } from "./labels.js";
+
+const WIDTHS = 6; // of lines of force
+
+export class Plan {
+  constructor(canvas, view) {
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d");
+    this.view = view;
+    this.belts = new Belts(view.recording.head.belts);
+    this.labels = view.labels = new Labels();
+    this.sprites = new Map();
+    this.last = null; // time of the last picture
+    this.frame = null;
+  }
+
+  resize() {
+    const ratio = devicePixelRatio || 1, { clientWidth, clientHeight } = this.canvas;
+    this.canvas.width = Math.round(clientWidth * ratio);
+    this.canvas.height = Math.round(clientHeight * ratio);
+    this.ratio = ratio;
+    this.sprites.clear();
+    this.view.camera.resize(clientWidth, clientHeight);
+  }
+
+  draw() {
+    const { view, context } = this, { camera, clock, recording } = view, colours = palette();
+    const frame = recording.frame(clock.time, clock.playing) ?? this.frame; // while it loads, what was there
+    this.frame = frame;
+    const speeds = recording.head.belts.map((_, i) => recording.at("belts", i, clock.time) ?? 0);
+    const gone = this.last === null ? 0 : clock.time - this.last;
+    if (Math.abs(gone) < 1) this.belts.advance(speeds, gone);
+    this.last = clock.time;
+    context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    context.fillStyle = colours.paper;
+    context.fillRect(0, 0, camera.width, camera.height);
+    this.labels.clear();
+    this.belts.draw(context, camera, colours, speeds);
+    drawAreas(context, camera, colours, view);
+    this._rails(colours);
+    if (frame) this._bottles(frame, colours);
+    if (frame && view.showForces) this._forces(frame, colours);
+    drawMovers(context, camera, colours, view);
+    drawLines(context, camera, colours, view);
+    this._beltNames(colours, speeds);
+    if (frame) this._selected(frame, colours);
+    if (view.showNames) this.labels.draw(context, camera, colours);
+  }
+
+  _rails(colours) {
+    const { context, view: { camera, recording } } = this;
+    context.beginPath();
+    for (const rail of recording.head.rails) {
+      rail.forEach(([x, y], k) => context[k ? "lineTo" : "moveTo"](camera.toX(x), camera.toY(y)));
+    }
+    context.lineJoin = context.lineCap = "round";
+    context.lineWidth = Math.max(2, 0.008 * camera.scale);
+    context.strokeStyle = colours.rail;
+    context.stroke();
+    context.lineCap = "butt";
+  }
+
+  _bottles(frame, colours) {
+    const { context, view } = this, { camera, recording: { head } } = view, colouring = COLOURINGS[view.colouring];
+    for (const bottle of frame.bottles) {
+      const x = camera.toX(bottle.x), y = camera.toY(bottle.y), radius = head.types[bottle.type].radius * camera.scale;
+      if (x < -radius || y < -radius || x > camera.width + radius || y > camera.height + radius) continue;
+      const colour = colouring.of(bottle, view);
+      if (radius < 1.5) {
+        context.fillStyle = colour;
+        context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);
+      } else if (radius < 60) {
+        const sprite = this._sprite(colour, radius, colours.edge);
+        context.drawImage(sprite, x - sprite.reach, y - sprite.reach, 2 * sprite.reach, 2 * sprite.reach);
+      } else this._circle(context, x, y, radius, colour, colours.edge);
+      if (radius > 16) this.labels.add(`${bottle.id}`, x, y - radius - 4, { importance: 1, reach: -11 });
+    }
+  }
+
+  _circle(context, x, y, radius, colour, edge) {
+    context.beginPath();
+    context.arc(x, y, Math.max(0.5, radius - 0.5), 0, 2 * Math.PI);
+    context.fillStyle = colour;
+    context.fill();
+    context.lineWidth = 1;
+    context.strokeStyle = edge;
+    context.stroke();
+    if (radius > 6) {
+      context.beginPath();
+      context.arc(x, y, radius * 0.45, 0, 2 * Math.PI); // the neck
+      context.globalAlpha = 0.35;
+      context.stroke();
+      context.globalAlpha = 1;
+    }
+  }
+
+  // A bottle as a picture: to copy it takes a fraction of drawing it.
+  _sprite(colour, radius, edge) {
+    const key = `${colour} ${radius} ${edge}`;
+    let sprite = this.sprites.get(key);
+    if (!sprite) {
+      if (this.sprites.size > 400) this.sprites.clear();
+      const reach = Math.ceil(radius) + 1;
+      sprite = document.createElement("canvas");
+      sprite.width = sprite.height = Math.ceil(2 * reach * this.ratio);
+      sprite.reach = sprite.width / 2 / this.ratio;
+      const context = sprite.getContext("2d");
+      context.scale(this.ratio, this.ratio);
+      this._circle(context, sprite.reach, sprite.reach, radius, colour, edge);
+      this.sprites.set(key, sprite);
+    }
+    return sprite;
+  }
+
+  _forces(frame, colours) {
+    const { context, view } = this, { camera } = view, { contacts, bottles, places } = frame;
+    if (!contacts) return;
+    const paths = Array.from({ length: WIDTHS }, () => new Path2D());
+    for (let i = 0; i < contacts.force.length; i++) {
+      const a = bottles[places[contacts.a[i]]], b = contacts.b[i] < 0 ? null : bottles[places[contacts.b[i]]];
+      if (!a || (contacts.b[i] >= 0 && !b) || contacts.force[i] <= 0) continue;
+      const share = Math.sqrt(contacts.force[i] / view.strongest);
+      const path = paths[Math.min(WIDTHS - 1, Math.floor(share * WIDTHS))];
+      path.moveTo(camera.toX(a.x), camera.toY(a.y));
+      path.lineTo(camera.toX(b ? b.x : contacts.x[i]), camera.toY(b ? b.y : contacts.y[i]));
+    }
+    context.strokeStyle = colours.force;
+    context.lineCap = "round";
+    paths.forEach((path, i) => {
+      context.lineWidth = Math.min(12, (0.6 + 1.1 * i) * Math.min(2, Math.max(0.6, camera.scale / 250)));
+      context.stroke(path);
+    });
+    context.lineCap = "butt";
+  }
+
+  _beltNames(colours, speeds) {
+    const { camera, recording: { head } } = this.view;
+    head.belts.forEach((belt, i) => {
+      const angle = belt.start + belt.span / 2, radius = belt.inner + belt.width / 2;
+      const [x, y] = belt.kind === "straight"
+        ? [0, 1].map((k) => (belt.outline[0][k] + belt.outline[2][k]) / 2)
+        : [belt.centre[0] + radius * Math.cos(angle), belt.centre[1] + radius * Math.sin(angle)];
+      this.labels.add(`${belt.name} ${speeds[i].toFixed(2)} m/s`, camera.toX(x), camera.toY(y), {
+        importance: 2, reach: Math.min(60, 0.5 * belt.width * camera.scale), colour: colours.muted,
+      });
+    });
+  }
+
+  _selected(frame, colours) {
+    const { context, view } = this, { camera, recording, clock } = view;
+    if (view.bottle === null) return;
+    const points = recording.trace(view.bottle, clock.time - 10, clock.time);
+    context.beginPath();
+    points.forEach(({ x, y }, k) => context[k ? "lineTo" : "moveTo"](camera.toX(x), camera.toY(y)));
+    context.lineWidth = 2.5;
+    context.strokeStyle = colours.select;
+    context.stroke();
+    const bottle = frame.bottles.find(({ id }) => id === view.bottle);
+    if (!bottle) return;
+    const radius = recording.head.types[bottle.type].radius * camera.scale;
+    context.beginPath();
+    context.arc(camera.toX(bottle.x), camera.toY(bottle.y), radius + 4, 0, 2 * Math.PI);
+    context.lineWidth = 3;
+    context.stroke();
+    this.labels.add(`bottle ${bottle.id}`, camera.toX(bottle.x), camera.toY(bottle.y), { importance: 9, reach: radius + 4, colour: colours.select, bold: true });
+  }
+
+  // The bottle, or else the device, at a point of the canvas.
+  bottleAt(px, py) {
+    const { camera, recording: { head } } = this.view;
+    let best = null, least = Infinity;
+    for (const bottle of this.frame?.bottles ?? []) {
+      const far = Math.hypot(camera.toX(bottle.x) - px, camera.toY(bottle.y) - py) - head.types[bottle.type].radius * camera.scale;
+      if (far < Math.min(least, 4)) [best, least] = [bottle.id, far];
+    }
+    return best;
+  }
+}

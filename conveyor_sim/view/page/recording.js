@@ -1,0 +1,198 @@
+// A recording by time: frames of bottles, signals, contacts, in blocks that are loaded as they are asked for.
+
+import { lastUpTo, readBlock } from "./block.js";
+
+const KEPT = 60; // blocks
+const NEAR = 1e-6; // s
+const SPAN = 2; // frames to either side by which a speed is measured
+
+export class Recording extends EventTarget {
+  constructor(source, head) {
+    super();
+    this.source = source;
+    this.head = head;
+    const { first, last, block, blocks } = head.times;
+    this.start = first * head.tick;
+    this.end = last * head.tick;
+    this.length = block * head.tick; // of a block
+    this.count = blocks;
+    this.blocks = new Map();
+    this.pending = new Map();
+    this.signalIndex = new Map(head.signals.map((name, index) => [name, index]));
+    this.tags = new Map(head.tags.map((tag) => [tag.name, tag]));
+  }
+
+  number(time) {
+    return Math.min(this.count - 1, Math.max(0, Math.floor((time - this.start + NEAR) / this.length)));
+  }
+
+  // The block of a number if it is there; else it is loaded, and "loaded" says when.
+  block(number) {
+    if (number < 0 || number >= this.count) return null;
+    const found = this.blocks.get(number);
+    if (found) {
+      this.blocks.delete(number);
+      this.blocks.set(number, found); // the last one used is forgotten last
+      return found;
+    }
+    this.load(number);
+    return null;
+  }
+
+  load(number) {
+    if (!this.blocks.has(number) && !this.pending.has(number)) this.pending.set(number, this._read(number));
+    return this.pending.get(number) ?? Promise.resolve(this.blocks.get(number));
+  }
+
+  async _read(number) {
+    const { first, block } = this.head.times;
+    try {
+      const bytes = await this.source.bytes(`block/${number}`);
+      const read = readBlock(bytes, this.head.steps, first + number * block, this.head.tick);
+      this.blocks.set(number, read);
+      for (const old of this.blocks.keys()) {
+        if (this.blocks.size <= KEPT) break;
+        this.blocks.delete(old);
+      }
+      return read;
+    } catch (error) {
+      this.dispatchEvent(new CustomEvent("failed", { detail: error.message }));
+      return null;
+    } finally {
+      this.pending.delete(number);
+      this.dispatchEvent(new Event("loaded"));
+    }
+  }
+
+  // The block and the place in it of the last frame up to a time; null while it is loading, or before the first.
+  place(time) {
+    for (let number = this.number(time); number >= 0; number--) {
+      const block = this.block(number);
+      if (!block) return null;
+      const frame = lastUpTo(block.times, time + NEAR);
+      if (frame >= 0) return { number, block, frame };
+    }
+    return null;
+  }
+
+  // The time of the frame some steps after that of a time; null while it is loading.
+  async stepped(time, steps) {
+    await this.load(this.number(time));
+    let at = this.place(time);
+    if (!at) return null;
+    let { number, block, frame } = at;
+    frame += steps;
+    while (block && frame >= block.times.length && number + 1 < this.count) {
+      frame -= block.times.length;
+      block = await this.load(++number);
+    }
+    while (block && frame < 0 && number > 0) {
+      block = await this.load(--number);
+      frame += block ? block.times.length : 0;
+    }
+    if (!block || !block.times.length) return null;
+    return block.times[Math.min(block.times.length - 1, Math.max(0, frame))];
+  }
+
+  // Bottles at a time, between two frames if it is moving; null while they are loading.
+  frame(time, moving) {
+    const at = this.place(time);
+    if (!at) return null;
+    const { number, block, frame } = at;
+    const next = frame + 1 < block.times.length ? null : this.block(number + 1);
+    const nextTime = next ? next.times[0] : block.times[frame + 1];
+    const share = moving && nextTime > block.times[frame] ? Math.min(1, (time - block.times[frame]) / (nextTime - block.times[frame])) : 0;
+    const bottles = [];
+    const places = new Int32Array(block.tracks.length).fill(-1);
+    for (const track of block.tracks) {
+      const k = frame - track.first;
+      if (k < 0 || k >= track.count) continue;
+      let x = track.x[k], y = track.y[k];
+      if (share > 0) {
+        const later = next ? next.byId.get(track.id) : track;
+        const j = next ? (later && later.first === 0 ? 0 : -1) : k + 1 < track.count ? k + 1 : -1;
+        if (j >= 0) {
+          x += share * (later.x[j] - x);
+          y += share * (later.y[j] - y);
+        }
+      }
+      places[track.place] = bottles.length;
+      bottles.push({ id: track.id, type: track.type, x, y, speed: speedOf(block, track, k), force: forceOf(track, frame, this.head.steps) });
+    }
+    return { time: block.times[frame], bottles, places, contacts: this._contacts(block, time) };
+  }
+
+  _contacts(block, time) {
+    let found = null;
+    for (const contacts of block.contacts) {
+      if (contacts.time > time + NEAR) break;
+      found = contacts;
+    }
+    return found;
+  }
+
+  // A column of `belts` or `signals` at a time; undefined: not there, or not yet.
+  at(table, column, time) {
+    for (let number = this.number(time), tries = 0; number >= 0 && tries < 2; number--, tries++) {
+      const block = this.block(number);
+      if (!block) return undefined;
+      const row = lastUpTo(block[table].times, time + NEAR);
+      if (row < 0) continue;
+      const { rows, values } = block[table].columns[column] ?? { rows: [], values: [] };
+      const place = lastUpTo(rows, row);
+      return place < 0 ? 0 : values[place];
+    }
+    return undefined;
+  }
+
+  signal(name, time) {
+    const column = this.signalIndex.get(name);
+    return column === undefined ? undefined : this.at("signals", column, time);
+  }
+
+  // What a signal was, from a time to another: times and values, of loaded blocks; others are sent for.
+  series(name, from, to) {
+    const column = this.signalIndex.get(name), times = [], found = [];
+    if (column === undefined) return { times, values: found };
+    for (let number = this.number(from); number <= this.number(to); number++) {
+      const block = this.block(number);
+      if (!block) continue;
+      const table = block.signals;
+      const { rows, values } = table.columns[column] ?? { rows: [], values: [] };
+      let place = -1;
+      for (let row = 0; row < table.times.length; row++) {
+        while (place + 1 < rows.length && rows[place + 1] <= row) place++;
+        if (table.times[row] < from - NEAR || table.times[row] > to + NEAR) continue;
+        times.push(table.times[row]);
+        found.push(place < 0 ? 0 : values[place]);
+      }
+    }
+    return { times, values: found };
+  }
+
+  // Where a bottle has been, in the loaded blocks up to a time: points in order.
+  trace(id, from, to) {
+    const points = [];
+    for (let number = this.number(from); number <= this.number(to); number++) {
+      const block = this.block(number), track = block?.byId.get(id);
+      if (!track) continue;
+      for (let k = 0; k < track.count; k++) {
+        const time = block.times[track.first + k];
+        if (time < from - NEAR || time > to + NEAR) continue;
+        points.push({ time, x: track.x[k], y: track.y[k], speed: speedOf(block, track, k), force: forceOf(track, track.first + k, this.head.steps) });
+      }
+    }
+    return points;
+  }
+}
+
+function forceOf(track, frame, steps) {
+  return track.force[Math.floor(frame / steps.forceFrames) - track.firstSlot] ?? 0;
+}
+
+function speedOf(block, track, k) {
+  const a = Math.max(0, k - SPAN), b = Math.min(track.count - 1, k + SPAN);
+  if (a === b) return 0;
+  const seconds = block.times[track.first + b] - block.times[track.first + a];
+  return Math.hypot(track.x[b] - track.x[a], track.y[b] - track.y[a]) / seconds;
+}

@@ -1,0 +1,93 @@
+// The scrubber: where in time one is, with marks of alarms, faults, refusals and failed conditions.
+
+import { palette } from "./colours.js";
+import { byId, element, seconds, sharp } from "./dom.js";
+
+const KINDS = { alarm: ["#d55e00", 0], fault: ["#cc79a7", 1], refused: ["#e69f00", 1], failed: ["#d1330d", 2] };
+const NEAR = 6; // px
+
+export class Scrubber {
+  constructor(view) {
+    this.view = view;
+    this.box = byId("scrubber");
+    this.canvas = this.box.querySelector("canvas");
+    this.tip = element("div", { class: "tip", role: "tooltip", hidden: true });
+    this.box.append(this.tip);
+    const { recording } = view;
+    this.box.setAttribute("aria-valuemin", recording.start.toFixed(2));
+    this.box.setAttribute("aria-valuemax", recording.end.toFixed(2));
+    this.dragging = false;
+    this.box.addEventListener("pointerdown", (event) => {
+      this.box.setPointerCapture(event.pointerId);
+      this.dragging = true;
+      const mark = this._markAt(event);
+      if (mark) view.jump(mark.time);
+      else this._seek(event);
+    });
+    this.box.addEventListener("pointermove", (event) => {
+      if (this.dragging) this._seek(event);
+      this._tell(event);
+    });
+    for (const end of ["pointerup", "pointercancel"]) this.box.addEventListener(end, () => (this.dragging = false));
+    this.box.addEventListener("pointerleave", () => (this.tip.hidden = true));
+  }
+
+  x(time) {
+    const { start, end } = this.view.recording;
+    return 8 + ((time - start) / Math.max(end - start, 1e-9)) * (this.box.clientWidth - 16);
+  }
+
+  _time(event) {
+    const { start, end } = this.view.recording, box = this.box.getBoundingClientRect();
+    return Math.min(end, Math.max(start, start + ((event.clientX - box.left - 8) / (box.width - 16)) * (end - start)));
+  }
+
+  _seek(event) {
+    this.view.clock.seek(this._time(event));
+    this.view.snap();
+  }
+
+  _markAt(event) {
+    const px = event.clientX - this.box.getBoundingClientRect().left;
+    const near = this.view.story.marks.filter((mark) => Math.abs(this.x(mark.time) - px) < NEAR && mark.time >= this.view.recording.start);
+    return near.sort((a, b) => KINDS[b.kind][1] - KINDS[a.kind][1] || Math.abs(this.x(a.time) - px) - Math.abs(this.x(b.time) - px))[0];
+  }
+
+  _tell(event) {
+    const mark = this._markAt(event), time = mark ? mark.time : this._time(event);
+    this.tip.textContent = mark ? `${seconds(time)} ${mark.text}` : seconds(time);
+    this.tip.hidden = false;
+    const half = this.tip.offsetWidth / 2;
+    this.tip.style.left = `${Math.min(this.box.clientWidth - half, Math.max(half, this.x(time)))}px`;
+  }
+
+  draw() {
+    const context = sharp(this.canvas);
+    if (!context) return;
+    const { clock, recording, story } = this.view, colours = palette(), height = this.canvas.clientHeight, middle = height / 2;
+    const line = (from, to, width, colour) => {
+      context.fillStyle = colour;
+      context.fillRect(from, middle - width / 2, to - from, width);
+    };
+    line(this.x(recording.start), this.x(recording.end), 4, colours.beltEdge);
+    line(this.x(recording.start), this.x(clock.time), 4, "#0072b2");
+    for (const mark of story.marks) {
+      if (mark.time < recording.start) continue;
+      const [colour, weight] = KINDS[mark.kind], x = this.x(mark.time);
+      context.fillStyle = colour;
+      context.fillRect(x - 1, 4, weight > 1 ? 3 : 2, height - 8);
+      context.beginPath();
+      context.arc(x, weight > 1 ? height - 5 : 5, weight > 1 ? 5 : 3.5, 0, 2 * Math.PI);
+      context.fill();
+    }
+    context.beginPath();
+    context.arc(this.x(clock.time), middle, 8, 0, 2 * Math.PI);
+    context.fillStyle = "#0072b2";
+    context.fill();
+    context.lineWidth = 2;
+    context.strokeStyle = colours.halo;
+    context.stroke();
+    this.box.setAttribute("aria-valuenow", clock.time.toFixed(2));
+    this.box.setAttribute("aria-valuetext", seconds(clock.time));
+  }
+}

@@ -1,0 +1,93 @@
+// What happened: events, alarms, states of machines, counters, as they were at a time.
+
+import { lastUpTo } from "./block.js";
+
+const STATE_NAMES = [
+  "Undefined", "Clearing", "Stopped", "Starting", "Idle", "Suspended", "Execute", "Stopping", "Aborting", "Aborted",
+  "Holding", "Held", "Unholding", "Suspending", "Unsuspending", "Resetting", "Completing", "Complete",
+];
+export const ALARM_STATES = [
+  "normal", "unacknowledged", "acknowledged", "returned", "latched", "latched, acknowledged", "shelved", "suppressed",
+  "out of service",
+];
+const STANDS = new Set([1, 2, 4, 5]);
+const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
+
+export const stateName = (number) => STATE_NAMES[number] ?? `state ${number}`;
+
+export class Story {
+  constructor(data) {
+    this.data = data;
+    const { events } = data;
+    this.events = events.at.map((time, i) => ({
+      time, kind: events.kind[i], name: events.name[i], bottle: events.bottle[i], value: events.value[i], text: events.text[i],
+    }));
+    this.eventTimes = events.at;
+    this.fed = new Map();
+    this.rejected = new Set();
+    this.machines = new Map();
+    for (const event of this.events) {
+      if (event.kind === "bottle_fed") this.fed.set(event.bottle, event.time);
+      if (event.kind === "bottle_rejected") this.rejected.add(event.bottle);
+      if (event.kind === "machine_state" && event.name.endsWith("/state")) this._state(event);
+    }
+    this.alarms = new Map();
+    for (const [time, number, state, active, firstOut, since, by] of data.alarm_changes) {
+      if (!this.alarms.has(number)) this.alarms.set(number, { times: [], states: [], ...data.alarms[number] });
+      const alarm = this.alarms.get(number);
+      alarm.times.push(time);
+      alarm.states.push({ state, active, firstOut, since, by });
+    }
+    this.counterTimes = data.counters.map((entry) => entry.at);
+    this.marks = this._marks();
+  }
+
+  _state(event) {
+    const device = event.name.replace(/\/state$/, "");
+    if (!this.machines.has(device)) this.machines.set(device, []);
+    this.machines.get(device).push({ time: event.time, state: event.value });
+  }
+
+  _marks() {
+    const marks = [];
+    for (const event of this.events) {
+      if (event.kind === "alarm_raised") marks.push({ time: event.time, kind: "alarm", text: `alarm ${event.name} ${event.text}` });
+      if (event.kind === "fault_injected") marks.push({ time: event.time, kind: "fault", text: `fault ${event.name}` });
+      if (event.kind === "command_refused") marks.push({ time: event.time, kind: "refused", text: `refused ${event.name}: ${event.text}` });
+    }
+    for (const failure of this.data.failures ?? []) marks.push({ ...failure, kind: "failed" });
+    return marks.sort((a, b) => a.time - b.time);
+  }
+
+  // Alarms that are not normal at a time, those that stand first, by priority.
+  alarmsAt(time) {
+    const found = [];
+    for (const [number, alarm] of this.alarms) {
+      const now = alarm.states[lastUpTo(alarm.times, time + 1e-6)];
+      if (now && SHOWN.has(now.state)) found.push({ number, ...alarm, ...now, stands: STANDS.has(now.state) });
+    }
+    return found.sort((a, b) => b.stands - a.stands || b.priority - a.priority || b.since - a.since);
+  }
+
+  countersAt(time) {
+    return this.data.counters[lastUpTo(this.counterTimes, time + 1e-6)] ?? null;
+  }
+
+  readBackAt(command, time) {
+    let found = null;
+    for (const [at, place, value, writer] of this.data.readback) {
+      if (at > time + 1e-6) break;
+      if (place === command) found = { value, writer, since: at };
+    }
+    return found;
+  }
+
+  forcedAt(time) {
+    let found = [];
+    for (const [at, forced] of this.data.forced) {
+      if (at > time + 1e-6) break;
+      found = forced;
+    }
+    return found;
+  }
+}

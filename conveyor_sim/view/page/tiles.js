@@ -1,0 +1,46 @@
+// OEE tiles: what each machine and the line have made since their last reset.
+
+import { CATEGORIES } from "./colours.js";
+import { element } from "./dom.js";
+
+const percent = (share) => (share === null || share === undefined ? "–" : `${(100 * share).toFixed(1)} %`);
+
+export class Tiles {
+  constructor(view) {
+    this.view = view;
+    this.list = element("div", { class: "tiles" });
+    this.root = element("section", {}, element("h2", {}, "Production"), this.list);
+    this.drawn = null;
+  }
+
+  draw() {
+    const { story, clock, recording } = this.view, entry = story.countersAt(clock.time);
+    if (entry === this.drawn && entry !== null) return;
+    this.drawn = entry;
+    if (!entry) {
+      this.list.replaceChildren(element("p", { class: "muted" }, "No counters were recorded up to here."));
+      return;
+    }
+    const fields = recording.head.fields.counters;
+    this.list.replaceChildren(...entry.name.map((name, i) => {
+      const row = Object.fromEntries(fields.map((field, k) => [field, entry.rows[i][k]]));
+      const times = Object.keys(CATEGORIES).map((category) => [category, row[category]]).filter(([, time]) => time > 0);
+      const all = times.reduce((sum, [, time]) => sum + time, 0);
+      const bar = element("div", { class: "times", role: "img", "aria-label": times.map(([category, time]) => `${category} ${time.toFixed(0)} s`).join(", ") },
+        ...times.map(([category, time]) => {
+          const part = element("span", { title: `${category} ${time.toFixed(1)} s` });
+          part.style.width = `${(100 * time) / all}%`;
+          part.style.background = CATEGORIES[category];
+          return part;
+        }));
+      return element("article", { class: "tile" },
+        element("h3", {}, name.replace("machines/", "")),
+        element("div", { class: "oee" }, element("strong", {}, percent(row.oee)), element("span", {}, "OEE")),
+        element("dl", {},
+          ...[["availability", percent(row.availability)], ["effectiveness", percent(row.effectiveness)], ["quality", percent(row.quality)],
+            ["bottles", `${row.processed}`]].flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
+        all ? bar : null,
+        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, `${row.category}: ${row.stop_reason}`) : null);
+    }));
+  }
+}

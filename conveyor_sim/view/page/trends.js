@@ -1,0 +1,155 @@
+// Trends of chosen signals around now, with commands and faults as marks; drawn by uPlot.
+
+import { COLOURED, palette } from "./colours.js";
+import { byId, element, seconds } from "./dom.js";
+
+const MOST = 8; // signals
+const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d" };
+const LONGEST = 28; // letters of a mark
+const WINDOWS = [10, 30, 60, 120]; // s
+
+export class Trends {
+  constructor(view) {
+    this.view = view;
+    this.names = [];
+    this.window = 30;
+    this.plot = null;
+    const { recording } = view;
+    this.input = element("input", { list: "signals", placeholder: "Add a signal …", "aria-label": "Add a signal to the trends", onchange: () => this._typed() });
+    this.chips = element("div", { class: "chips" });
+    this.choice = element("select", { "aria-label": "Seconds shown", onchange: () => { this.window = +this.choice.value; view.touch(); } },
+      ...WINDOWS.map((window) => element("option", { value: window, selected: window === this.window }, `${window} s`)));
+    byId("trendbar").append(this.chips, this.input,
+      element("datalist", { id: "signals" }, ...recording.head.signals.map((name) => element("option", { value: name }))), this.choice);
+    this.box = byId("trends");
+    for (const name of this._first()) this.add(name);
+  }
+
+  // What there is to see at first: machines and eyes say most, belts are everywhere.
+  _first() {
+    const { signals } = this.view.recording.head, found = [];
+    for (const pattern of [/^belts\/.*\/speed$/, /^photo_eyes\/.*\/blocked$/, /^zones\/.*\/bottles$/, /^gates\/.*\/position$/, /\/rate$/]) {
+      found.push(...signals.filter((name) => pattern.test(name)).slice(0, 2));
+    }
+    return found.slice(0, 4);
+  }
+
+  _typed() {
+    if (this.view.recording.signalIndex.has(this.input.value)) {
+      this.add(this.input.value);
+      this.input.value = "";
+    }
+  }
+
+  add(name) {
+    if (this.names.includes(name) || !this.view.recording.signalIndex.has(name)) return;
+    this.names = [...this.names, name].slice(-MOST);
+    this._chipped();
+  }
+
+  remove(name) {
+    this.names = this.names.filter((other) => other !== name);
+    this._chipped();
+  }
+
+  _chipped() {
+    this.chips.replaceChildren(...this.names.map((name, i) => {
+      const swatch = element("span", { class: "swatch" });
+      swatch.style.background = COLOURED(i);
+      return element("button", { class: "chip", title: `Remove ${name}`, onclick: () => this.remove(name) }, swatch, name, " ✕");
+    }));
+    this.plot?.destroy();
+    this.plot = null;
+    this.view.touch();
+  }
+
+  // How a signal is drawn: switches as steps below, all of one unit on one axis.
+  _scale(name) {
+    const tag = this.view.recording.tags.get(name);
+    return tag?.kind === "bool" ? "switch" : tag?.unit || "1";
+  }
+
+  _make() {
+    const colours = palette(), scales = { x: { time: false } }, axes = [{ stroke: colours.muted, size: 28, gap: 2, grid: { stroke: colours.slat, width: 1 }, values: (_, at) => at.map((time) => `${time} s`) }];
+    for (const scale of new Set(this.names.map((name) => this._scale(name)))) {
+      scales[scale] = { auto: false };
+      if (scale !== "switch" && axes.length < 3) axes.push({ scale, stroke: colours.muted, size: 68, space: 26, side: axes.length === 1 ? 3 : 1, grid: { show: axes.length === 1, stroke: colours.slat, width: 1 }, values: (_, at) => at.map((value) => (scale === "1" ? `${value}` : `${value} ${scale}`)) });
+    }
+    const stepped = uPlot.paths.stepped({ align: 1 });
+    this.plot = new uPlot({
+      width: this.box.clientWidth, height: this.box.clientHeight, legend: { show: false }, scales, axes, cursor: { y: false, drag: { x: false, y: false } },
+      series: [{}, ...this.names.map((name, i) => ({ label: name, scale: this._scale(name), stroke: COLOURED(i), width: 2, points: { show: false }, spanGaps: false, paths: this.view.recording.tags.get(name)?.kind === "number" ? undefined : stepped }))],
+      hooks: { draw: [(plot) => this._marks(plot)] },
+    }, this._data(), this.box);
+    this.plot.over.addEventListener("click", (event) => this.view.jump(this.plot.posToVal(event.offsetX, "x")));
+    this.theme = colours;
+  }
+
+  _span() {
+    const { clock, recording } = this.view, from = Math.max(recording.start, clock.time - 0.75 * this.window);
+    return [from, Math.min(Math.max(recording.end, from + 1), from + this.window)];
+  }
+
+  _data() {
+    const [from, to] = this._span(), all = this.names.map((name) => this.view.recording.series(name, from, to));
+    return [all[0]?.times ?? [], ...all.map(({ values }) => values)];
+  }
+
+  _marks(plot) {
+    const { ctx: context, bbox } = plot, { clock, story } = this.view, [from, to] = this._span(), colours = palette();
+    let free = 0; // px from which on there is room for a text
+    const line = (time, colour, dash, text) => {
+      const x = plot.valToPos(time, "x", true);
+      context.strokeStyle = colour;
+      context.lineWidth = devicePixelRatio;
+      context.setLineDash(dash);
+      context.beginPath();
+      context.moveTo(x, bbox.top);
+      context.lineTo(x, bbox.top + bbox.height);
+      context.stroke();
+      context.setLineDash([]);
+      if (!text || x < free) return;
+      context.fillStyle = colours.muted;
+      context.textAlign = "left";
+      context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+      context.fillText(text, x + 3, bbox.top + 12 * devicePixelRatio);
+      free = x + 8 + context.measureText(text).width;
+    };
+    context.save();
+    const { recording } = this.view;
+    const given = story.data.readback.filter(([, , , writer]) => writer !== "scene");
+    const marks = [
+      ...given.map(([time, place, value]) => ({ time, kind: "command", text: `${recording.head.commands[place].split("/").slice(-2).join("/")} = ${value}` })),
+      ...story.marks,
+    ].filter(({ time }) => time >= from && time <= to).sort((one, other) => one.time - other.time);
+    for (const { time, kind, text } of marks) line(time, MARKS[kind] ?? colours.muted, kind === "command" ? [3, 3] : [6, 3], text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text);
+    line(clock.time, colours.ink, [], "");
+    context.restore();
+  }
+
+  draw() {
+    if (!this.box.clientHeight || !this.names.length) return;
+    if (!this.plot || this.theme !== palette()) {
+      this.plot?.destroy();
+      this._make();
+    }
+    const { clientWidth: width, clientHeight: height } = this.box;
+    if (this.plot.width !== width || this.plot.height !== height) this.plot.setSize({ width, height });
+    this.plot.setData(this._data(), false);
+    const [min, max] = this._span();
+    this.plot.batch(() => {
+      for (const scale of Object.keys(this.plot.scales)) if (scale !== "x") this.plot.setScale(scale, this._range(scale));
+      this.plot.setScale("x", { min, max });
+    });
+    this.box.setAttribute("aria-label", `Trends of ${this.names.join(", ")} up to ${seconds(this.view.clock.time)}`);
+  }
+
+  _range(scale) {
+    if (scale === "switch") return { min: -0.1, max: 4 };
+    const values = this.names.flatMap((name, i) => (this._scale(name) === scale ? Array.from(this.plot.data[i + 1]).filter(Number.isFinite) : []));
+    const low = values.reduce((least, value) => Math.min(least, value), Infinity), high = values.reduce((most, value) => Math.max(most, value), -Infinity);
+    if (!(low <= high)) return { min: 0, max: 1 };
+    const room = low === high ? Math.max(0.5, 0.1 * Math.abs(low)) : 0.08 * (high - low);
+    return { min: low - room, max: high + room };
+  }
+}

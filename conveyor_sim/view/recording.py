@@ -1,0 +1,99 @@
+"""A recording as the page sees it: its head, blocks of some seconds, read by the bag's index, and its story."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.view.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN, pack
+from conveyor_sim.view.content import DRAWN, Collector
+from conveyor_sim.view.head import head
+from conveyor_sim.view.story import TOPICS_READ, Story, fields
+
+BLOCK = 4.0
+"""s of simulated time."""
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How much of a recording is shown, at most, in Hz of simulated time."""
+
+    bottles: float = 25.0
+    contacts: float = 12.5
+    belts: float = 25.0
+    signals: float = 25.0
+    counters: float = 0.5
+
+
+class Recording:
+    """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
+
+    def __init__(self, bag: Bag, detail: Detail, start: float | None = None) -> None:
+        """start: s, from which on it is drawn; None: all of it. What happened is listed from the beginning."""
+        self._bag = bag
+        self._detail = detail
+        self._tick_ns = int(bag.line.tick_ns)
+        self._scene = parse_scene(
+            bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
+        )
+        self.first = int(bag.line.tick)
+        self.last = max(self.first, bag.span_ns[1] // self._tick_ns)
+        if start is not None:
+            self.first = min(self.last, max(self.first, round(start * 1e9 / self._tick_ns)))
+        self._block_ticks = max(1, round(BLOCK * 1e9 / self._tick_ns))
+
+    @property
+    def name(self) -> str:
+        """Of the scene."""
+        return self._scene.name
+
+    @property
+    def blocks(self) -> int:
+        """How many there are; the first one begins at the first tick."""
+        return 1 + (self.last - self.first) // self._block_ticks
+
+    def head(self) -> dict[str, Any]:
+        """As `head.head`, and how to read the rest."""
+        times = {"first": self.first, "last": self.last, "block": self._block_ticks, "blocks": self.blocks}
+        steps = {
+            "mm": MM,
+            "signal": SIGNAL_STEPS,
+            "force": LEAST_FORCE,
+            "levels": LEVELS,
+            "unknown": UNKNOWN,
+            "forceFrames": FORCE_FRAMES,
+        }
+        return {**head(self._bag, self._scene), "times": times, "steps": steps, "fields": fields()}
+
+    def block(self, number: int) -> bytes:
+        """A block, from 0 on, as `block.pack` writes it."""
+        start = self.first + number * self._block_ticks
+        gaps = {name: max(1, round(1e9 / getattr(self._detail, name) / self._tick_ns)) for name in DRAWN}
+        collector = Collector(self._bag, start, gaps)
+        for topic, tick, raw in self._messages(DRAWN, start, min(start + self._block_ticks, self.last + 1)):
+            collector.add(topic, tick, raw)
+        return pack(collector.content, start)
+
+    def story(self) -> bytes:
+        """What happened from the beginning to the end, as JSON (`Story`)."""
+        story = Story(self._bag, 1.0 / self._detail.counters)
+        for topic, _, raw in self._messages(TOPICS_READ, None, None):
+            story.add(topic, raw)
+        return story.text()
+
+    def _messages(
+        self, topics: tuple[str, ...], start: int | None, stop: int | None
+    ) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, tick and bytes of messages from a tick on, before a tick."""
+        first, last = (None if tick is None else tick * self._tick_ns for tick in (start, stop))
+        for topic, stamp, raw in self._bag.raw(topics, first, last):
+            yield topic, stamp // self._tick_ns, raw
+
+
+def text(value: Any) -> bytes:
+    """As JSON."""
+    return json.dumps(value, separators=(",", ":")).encode()

@@ -1,0 +1,121 @@
+"""What happened in a stretch of a recording, for the page: events, alarms, readings back, counters. As JSON.
+
+Every list is in the order of time; what says a state says it when it changes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.bag.topics import TOPICS
+
+TOPICS_READ = ("events", "alarm_states", "readback", "counters", "signals", "run_state")
+"""Those that it is made of; of `signals` what is forced."""
+
+_DECLARED = ("id", "text", "alarm_class", "priority", "tag", "group", "latching")
+_ALARM = ("state", "active", "first_out", "since", "changed_by")
+_COUNTED = (
+    "processed", "good", "defective", "rejected", "failures",
+    "running", "starved", "blocked", "down", "planned", "idle",
+    "rate", "availability", "effectiveness", "quality", "oee", "mtbf", "mttr", "category", "stop_reason",
+)  # fmt: skip
+
+
+class Story:
+    """Collects it from messages in the order of time."""
+
+    def __init__(self, bag: Bag, counters_every: float) -> None:
+        """counters_every: s of simulated time from one entry of the counters to the next, at least."""
+        self._bag = bag
+        self._counters_every = counters_every
+        self._last: dict[str, dict[Any, Any]] = {"alarms": {}, "commands": {}}
+        self._counted = -math.inf
+        self._forced: list[int] = []
+        self.data: dict[str, Any] = {
+            "events": {name: [] for name in ("at", "kind", "name", "bottle", "value", "text")},
+            "alarms": {},
+            "alarm_changes": [],
+            "readback": [],
+            "counters": [],
+            "forced": [],
+            "runs": [],
+        }
+
+    def add(self, topic: str, raw: bytes) -> None:
+        """A message of one of TOPICS_READ."""
+        message = self._bag.decode(topic, raw)
+        getattr(self, f"_{topic}")(message, self._bag.time(message.tick))
+
+    def text(self) -> bytes:
+        """All of it as JSON."""
+        return json.dumps(_clean(self.data), separators=(",", ":")).encode()
+
+    def _events(self, message: Any, _: float) -> None:
+        columns = TOPICS["events"].unpack(message)
+        events = self.data["events"]
+        events["at"] += [round(self._bag.time(int(tick)), 6) for tick in columns.at]
+        events["kind"] += list(columns.kind)
+        events["name"] += list(columns.name)
+        events["bottle"] += columns.bottle.tolist()
+        events["value"] += columns.value.tolist()
+        events["text"] += list(columns.text)
+
+    def _alarm_states(self, message: Any, time: float) -> None:
+        columns = TOPICS["alarm_states"].unpack(message)
+        before = self._last["alarms"]
+        for place, number in enumerate(columns.number.tolist()):
+            self.data["alarms"][number] = {name: _plain(getattr(columns, name)[place]) for name in _DECLARED}
+            state = [_plain(getattr(columns, name)[place]) for name in _ALARM]
+            state[_ALARM.index("since")] = self._bag.time(state[_ALARM.index("since")])
+            if before.get(number) != state:
+                before[number] = state
+                self.data["alarm_changes"].append([time, number, *state])
+
+    def _readback(self, message: Any, time: float) -> None:
+        columns = TOPICS["readback"].unpack(message)
+        before = self._last["commands"]
+        for place, value in enumerate(columns.value.tolist()):
+            writer = columns.writers[columns.writer[place]]
+            state = repr(value), writer
+            if before.get(place) != state:
+                before[place] = state
+                self.data["readback"].append([time, place, value, writer])
+
+    def _counters(self, message: Any, time: float) -> None:
+        if time < self._counted + self._counters_every - 1e-9:
+            return
+        self._counted = time
+        rows = [[_plain(getattr(message, name)[place]) for name in _COUNTED] for place in range(len(message.name))]
+        names, bottleneck = list(message.name), list(message.bottleneck)
+        self.data["counters"].append({"at": time, "name": names, "rows": rows, "bottleneck": bottleneck})
+
+    def _signals(self, message: Any, time: float) -> None:
+        forced = [] if not hasattr(message, "forced") else message.forced.tolist()
+        if forced != self._forced:
+            self._forced = forced
+            self.data["forced"].append([time, forced])
+
+    def _run_state(self, message: Any, time: float) -> None:
+        self.data["runs"].append([time, message.text, message.reason])
+
+
+def fields() -> Mapping[str, tuple[str, ...]]:
+    """What rows hold, by list."""
+    return {"counters": _COUNTED, "alarm_changes": ("at", "number", *_ALARM)}
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def _clean(value: Any) -> Any:
+    """Without NaN and infinities, which JSON has not."""
+    if isinstance(value, dict):
+        return {key: _clean(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_clean(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,259 @@
+"""The page in a real browser: its states are reached by clicks and keys, and looked at as a document and as pixels."""
+
+from __future__ import annotations
+
+from base64 import b64decode
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conveyor_sim.bag.reader import open_bag
+
+TYPE_COLOURS = ((0, 114, 178), (213, 94, 0))
+"""Of the first two bottle types, in the colouring by type."""
+
+
+def clock(page: Any) -> float:
+    return float(page.inner_text("#clock").removesuffix(" s"))
+
+
+def settled(page: Any) -> None:
+    """Wait for what is drawn next, and for what that may send for."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.wait_for_timeout(100)
+
+
+def press(page: Any, *keys: str) -> None:
+    for key in keys:
+        page.keyboard.press(key)
+    settled(page)
+
+
+def to_pixels(page: Any, x: float, y: float) -> tuple[float, float]:
+    """Where a point of the line is on the canvas."""
+    at_x, at_y, scale, width, height = map(float, page.get_attribute("#plan", "data-camera").split())
+    return width / 2 + (x - at_x) * scale, height / 2 - (y - at_y) * scale
+
+
+def canvas(page: Any) -> np.ndarray:
+    """The pixels (height, width, 3) of the plan."""
+    data = page.evaluate(
+        """() => {
+            const plan = document.getElementById("plan"), { width, height } = plan;
+            const bytes = plan.getContext("2d").getImageData(0, 0, width, height).data;
+            const pieces = [], most = 30000;
+            for (let at = 0; at < bytes.length; at += most) {
+                pieces.push(String.fromCharCode(...bytes.subarray(at, at + most)));
+            }
+            return [width, height, btoa(pieces.join(""))];
+        }"""
+    )
+    pixels = np.frombuffer(b64decode(data[2]), dtype=np.uint8).astype(np.int64)
+    return pixels.reshape(data[1], data[0], 4)[..., :3]
+
+
+def seek(page: Any, time: float) -> None:
+    """Click the scrubber where a time is."""
+    box = page.locator("#scrubber").bounding_box()
+    page.mouse.click(box["x"] + 8 + time / 24.0 * (box["width"] - 16), box["y"] + box["height"] / 2)
+    settled(page)
+
+
+def disc(pixels: np.ndarray, colour: tuple[int, int, int], x: float, y: float, reach: float) -> np.ndarray:
+    """Middle (x, y) of the box around pixels of a colour near a point."""
+    rows, columns = np.nonzero((np.abs(pixels - np.array(colour)) < 30).all(axis=2))
+    near = (np.abs(columns + 0.5 - x) < reach) & (np.abs(rows + 0.5 - y) < reach)
+    assert near.any(), f"nothing of {colour} near {x:.1f}, {y:.1f}"
+    rows, columns = rows[near], columns[near]
+    return np.array([(columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2])
+
+
+def test_bottles_are_drawn_where_the_topic_has_them_to_a_pixel(page: Any, bag: Path) -> None:
+    page.uncheck("#names")
+    page.uncheck("#forces")
+    seek(page, 12.0)
+    time = float(page.get_attribute("#plan", "data-frame"))
+    with open_bag(bag) as opened:
+        frames = [frame for frame in opened.bottles() if abs(frame.time - time) < 1e-6]
+    assert len(frames) == 1, "the time is that of a recorded frame"
+    bottles = frames[0].data
+    assert int(page.get_attribute("body", "data-bottles")) == len(bottles.id)
+    assert clock(page) == pytest.approx(time, abs=0.005)
+    pixels, scale = canvas(page), float(page.get_attribute("#plan", "data-camera").split()[2])
+    radius = np.array([0.04, 0.035])[bottles.type] * scale
+    checked = 0
+    for index in range(len(bottles.id)):
+        if not 2.7 < bottles.x[index] < 3.5:  # no mark is drawn over those
+            continue
+        x, y = to_pixels(page, bottles.x[index], bottles.y[index])
+        found = disc(pixels, TYPE_COLOURS[bottles.type[index]], x, y, radius[index] + 1)
+        assert np.abs(found - [x, y]).max() <= 1.0
+        checked += 1
+    assert checked >= 3
+
+
+def test_frames_are_stepped_one_at_a_time_forward_and_back(page: Any) -> None:
+    seek(page, 12.0)
+    before = clock(page)
+    press(page, ".")
+    assert clock(page) == pytest.approx(before + 0.04, abs=1e-6)
+    press(page, ",", ",")
+    assert clock(page) == pytest.approx(before - 0.04, abs=1e-6)
+
+
+def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
+    page.select_option("#speed", "10")
+    press(page, "Home")
+    assert clock(page) == 0.0
+    page.click("#play")
+    for _ in range(600):  # the page's policy forbids what the browser's driver would wait with
+        if clock(page) > 2.0:
+            break
+        page.wait_for_timeout(100)
+    assert clock(page) > 2.0
+    assert page.get_attribute("#play", "aria-label") == "Pause"
+    page.click("#plan", position={"x": 20, "y": 20})
+    press(page, "k")
+    stopped = clock(page)
+    page.wait_for_timeout(300)
+    assert clock(page) == stopped
+    press(page, "End")
+    assert clock(page) == 24.0
+
+
+def test_the_page_opens_before_what_failed_and_says_it_as_text(page: Any) -> None:
+    assert clock(page) == pytest.approx(17.0, abs=0.05)
+    assert page.inner_text("#notice") == "always: no more than 20 bottles <script>alert(3)</script>"
+
+
+def test_hostile_names_are_shown_as_text_under_a_policy(page: Any) -> None:
+    page.click("#tab_alarms")
+    assert "<img src=x onerror=alert(2)>" in page.inner_text("#panel_alarms")
+    assert page.locator("#panels img").count() == 0
+    policy = page.get_attribute("meta[http-equiv=Content-Security-Policy]", "content")
+    assert "default-src 'none'" in policy and "unsafe" not in policy
+
+
+def test_alarms_stand_as_they_did_and_a_click_jumps_to_their_beginning(page: Any) -> None:
+    seek(page, 3.0)
+    page.click("#tab_alarms")
+    assert page.inner_text("#panel_alarms .rows") == "All alarms are normal."
+    seek(page, 12.0)
+    row = page.locator("#panel_alarms .alarm", has_text="capper_full")
+    assert "unacknowledged" in row.inner_text() and "first out" in row.inner_text()
+    row.click()
+    settled(page)
+    since = clock(page)
+    assert 5.0 < since < 9.0
+    press(page, ",")
+    assert "capper_full" not in page.inner_text("#panel_alarms .rows")
+
+
+def test_marks_of_what_happened_are_gone_through_by_keys(page: Any) -> None:
+    page.click("#plan", position={"x": 20, "y": 20})
+    press(page, "Home", "n")
+    assert clock(page) == pytest.approx(5.0, abs=0.05)
+    assert page.inner_text("#notice") == "fault photo_eyes/exit/stuck_on"
+
+
+def test_events_are_filtered_and_a_click_jumps_there(page: Any) -> None:
+    page.click("#tab_events")
+    page.fill("#panel_events input[type=search]", "speed")
+    settled(page)
+    rows = page.locator("#panel_events .event")
+    assert rows.count() == 1
+    assert "command refused" in rows.first.inner_text()
+    rows.first.click()
+    settled(page)
+    assert clock(page) == pytest.approx(8.0, abs=0.05)
+
+
+def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> None:
+    seek(page, 12.0)
+    x, y = to_pixels(page, 1.5, 0.06)
+    page.click("#plan", position={"x": x, "y": y})
+    settled(page)
+    assert page.locator("#panel_device select").input_value() == "photo_eyes/queue"
+    assert page.locator("#panel_device tr", has_text="blocked").locator("td").inner_text() in ("on", "off")
+    page.select_option("#panel_device select", "belts/line")
+    settled(page)
+    row = page.locator("#panel_device tr", has_text="cmd_speed")
+    assert row.locator("td").inner_text() == "0.3 m/s"
+    assert "by test since 10.01 s" in row.inner_text()
+
+
+def test_an_eye_is_lit_while_it_is_blocked(page: Any) -> None:
+    for time, lit in ((2.0, False), (12.0, True)):
+        seek(page, time)
+        x, y = (round(part) for part in to_pixels(page, 4.38, 1.2))
+        colour = canvas(page)[y, x - 2]
+        assert (tuple(colour) == (0xD1, 0x33, 0x0D)) == lit
+
+
+def test_a_gate_is_drawn_where_its_signal_has_it(page: Any) -> None:
+    page.uncheck("#names")
+    mover = np.array([0xA3, 0x44, 0x7F])
+    for time, y in ((5.0, -0.1), (8.0, 0.0)):
+        seek(page, time)
+        px, py = (round(part) for part in to_pixels(page, 3.2, y))
+        patch = canvas(page)[py - 2 : py + 3, px - 3 : px + 4]
+        assert (np.abs(patch - mover) < 40).all(axis=2).any()
+
+
+def test_a_bottle_is_chosen_followed_and_let_go(page: Any, bag: Path) -> None:
+    seek(page, 12.0)
+    time = float(page.get_attribute("#plan", "data-frame"))
+    with open_bag(bag) as opened:
+        bottles = next(frame.data for frame in opened.bottles() if abs(frame.time - time) < 1e-6)
+    index = int(np.argmax((bottles.x > 2.7) & (bottles.x < 3.5)))
+    x, y = to_pixels(page, bottles.x[index], bottles.y[index])
+    page.click("#plan", position={"x": x, "y": y})
+    settled(page)
+    assert f"id\n{bottles.id[index]}\n" in page.inner_text("#panel_bottle")
+    press(page, "f", "+", "+", ".")
+    at = [float(part) for part in page.get_attribute("#plan", "data-camera").split()]
+    assert at[0] == pytest.approx(bottles.x[index] + 0.5 * 0.04, abs=0.02)
+    press(page, "Escape")
+    assert "Click a bottle" in page.inner_text("#panel_bottle")
+
+
+def test_bottles_are_coloured_as_chosen_by_a_key(page: Any) -> None:
+    page.click("#plan", position={"x": 20, "y": 20})
+    press(page, "c")
+    assert page.input_value("#colour") == "speed"
+    assert "m/s" in page.inner_text("#legend")
+
+
+def test_signals_are_put_on_the_trends_and_taken_off(page: Any) -> None:
+    page.fill("#trendbar input", "zones/before_capper/bottles")
+    press(page, "Enter")
+    chip = page.locator(".chip", has_text="zones/before_capper/bottles")
+    assert chip.count() == 1
+    assert page.locator("#trends canvas").count() == 1
+    chip.click()
+    assert chip.count() == 0
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (820, 1180)], ids=["laptop", "tablet"])
+def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    settled(page)
+    assert page.evaluate(
+        "document.documentElement.scrollWidth <= innerWidth && document.body.scrollHeight <= innerHeight"
+    )
+    nameless = page.evaluate(
+        """() => Array.from(document.querySelectorAll("button, select, input, canvas[role], [role=slider]"))
+            .filter((one) => one.offsetParent && !(one.getAttribute("aria-label") || one.textContent.trim()
+                || one.labels?.length || one.title)).map((one) => one.outerHTML)"""
+    )
+    assert nameless == []
+    assert page.locator("#plan").bounding_box()["height"] > 200
+
+
+def test_dark_is_dark(page: Any) -> None:
+    bright = canvas(page)[5, 5].sum()
+    page.click("#theme")
+    settled(page)
+    assert canvas(page)[5, 5].sum() < 0.3 * bright
