@@ -30,7 +30,7 @@ setup(
     license="Apache-2.0",
     classifiers=["Operating System :: POSIX :: Linux", "Programming Language :: Python :: 3"],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.view": ["page/*", "page/lib/*"]},
+    package_data={NAME: ["py.typed"], f"{NAME}.st": ["grammar.lark"], f"{NAME}.view": ["page/*", "page/lib/*"]},
     # share/ as ROS expects it; conveyor_sim/support/resources.py finds config/ and msg_defs/ there.
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -50,6 +50,7 @@ setup(
         "plot": requirements("plot"),
         "accuracy": requirements("accuracy"),
         "scada": requirements("scada"),
+        "st": requirements("st"),
         "bench": requirements("bench"),
         "test": requirements("pytest"),
         "docs": requirements("docs"),

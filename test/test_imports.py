@@ -35,6 +35,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "stepping": "accounts engine errors model scene state | numpy",
     "simulation": "accounts engine line model observe scene state stepping | numpy",
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
+    "st": "control | lark",
     "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
     "version | numpy rich ruamel scipy",
     "explain": "effects errors model scene simulation support timestep | rich",

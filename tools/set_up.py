@@ -177,7 +177,7 @@ def set_up(distro: str, tools: str) -> None:
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
     needed = {"packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
     if tools:
-        needed[tools] = key(requirements / f"{tools}.txt", requirements / "scada.txt")
+        needed[tools] = key(requirements / f"{tools}.txt", requirements / "scada.txt", requirements / "st.txt")
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
         return
 

@@ -1,0 +1,206 @@
+"""A program's text to Python: checked as a whole, compiled once, and run as often as there are instances."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from types import CodeType
+
+from conveyor_sim.st import tree
+from conveyor_sim.st.calls import PASSED, Calls
+from conveyor_sim.st.declarations import Declarations
+from conveyor_sim.st.errors import Position, SourceError, StructuredTextError
+from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.parse import parse
+from conveyor_sim.st.statements import Lines, Statements
+from conveyor_sim.st.types import TIME, BlockType, Member
+
+LOWEST = 2**31
+"""The priority of a program without a task: it comes after all others."""
+
+MOST_BYTES = 4_000_000
+"""Of a file."""
+
+
+@dataclass(frozen=True)
+class Scheduled:
+    """An instance of a program, and when it runs."""
+
+    name: str
+    type: BlockType
+    task: str = ""
+    """"" in every scan."""
+    interval: int = 0
+    """ns; 0: every scan."""
+    priority: int = LOWEST
+    """0 comes first."""
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A whole file."""
+
+    file: str
+    code: CodeType
+    source: str
+    """In Python."""
+    positions: tuple[Position | None, ...]
+    """Where line n + 1 of it comes from."""
+    programs: tuple[Scheduled, ...]
+    """In the order in which they run."""
+    globals: BlockType
+    digest: str
+    """Of the text: a snapshot fits the same program only."""
+
+
+def compile_file(path: Path, trace: bool = False) -> Compiled:
+    """The program of a file. Raises StructuredTextError for one that can't be read, or can't be."""
+    try:
+        content = path.read_bytes() if path.is_file() else None
+    except OSError as error:
+        raise StructuredTextError(f"{path}: can't be read ({error.strerror})") from error
+    if content is None:
+        raise StructuredTextError(f"{path}: no such file, expected a program in Structured Text")
+    if len(content) > MOST_BYTES:
+        raise StructuredTextError(f"{path}: has {len(content)} bytes, expected at most {MOST_BYTES}")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise StructuredTextError(f"{path}: is not UTF-8 ({error.reason} at byte {error.start})") from error
+    return compile_text(text, str(path), trace)
+
+
+def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Compiled:
+    """The same of a text. trace: whether assignments note that they were the last to write. Raises as that does."""
+    try:
+        return _compile(text, file, trace)
+    except SourceError as error:
+        raise StructuredTextError(f"{file}:{error.at.line}:{error.at.column}: {error}") from None
+    except (RecursionError, MemoryError, SyntaxError) as error:
+        if isinstance(error, SyntaxError) and "nested" not in str(error) and "indent" not in str(error):
+            raise
+        raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
+
+
+def _compile(text: str, file: str, trace: bool) -> Compiled:
+    source = parse(text)
+    calls = Calls()
+    declared = calls.declarations = Declarations(source, calls)
+    lines = Lines()
+    for one in source.types:
+        declared.named(one.at, one.name)
+    units = [(unit, _type_of(unit, declared)) for unit in source.units]
+    for unit, kind in units:
+        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, trace)
+    if found := calls.recursion():
+        node, name = found
+        raise SourceError(node.at, f"found a call that leads back to {name}, expected no recursion")
+    for structure in declared.structures:
+        _class(lines, structure.python, "_Record", list(structure.members.values()))
+    _class(lines, "_Globals", "", list(declared.names.globals.members.values()))
+    lines.add("_g = _Globals()")
+    python = "\n".join(lines.lines) + "\n"
+    programs = {unit.name.lower(): kind for unit, kind in units if unit.kind == "PROGRAM"}
+    return Compiled(
+        file,
+        compile(python, f"<{file}>", "exec"),
+        python,
+        tuple(lines.positions),
+        tuple(sorted(_schedule(source, programs, declared, calls), key=lambda one: one.priority)),
+        declared.names.globals,
+        hashlib.sha256(text.encode()).hexdigest(),
+    )
+
+
+def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
+    kind = declared.function(unit.name) if unit.kind == "FUNCTION" else declared.named(unit.at, unit.name)
+    assert isinstance(kind, BlockType)
+    return kind
+
+
+def _unit(unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls, trace: bool) -> None:
+    """The class of a unit, whose `run` is its body."""
+    members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
+    _class(lines, kind.python, "", members)
+    with lines.inner():
+        lines.add("def run(self, now=0):", unit.at)
+        with lines.inner():
+            lines.add("_rt.left -= 1", unit.at)
+            lines.add("if _rt.left < 0: _late()", unit.at)
+            for member in kind.of("VAR_TEMP"):
+                lines.add(f"self.{member.slot} = {member.initial}")
+        Statements(lines, expressions, calls, trace).block(unit.body)
+    if kind.function:
+        _function(kind, lines)
+
+
+def _function(kind: BlockType, lines: Lines) -> None:
+    """What a call calls: a new frame, its arguments in, its body, its result out."""
+    passed = kind.of(*PASSED)
+    lines.add(f"def _f_{kind.name.lower()}({', '.join(one.slot for one in passed)}):")
+    with lines.inner():
+        lines.add(f"self = {kind.python}()")
+        for one in passed:
+            if one.section != "VAR_OUTPUT":
+                lines.add(f"self.{one.slot} = {one.slot}")
+        lines.add("self.run()")
+        for one in passed:
+            if one.section == "VAR_OUTPUT":
+                lines.add(f"if {one.slot} is not None: {one.slot}.set(self.{one.slot})")
+        if kind.result is not None:
+            lines.add(f"return self.v_{kind.name.lower()}")
+
+
+def _class(lines: Lines, name: str, base: str, members: list[Member]) -> None:
+    lines.add(f"class {name}({base}):")
+    with lines.inner():
+        lines.add(f"__slots__ = ({''.join(f'{one.slot!r}, ' for one in members)})")
+        lines.add("def __init__(self):")
+        with lines.inner():
+            for one in members:
+                lines.add(f"self.{one.slot} = {'None' if one.section == 'VAR_IN_OUT' else one.initial}")
+            lines.add("pass")
+
+
+def _schedule(
+    source: tree.Source, programs: dict[str, BlockType], declared: Declarations, calls: Calls
+) -> list[Scheduled]:
+    if len(source.configurations) > 1:
+        raise SourceError(source.configurations[1].at, "found a second CONFIGURATION, expected one")
+    if not source.configurations:
+        if not programs:
+            raise SourceError(Position(1, 1), "found no PROGRAM, expected one or more")
+        return [Scheduled(kind.name, kind) for kind in programs.values()]
+    configuration = source.configurations[0]
+    known = Expressions(declared.scope(None), calls)
+    tasks = {task.name.lower(): _task(task, known) for task in configuration.tasks}
+    found: dict[str, Scheduled] = {}
+    for one in configuration.instances:
+        if one.type.lower() not in programs:
+            raise SourceError(one.at, f"found {one.type}, expected a PROGRAM: {', '.join(programs) or 'there is none'}")
+        if one.task and one.task.lower() not in tasks:
+            raise SourceError(one.at, f"found {one.task}, expected a TASK: {', '.join(tasks) or 'there is none'}")
+        if one.name.lower() in found:
+            raise SourceError(one.at, f"found {one.name} again, expected each program once")
+        interval, priority = tasks[one.task.lower()] if one.task else (0, LOWEST)
+        found[one.name.lower()] = Scheduled(one.name, programs[one.type.lower()], one.task, interval, priority)
+    if not found:
+        raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")
+    return list(found.values())
+
+
+def _task(task: tree.Task, known: Expressions) -> tuple[int, int]:
+    """Interval (ns) and priority."""
+    interval, priority = 0, LOWEST - 1
+    for at, name, node in task.fields:
+        word = name.upper()
+        if word == "INTERVAL":
+            interval = known.known(node, "INTERVAL", TIME.kind)
+        elif word == "PRIORITY":
+            priority = known.known(node, "PRIORITY")
+        else:
+            raise SourceError(at, f"found {name}, expected INTERVAL or PRIORITY")
+    if interval <= 0 or not 0 <= priority < LOWEST:
+        raise SourceError(task.at, f"found the TASK {task.name}, expected INTERVAL more than 0 and PRIORITY 0 or more")
+    return interval, priority

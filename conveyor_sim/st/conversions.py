@@ -1,0 +1,166 @@
+"""X_TO_Y, TO_Y and TRUNC: every conversion of elementary types that there is, by the standard where it says how.
+
+Whole numbers and bit strings keep their lowest bits; reals become the nearest whole number, of two the even one, and
+stop the program where the type has none. A DWORD is the bits of a REAL, an LWORD those of an LREAL. A TIME is a number
+of milliseconds, as in CODESYS and TwinCAT: the standard does not say.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from typing import Any
+
+from conveyor_sim.st.errors import Fault, Position, SourceError
+from conveyor_sim.st.types import (
+    DINT,
+    DWORD,
+    ELEMENTARY,
+    LREAL,
+    LWORD,
+    REAL,
+    TIME,
+    Enumeration,
+    String,
+    Type,
+)
+from conveyor_sim.st.values import NAMESPACE, Value, converted, described, folded
+
+_MS = 1_000_000
+_NAME = re.compile(r"(?:(\w+?)_)?(TO|TRUNC)_(\w+)")
+_UNITS = (("d", 86_400_000_000_000), ("h", 3_600_000_000_000), ("m", 60_000_000_000), ("s", 1_000_000_000))
+_SMALL = (("ms", 1_000_000), ("us", 1_000), ("ns", 1))
+
+
+def conversion(name: str, hint: Type | None) -> tuple[Type | None, Type, bool] | None:
+    """What a function converts from (None: anything) and to, and whether it cuts decimals; None if it is none."""
+    if name.upper() == "TRUNC":
+        return None, hint.base if hint is not None and hint.base.kind == "int" else DINT, True
+    if not (match := _NAME.fullmatch(name.upper())):
+        return None
+    source, word, target = match.groups()
+    if target not in ELEMENTARY or (source is not None and source not in ELEMENTARY):
+        return None
+    return ELEMENTARY[source] if source else None, ELEMENTARY[target], word == "TRUNC"
+
+
+def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
+    """A conversion function, called."""
+    found = conversion(name, hint)
+    assert found is not None
+    source, target, cut = found
+    if source is not None:
+        given = converted(value, source, name)
+        value = Value(at, value.type if isinstance(source, String) else source, given, value.constant)
+    elif value.literal:
+        value = Value(at, value.type, value.code, value.constant)
+    code = _cut(value, target) if cut else _code(value, target)
+    if code is None:
+        raise SourceError(at, f"found {name} of {described(value)}, which is no conversion, expected one that is")
+    return folded(Value(at, target, code), value)
+
+
+def _cut(value: Value, target: Type) -> str | None:
+    if value.type.base.kind != "real" or target.kind != "int":
+        return None
+    return f"_truncated({value.code}, {target.low}, {target.high})"
+
+
+def _code(value: Value, target: Type) -> str | None:
+    source, code = value.type.base, value.code
+    if source == target or source.kind == target.kind == "string":
+        return f"{code}[:{target.high}]" if isinstance(target, String) else code
+    if isinstance(target, String):
+        return _to_text(source, code)
+    if source.kind == "string":
+        return f"_parsed({code}, {target.name!r})"
+    if source.kind == "enum" or source.kind == "bool":
+        code = f"int({code})" if source.kind == "bool" else code
+    if target.kind == "bool":
+        return f"({code} != 0)"
+    if source.kind == "real":
+        return _from_real(source, code, target)
+    if target.kind == "real":
+        if source.kind == "bits":
+            pairs = {(DWORD, REAL): "_from_dword", (LWORD, LREAL): "_from_lword"}
+            return f"{pairs[source, target]}({code})" if (source, target) in pairs else None
+        number = f"{code} / {_MS}.0" if source == TIME else code
+        return f"_single({number})" if target == REAL else f"float({number})"
+    if target == TIME:
+        return TIME.wrapped(f"{code} * {_MS}")
+    if source == TIME:
+        code = f"_divide({code}, {_MS})"
+    return code if target.low <= source.low and source.high <= target.high and source != TIME else target.wrapped(code)
+
+
+def _from_real(source: Type, code: str, target: Type) -> str | None:
+    if target.kind == "bits":
+        pairs = {(REAL, DWORD): "_to_dword", (LREAL, LWORD): "_to_lword"}
+        return f"{pairs[source, target]}({code})" if (source, target) in pairs else None
+    if target.kind == "real":
+        return f"_single({code})" if target == REAL else code
+    if target == TIME:
+        return f"_nearest({code} * {_MS}, {TIME.low}, {TIME.high})"
+    return f"_nearest({code}, {target.low}, {target.high})"
+
+
+def _to_text(source: Type, code: str) -> str | None:
+    if isinstance(source, Enumeration):
+        return f"dict({ {value: name for name, value in source.values}!r}).get({code}, '')"
+    names = {"bool": "_bool_text", "int": "str", "bits": "str", "time": "time_text", "real": "_real_text"}
+    name = names.get(source.kind)
+    return f"{'_time_text' if source == TIME else name}({code})" if name else None
+
+
+def time_text(value: int) -> str:
+    """A duration as it is written: T#1m30s."""
+    rest, parts = abs(value), ""
+    for unit, size in (*_UNITS, *_SMALL):
+        count, rest = divmod(rest, size)
+        parts += f"{count}{unit}" if count else ""
+    return f"T#{'-' if value < 0 else ''}{parts or '0s'}"
+
+
+def _bool_text(value: bool) -> str:
+    return "TRUE" if value else "FALSE"
+
+
+def _real_text(value: float) -> str:
+    """The shortest that reads as the same number; of 7 digits where that is a REAL."""
+    short = f"{value:.7g}"
+    return repr(float(short)) if struct.pack("<d", value)[:3] == b"\0\0\0" else repr(value)
+
+
+def _parsed(text: str, name: str) -> Any:
+    """A text as a number. Raises Fault."""
+    target, given = ELEMENTARY[name], text.strip().replace("_", "")
+    try:
+        if target.kind == "bool":
+            return {"TRUE": True, "FALSE": False, "1": True, "0": False}[given.upper()]
+        if target.kind == "real":
+            number = float(given)
+            return NAMESPACE["_single"](number) if target == REAL else number
+        if target.kind in ("int", "bits"):
+            base, hash_, digits = given.partition("#")
+            whole = int(digits, int(base)) if hash_ else int(given)
+            if target.low <= whole <= target.high:
+                return whole
+    except (ValueError, KeyError):
+        pass
+    raise Fault(f"STRING_TO_{name}: found {text[:40]!r}, expected a {name}")
+
+
+def _bits(packed: str, unpacked: str) -> Any:
+    return lambda value: struct.unpack(unpacked, struct.pack(packed, value))[0]
+
+
+NAMESPACE.update(
+    _parsed=_parsed,
+    _bool_text=_bool_text,
+    _real_text=_real_text,
+    _time_text=time_text,
+    _from_dword=_bits("<I", "<f"),
+    _from_lword=_bits("<Q", "<d"),
+    _to_dword=_bits("<f", "<I"),
+    _to_lword=_bits("<d", "<Q"),
+)

@@ -1,0 +1,74 @@
+"""What literals stand for: numbers in bases, durations as whole nanoseconds, characters by $."""
+
+from __future__ import annotations
+
+import re
+
+from conveyor_sim.st.errors import Position, SourceError
+
+_UNITS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000}
+_UNITS |= {"ms": 1_000_000, "us": 1_000, "ns": 1}
+_ORDER = tuple(_UNITS)
+_PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
+_ESCAPES = {"$": "$", "'": "'", '"': '"', "l": "\n", "n": "\n", "p": "\f", "r": "\r", "t": "\t"}
+
+
+def integer(text: str) -> int:
+    """1_000"""
+    return int(text.replace("_", ""))
+
+
+def based(at: Position, text: str) -> int:
+    """16#FF, 8#17 or 2#1010_0001."""
+    base, _, digits = text.partition("#")
+    try:
+        return int(digits.replace("_", ""), int(base))
+    except ValueError:
+        raise SourceError(at, f"found {text}, expected digits of base {base}") from None
+
+
+def real(text: str) -> float:
+    """1.5, 2E3 or 1_000.25e-6."""
+    return float(text.replace("_", ""))
+
+
+def duration(at: Position, text: str) -> int:
+    """T#1h30m, TIME#-2.5s or T#1d_4h in ns. Each unit once, from the largest down; only the last has decimals."""
+    written = text.partition("#")[2].lower().replace("_", "")
+    sign, digits = (-1, written[1:]) if written.startswith("-") else (1, written.removeprefix("+"))
+    parts = _PART.findall(digits)
+    units = [_ORDER.index(unit) for _, unit in parts]
+    whole = all("." not in number for number, _ in parts[:-1])
+    if not (parts and "".join(map("".join, parts)) == digits and units == sorted(set(units)) and whole):
+        raise SourceError(at, f"found {text}, expected a duration such as T#1m30s or T#2.5s")
+    total = 0
+    for number, unit in parts:
+        before, _, after = number.partition(".")
+        total += int(before) * _UNITS[unit]
+        total += int(after or "0") * _UNITS[unit] // 10 ** len(after)
+    return sign * total
+
+
+def characters(at: Position, text: str, wide: bool) -> str:
+    """What stands between the quotes: $$, $', $N, $0A (two digits; four in a wide text) stand for one character."""
+    digits = 4 if wide else 2
+    body, found, index = text[1:-1], [], 0
+    while index < len(body):
+        char = body[index]
+        if char != "$":
+            if not wide and ord(char) > 255:
+                raise SourceError(at, f"found {char!r} in a STRING, expected characters up to $FF; a WSTRING has all")
+            found.append(char)
+            index += 1
+        elif (escape := _ESCAPES.get(body[index + 1].lower())) is not None:
+            found.append(escape)
+            index += 2
+        else:
+            code = body[index + 1 : index + 1 + digits]
+            if not re.fullmatch(rf"[0-9A-Fa-f]{{{digits}}}", code):
+                raise SourceError(
+                    at, f"found ${code} in a text, expected $$, $', $L, $N, $P, $R, $T or ${'F' * digits}"
+                )
+            found.append(chr(int(code, 16)))
+            index += 1 + digits
+    return "".join(found)

@@ -1,0 +1,88 @@
+"""What is said where a text can't be parsed: what was found, and what was expected, in the words of the language."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from lark import Token
+
+from conveyor_sim.st.errors import Position, SourceError
+
+REFUSED: Mapping[str, str] = {
+    **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
+    **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
+    **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
+    **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
+    **dict.fromkeys(("DATE", "TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT"), "dates and times of day"),
+}
+"""Words of the standard, and of dialects, that are not for this interpreter, and what they belong to."""
+
+SUSPECT: Mapping[str, str] = {
+    **dict.fromkeys(("REFERENCE", "REF", "ADR"), "pointers and references"),
+    **dict.fromkeys(("METHOD", "PROPERTY", "THIS", "SUPER", "USING"), "classes, methods and namespaces"),
+    **dict.fromkeys(("STEP", "TRANSITION", "ACTION"), "SFC"),
+    **dict.fromkeys(("JMP", "GOTO"), "jumps"),
+    **dict.fromkeys(("UNION",), "unions"),
+}
+"""The same of words that may be names: so they are where the text makes sense with them as names."""
+
+_WORDS = {
+    "NAME": "a name",
+    "INTEGER": "a whole number",
+    "SEMICOLON": "';'",
+    "COLON": "':'",
+    "COMMA": "','",
+    "DOT": "'.'",
+    "LPAR": "'('",
+    "RPAR": "')'",
+    "LSQB": "'['",
+    "RSQB": "']'",
+    "ADDRESS": "an address such as %IX0.0",
+    "SECTION": "VAR",
+    "$END": "the end of the file",
+    "__ANON_0": "':='",
+    "__ANON_1": "'..'",
+    "__ANON_2": "'=>'",
+}
+_OPERATORS = {
+    *("OR", "OR_ELSE", "XOR", "AND", "AMPERSAND", "AND_THEN", "MOD", "EQUALS", "DIFFERS", "LESS", "GREATER"),
+    *("AT_MOST", "AT_LEAST", "PLUS", "MINUS", "TIMES", "OVER", "POWER"),
+}
+_VALUES = {
+    *("INTEGER", "BASED", "DECIMAL", "TIME", "TEXT", "WIDE_TEXT", "TRUE", "FALSE", "PREFIX", "NOT", "PLUS", "MINUS"),
+    *("NAME", "LPAR"),
+}
+
+
+def at_of(token: Token) -> Position:
+    """Where a token begins."""
+    return Position(token.line or 1, token.column or 1)
+
+
+def not_refused(token: Token) -> Token:
+    """A name. Raises SourceError for a word of what is not supported."""
+    if what := REFUSED.get(token.value.upper()):
+        raise SourceError(at_of(token), f"found {token.value}, expected a program without {what}")
+    return token
+
+
+def unexpected(error: Any) -> SourceError:
+    """What is said of lark's UnexpectedToken."""
+    token = error.token
+    before = error.token_history[-1] if error.token_history else token
+    for suspect in (before, token):
+        if what := SUSPECT.get(str(suspect).upper()):
+            return SourceError(at_of(suspect), f"found {suspect}, expected a program without {what}")
+    found = "the end of the file" if token.type == "$END" else f"'{token.value}'"
+    expected = set(error.accepts or error.expected)
+    words = []
+    if expected >= _VALUES:
+        expected -= _VALUES
+        words.append("a value")
+    if expected >= _OPERATORS:
+        expected -= _OPERATORS
+        words.append("an operator")
+    words += sorted(_WORDS.get(name, name) for name in expected)
+    listed = words[0] if len(words) == 1 else f"one of {', '.join(words)}"
+    return SourceError(at_of(token), f"found {found}, expected {listed}")

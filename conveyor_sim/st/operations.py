@@ -1,0 +1,301 @@
+"""What the code that programs become calls at run time, where Python's operators are not enough."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+from conveyor_sim.st.errors import Fault
+from conveyor_sim.st.types import single
+
+MOST_CHARACTERS = 32767
+"""Of any text."""
+
+
+class Attribute:
+    """A variable passed as VAR_IN_OUT."""
+
+    __slots__ = ("_name", "_owner")
+
+    def __init__(self, owner: Any, name: str) -> None:
+        self._owner, self._name = owner, name
+
+    def get(self) -> Any:
+        """Its value."""
+        return getattr(self._owner, self._name)
+
+    def set(self, value: Any) -> None:
+        """Write it."""
+        setattr(self._owner, self._name, value)
+
+
+class Element:
+    """An element of an array, passed likewise."""
+
+    __slots__ = ("_index", "_list")
+
+    def __init__(self, values: list[Any], index: int) -> None:
+        self._list, self._index = values, index
+
+    def get(self) -> Any:
+        """Its value."""
+        return self._list[self._index]
+
+    def set(self, value: Any) -> None:
+        """Write it."""
+        self._list[self._index] = value
+
+
+def divide(a: int, b: int) -> int:
+    """Towards zero."""
+    if b == 0:
+        raise Fault(f"division by zero: found {a} / 0, expected another divisor")
+    quotient = abs(a) // abs(b)
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+def modulo(a: int, b: int) -> int:
+    """IN1 - IN1 / IN2 * IN2, and 0 for a divisor of 0 (IEC 61131-3, table of arithmetic functions, MOD)."""
+    return 0 if b == 0 else int(math.copysign(1, a)) * (abs(a) % abs(b))
+
+
+def quotient(a: float, b: float) -> float:
+    """Of reals."""
+    if b == 0.0:
+        raise Fault(f"division by zero: found {a:g} / 0, expected another divisor")
+    return a / b
+
+
+def power(a: float, b: float) -> float:
+    """a to the b."""
+    try:
+        result: float | complex = a**b
+    except ZeroDivisionError:
+        raise Fault(f"division by zero: found {a:g} ** {b:g}, expected another base") from None
+    except OverflowError:
+        return -math.inf if a < 0.0 and b % 2.0 == 1.0 else math.inf
+    if isinstance(result, complex):
+        raise Fault(f"found {a:g} ** {b:g}, expected a whole exponent of a negative number")
+    return result
+
+
+def outside(index: int, low: int, high: int) -> int:
+    """Never returns: an index that is not in an array."""
+    raise Fault(f"index out of range: found {index}, expected {low} to {high}")
+
+
+def in_range(value: int, low: int, high: int) -> int:
+    """A value that is assigned to a subrange."""
+    if not low <= value <= high:
+        raise Fault(f"value out of range: found {value}, expected {low} to {high}")
+    return value
+
+
+def rounds(first: int, last: int, step: int) -> range:
+    """Values of a FOR's control variable."""
+    if step == 0:
+        raise Fault("found BY 0, expected a step other than 0")
+    return range(first, last + (1 if step > 0 else -1), step)
+
+
+def after(values: range, low: int, high: int) -> int:
+    """The control variable once its FOR has ended: the first value beyond the last, if its type has it."""
+    beyond = values[-1] + values.step if values else values.start
+    return beyond if low <= beyond <= high else values[-1]
+
+
+def nearest(value: float, low: int, high: int) -> int:
+    """A real as a whole number: the nearest, of two the even one (IEC 61131-3:2013, 6.6.2.5.2)."""
+    if not math.isfinite(value) or not low <= (whole := round(value)) <= high:
+        raise Fault(f"value out of range: found {value:g}, expected {low} to {high}")
+    return whole
+
+
+def truncated(value: float, low: int, high: int) -> int:
+    """A real as a whole number, towards zero."""
+    if not math.isfinite(value) or not low <= (whole := int(value)) <= high:
+        raise Fault(f"value out of range: found {value:g}, expected {low} to {high}")
+    return whole
+
+
+def guarded(name: str, function: Callable[..., float]) -> Callable[..., float]:
+    """A function of reals that stops where it has no value, and is infinite where that is beyond all numbers."""
+
+    def call(*given: float) -> float:
+        try:
+            return function(*given)
+        except OverflowError:
+            return math.inf
+        except ValueError:
+            shown = ", ".join(f"{value:g}" for value in given)
+            raise Fault(f"found {name}({shown}), expected an argument for which it is defined") from None
+
+    return call
+
+
+def copied(value: Any) -> Any:
+    """An array or a structure, as a value of its own."""
+    if isinstance(value, list):
+        return [copied(one) for one in value] if value and isinstance(value[0], (list, Record)) else value[:]
+    if isinstance(value, Record):
+        return value.copy()
+    return value
+
+
+class Record:
+    """A structure's value; those of a program derive from it."""
+
+    __slots__: tuple[str, ...] = ()
+
+    def copy(self) -> Record:
+        """Another one with the same values."""
+        new = type(self)()
+        for slot in type(self).__slots__:
+            setattr(new, slot, copied(getattr(self, slot)))
+        return new
+
+
+def with_values(record: Any, **values: Any) -> Any:
+    """A structure or a block with initial values of its own."""
+    for slot, value in values.items():
+        setattr(record, slot, value)
+    return record
+
+
+def left(text: str, count: int) -> str:
+    """LEFT"""
+    return text[: _count("LEFT", count)]
+
+
+def right(text: str, count: int) -> str:
+    """RIGHT"""
+    return text[-count:] if _count("RIGHT", count) else ""
+
+
+def mid(text: str, count: int, place: int) -> str:
+    """MID: so many characters from a place on, the first is 1."""
+    return text[_place("MID", place) - 1 :][: _count("MID", count)]
+
+
+def insert(text: str, other: str, place: int) -> str:
+    """INSERT: another text behind a place."""
+    _count("INSERT", place)
+    return text[:place] + other + text[place:]
+
+
+def delete(text: str, count: int, place: int) -> str:
+    """DELETE"""
+    begin = _place("DELETE", place) - 1
+    return text[:begin] + text[begin + _count("DELETE", count) :]
+
+
+def replace(text: str, other: str, count: int, place: int) -> str:
+    """REPLACE"""
+    begin = _place("REPLACE", place) - 1
+    return text[:begin] + other + text[begin + _count("REPLACE", count) :]
+
+
+def _count(name: str, value: int) -> int:
+    if value < 0:
+        raise Fault(f"{name}: found {value} characters, expected 0 or more")
+    return value
+
+
+def _place(name: str, value: int) -> int:
+    if value < 1:
+        raise Fault(f"{name}: found place {value}, expected 1 or more")
+    return value
+
+
+def concat(*texts: str) -> str:
+    """CONCAT"""
+    return "".join(texts)[:MOST_CHARACTERS]
+
+
+def find(text: str, other: str) -> int:
+    """FIND: where another text begins, 0 if it is not there."""
+    return text.find(other) + 1 if other else 0
+
+
+def limit(low: Any, value: Any, high: Any) -> Any:
+    """LIMIT: MIN(MAX(value, low), high)."""
+    return min(max(value, low), high)
+
+
+def mux(index: int, *values: Any) -> Any:
+    """MUX"""
+    if not 0 <= index < len(values):
+        raise Fault(f"MUX: found {index}, expected 0 to {len(values) - 1}")
+    return values[index]
+
+
+def shift(value: int, by: int, width: int, name: str) -> int:
+    """SHL, SHR, ROL and ROR of so many bits."""
+    if by < 0:
+        raise Fault(f"{name}: found {by} bits, expected 0 or more")
+    mask = (1 << width) - 1
+    if name == "SHL":
+        return value << by & mask if by < width else 0
+    if name == "SHR":
+        return value >> by
+    by %= width
+    if name == "ROR":
+        by = (width - by) % width
+    return (value << by | value >> (width - by)) & mask
+
+
+def chain(compare: Callable[[Any, Any], bool], *values: Any) -> bool:
+    """GT, GE, EQ, LE and LT of several values: each with the next."""
+    return all(compare(a, b) for a, b in pairwise(values))
+
+
+NAMES: dict[str, Any] = {
+    "_divide": divide,
+    "_modulo": modulo,
+    "_quotient": quotient,
+    "_power": power,
+    "_outside": outside,
+    "_in_range": in_range,
+    "_rounds": rounds,
+    "_after": after,
+    "_nearest": nearest,
+    "_truncated": truncated,
+    "_single": single,
+    "_copied": copied,
+    "_with": with_values,
+    "_Record": Record,
+    "_Attribute": Attribute,
+    "_Element": Element,
+    "_left": left,
+    "_right": right,
+    "_mid": mid,
+    "_insert": insert,
+    "_delete": delete,
+    "_replace": replace,
+    "_concat": concat,
+    "_find": find,
+    "_limit": limit,
+    "_mux": mux,
+    "_shift": shift,
+    "_chain": chain,
+    "_gt": operator.gt,
+    "_ge": operator.ge,
+    "_eq": operator.eq,
+    "_le": operator.le,
+    "_lt": operator.lt,
+    "_sqrt": guarded("SQRT", math.sqrt),
+    "_ln": guarded("LN", math.log),
+    "_log": guarded("LOG", math.log10),
+    "_exp": guarded("EXP", math.exp),
+    "_sin": guarded("SIN", math.sin),
+    "_cos": guarded("COS", math.cos),
+    "_tan": guarded("TAN", math.tan),
+    "_asin": guarded("ASIN", math.asin),
+    "_acos": guarded("ACOS", math.acos),
+    "_atan": guarded("ATAN", math.atan),
+    "_atan2": guarded("ATAN2", math.atan2),
+}
+"""By the name that code uses."""

@@ -1,0 +1,222 @@
+"""Statements: each is checked, and becomes lines of Python that know where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from conveyor_sim.st import tree
+from conveyor_sim.st.calls import Calls
+from conveyor_sim.st.errors import Position, SourceError
+from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.types import BlockType, Type
+from conveyor_sim.st.values import Place, converted, converts, described
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOST_LOOPS = 15
+"""One within the other; Python has 20."""
+
+
+class Lines:
+    """Python source as it grows; `positions[n]` is where line n + 1 comes from, None for what is not of the program."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.positions: list[Position | None] = []
+        self._depth = 0
+
+    def add(self, code: str, at: Position | None = None) -> None:
+        """One line."""
+        self.lines.append(" " * self._depth + code)
+        self.positions.append(at)
+
+    @contextmanager
+    def inner(self) -> Iterator[None]:
+        """What follows is a level deeper."""
+        self._depth += 1
+        yield
+        self._depth -= 1
+
+
+class Statements:
+    """Of one unit."""
+
+    def __init__(self, lines: Lines, expressions: Expressions, calls: Calls, trace: bool) -> None:
+        """trace: whether each assignment notes that it was the last to write its variable."""
+        self._lines = lines
+        self._expressions = expressions
+        self._calls = calls
+        self._trace = trace
+        self._controls: list[str] = []
+        self._loops = 0
+        self._names = 0
+
+    def block(self, body: tree.Block) -> None:
+        """A list of statements, a level deeper."""
+        with self._lines.inner():
+            for statement in body:
+                self._statement(statement)
+            if not body:
+                self._lines.add("pass")
+
+    def _statement(self, node: tree.Statement) -> None:
+        kinds: dict[type, Callable[..., None]] = {
+            tree.Assignment: self._assignment,
+            tree.CallStatement: self._call,
+            tree.If: self._if,
+            tree.Case: self._case,
+            tree.For: self._for,
+            tree.While: self._while,
+            tree.Repeat: self._repeat,
+            tree.Jump: self._jump,
+        }
+        kinds[type(node)](node)
+
+    def _assignment(self, node: tree.Assignment) -> None:
+        place = self._expressions.target(node.target)
+        if place.code in self._controls:
+            raise SourceError(
+                node.at, "found an assignment to the control variable of a FOR inside of it, expected none"
+            )
+        if isinstance(place.type, BlockType):
+            raise SourceError(
+                node.at, f"found an assignment to a block, {place.type.name}, expected a call or a variable"
+            )
+        value = self._expressions.value(node.value, place.type)
+        self._lines.add(place.write(converted(value, place.type)), node.at)
+        self._note(place, node.at)
+
+    def _call(self, node: tree.CallStatement) -> None:
+        target = node.call.target
+        if isinstance(target, tree.Name) and not self._is_variable(target):
+            value = self._calls(self._expressions, node.call, None)
+            self._lines.add(value.code, node.at)
+            return
+        _, lines = self._calls.block(self._expressions, node.call)
+        for line in lines:
+            self._lines.add(line, node.at)
+        for argument in node.call.arguments:
+            if argument.output:
+                self._note(self._expressions.place(argument.value), node.at)
+
+    def _is_variable(self, node: tree.Name) -> bool:
+        scope = self._expressions.scope
+        own = scope.unit.members if scope.unit is not None else {}
+        member = own.get(node.name.lower())
+        if member is not None and member.section == "RESULT":
+            return False
+        return member is not None or node.name.lower() in scope.names.globals.members
+
+    def _note(self, place: Place, at: Position) -> None:
+        if self._trace:
+            owner, slot = place.root
+            self._lines.add(f"_written[id({owner}), {slot!r}] = ({at.line}, {at.column})", at)
+
+    def _if(self, node: tree.If) -> None:
+        word = "if"
+        for condition, body in node.branches:
+            self._lines.add(f"{word} {self._expressions.condition(condition)}:", condition.at)
+            self.block(body)
+            word = "elif"
+        if node.otherwise:
+            self._lines.add("else:")
+            self.block(node.otherwise)
+
+    def _case(self, node: tree.Case) -> None:
+        selector = self._expressions.value(node.selector)
+        kind = selector.type.base
+        if kind.kind not in ("int", "enum", "bits"):
+            raise SourceError(
+                node.selector.at, f"found {described(selector)}, expected a whole number or an enumeration"
+            )
+        name = self._name("c")
+        self._lines.add(f"{name} = {selector.code}", node.at)
+        taken: list[tuple[int, int]] = []
+        word = "if"
+        for labels, body in node.choices:
+            tests = []
+            for first, last in labels:
+                low = self._label(first, kind)
+                high = low if last is None else self._label(last, kind)
+                if any(low <= other_high and other_low <= high for other_low, other_high in taken) or low > high:
+                    shown = str(low) if low == high else f"{low}..{high}"
+                    raise SourceError(first.at, f"found {shown}, expected a label that no other choice has, and rising")
+                taken.append((low, high))
+                tests.append(f"{name} == {low}" if low == high else f"{low} <= {name} <= {high}")
+            self._lines.add(f"{word} {' or '.join(tests)}:", node.at)
+            self.block(body)
+            word = "elif"
+        if node.otherwise:
+            self._lines.add("else:" if node.choices else "if True:")
+            self.block(node.otherwise)
+
+    def _label(self, node: tree.Expression, kind: Type) -> int:
+        value = self._expressions.value(node)
+        if value.constant is None or not converts(value, kind) or isinstance(value.constant, float):
+            raise SourceError(node.at, f"found {described(value)}, expected a constant {kind.name} as a label")
+        converted(value, kind, "a label")
+        return int(value.constant)
+
+    def _for(self, node: tree.For) -> None:
+        control = self._expressions.target(node.control)
+        kind = control.type
+        if kind.base.kind != "int":
+            raise SourceError(node.control.at, f"found {described(control)}, expected a variable of an integer type")
+        bounds = [self._expressions.value(bound, kind.base) for bound in (node.first, node.last)]
+        step = "1" if node.step is None else self._step(node.step, kind)
+        rounds = self._name("r")
+        codes = ", ".join(converted(bound, kind) for bound in bounds)
+        self._lines.add(f"{rounds} = _rounds({codes}, {step})", node.at)
+        self._lines.add(f"for _k in {rounds}:", node.at)
+        with self._lines.inner():
+            self._lines.add(control.write("_k"), node.at)
+        self._controls.append(control.code)
+        self._body(node.body, node.at)
+        self._controls.pop()
+        self._lines.add("else:")
+        with self._lines.inner():
+            self._lines.add(control.write(f"_after({rounds}, {kind.low}, {kind.high})"), node.at)
+
+    def _step(self, node: tree.Expression, kind: Type) -> str:
+        step = self._expressions.value(node, kind.base)
+        if step.constant == 0:
+            raise SourceError(node.at, "found BY 0, expected a step other than 0")
+        if step.literal == "int":  # FOR i := 10 TO 0 BY -1 of a USINT
+            return step.code
+        return converted(step, kind.base)
+
+    def _while(self, node: tree.While) -> None:
+        self._lines.add(f"while {self._expressions.condition(node.condition)}:", node.at)
+        self._body(node.body, node.at)
+
+    def _repeat(self, node: tree.Repeat) -> None:
+        # The condition comes at the top, so that CONTINUE comes to it.
+        first = self._name("q")
+        self._lines.add(f"{first} = True", node.at)
+        self._lines.add(f"while {first} or not ({self._expressions.condition(node.until)}):", node.until.at)
+        with self._lines.inner():
+            self._lines.add(f"{first} = False")
+        self._body(node.body, node.at)
+
+    def _body(self, body: tree.Block, at: Position) -> None:
+        """A loop's, with its share of the scan's budget."""
+        self._loops += 1
+        if self._loops > MOST_LOOPS:
+            raise SourceError(at, f"found {self._loops} loops one within the other, expected at most {MOST_LOOPS}")
+        with self._lines.inner():
+            self._lines.add("_rt.left -= 1", at)
+            self._lines.add("if _rt.left < 0: _late()", at)
+        self.block(body)
+        self._loops -= 1
+
+    def _jump(self, node: tree.Jump) -> None:
+        if node.word != "RETURN" and not self._loops:
+            raise SourceError(node.at, f"found {node.word} outside of a loop, expected it in FOR, WHILE or REPEAT")
+        self._lines.add({"EXIT": "break", "CONTINUE": "continue", "RETURN": "return"}[node.word], node.at)
+
+    def _name(self, letter: str) -> str:
+        self._names += 1
+        return f"_{letter}{self._names}"

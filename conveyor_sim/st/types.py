@@ -1,0 +1,226 @@
+"""The types of the standard: ranges, what converts to what by itself, and how code keeps a value in its type.
+
+Values are Python's: BOOL a bool; integers, bit strings and enumerations an int; REAL and LREAL a float, a REAL rounded
+to 32 bits; TIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an object.
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
+
+_SINGLE = array("f", [0.0])
+
+
+def single(value: float) -> float:
+    """The nearest number of 32 bits; beyond the largest it is infinite (IEEE 754)."""
+    _SINGLE[0] = value
+    return _SINGLE[0]
+
+
+@dataclass(frozen=True)
+class Type:
+    """A type, by the name that it has in messages. low, high: bounds of what is a whole number."""
+
+    name: str
+    kind: Kind
+    low: int = 0
+    high: int = 0
+    start: str = field(default="", compare=False)
+    """Code of the initial value that the type is declared with; "" where it is declared without."""
+
+    @property
+    def base(self) -> Type:
+        """What operators see of it."""
+        return self
+
+    @property
+    def initial(self) -> str:
+        """Code of the value that a variable has where none is given."""
+        return self.start or {"bool": "False", "real": "0.0", "string": "''"}.get(self.kind, "0")
+
+    @property
+    def width(self) -> int:
+        """Bits of a whole number."""
+        return (self.high - self.low).bit_length()
+
+    def wrapped(self, code: str) -> str:
+        """Code of a whole number, in two's complement of this width."""
+        mask = (1 << self.width) - 1
+        if self.low == 0:
+            return f"({code} & {mask})"
+        return f"(({code} + {-self.low} & {mask}) - {-self.low})"
+
+    def wrap(self, value: int) -> int:
+        """The same of a value."""
+        return (value - self.low & (1 << self.width) - 1) + self.low
+
+
+@dataclass(frozen=True)
+class Subrange(Type):
+    """Some of an integer type; a value outside of it stops the program."""
+
+    of: Type = field(default_factory=lambda: Type("INT", "int"))
+
+    @property
+    def base(self) -> Type:
+        """The integer type."""
+        return self.of
+
+    @property
+    def initial(self) -> str:
+        """0, or the lowest value where that is not in the range."""
+        return self.start or str(0 if self.low <= 0 <= self.high else self.low)
+
+
+@dataclass(frozen=True)
+class Enumeration(Type):
+    """Names for whole numbers."""
+
+    values: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def initial(self) -> str:
+        """The first value."""
+        return self.start or str(self.values[0][1])
+
+    def value(self, name: str) -> int | None:
+        """That of a name, in any case."""
+        return next((value for other, value in self.values if other.lower() == name.lower()), None)
+
+
+@dataclass(frozen=True)
+class String(Type):
+    """Characters, at most `high` of them; what is longer is cut."""
+
+
+@dataclass(frozen=True)
+class Array(Type):
+    """Indices of each dimension from the first to the last, and what lies there."""
+
+    ranges: tuple[tuple[int, int], ...] = ()
+    element: Type = field(default_factory=lambda: Type("INT", "int"))
+
+    @property
+    def initial(self) -> str:
+        """A list of lists of the element's initial value, each its own."""
+        code = self.element.initial
+        for low, high in reversed(self.ranges):
+            code = f"[{code} for _ in range({high - low + 1})]"
+        return self.start or code
+
+
+@dataclass(frozen=True)
+class Member:
+    """A field of a structure, or a variable of a block or program."""
+
+    name: str
+    type: Type
+    initial: str
+    """Code."""
+    section: str = "VAR"
+    constant: bool = False
+    retain: bool = False
+    value: Any = None
+    """Of a constant."""
+    address: str = ""
+    tag: str = ""
+    at: tuple[int, int] = (1, 1)
+
+    @property
+    def slot(self) -> str:
+        """Its name in Python."""
+        return f"v_{self.name.lower()}"
+
+
+@dataclass(frozen=True, eq=False)
+class Structure(Type):
+    """Named fields: an object of a class of its own in Python, as is a block."""
+
+    members: dict[str, Member] = field(default_factory=dict)
+    """By name in small letters."""
+    python: str = ""
+    """The class."""
+
+    @property
+    def initial(self) -> str:
+        """A new object."""
+        return self.start or f"{self.python}()"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Structure) and self.python == other.python
+
+    def __hash__(self) -> int:
+        return hash(self.python)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockType(Structure):
+    """A function block, a program or a function's frame. standard: one of the library, run with the time."""
+
+    standard: bool = False
+    function: bool = False
+    result: Type | None = None
+
+    def of(self, *sections: str) -> list[Member]:
+        """Variables of some sections, in their order."""
+        return [member for member in self.members.values() if member.section in sections]
+
+
+def _signed(name: str, bits: int) -> Type:
+    return Type(name, "int", -(1 << bits - 1), (1 << bits - 1) - 1)
+
+
+BOOL = Type("BOOL", "bool", 0, 1)
+SINT, INT, DINT, LINT = (_signed(name, bits) for name, bits in (("SINT", 8), ("INT", 16), ("DINT", 32), ("LINT", 64)))
+USINT, UINT, UDINT, ULINT = (
+    Type(name, "int", 0, (1 << bits) - 1) for name, bits in (("USINT", 8), ("UINT", 16), ("UDINT", 32), ("ULINT", 64))
+)
+BYTE, WORD, DWORD, LWORD = (
+    Type(name, "bits", 0, (1 << bits) - 1) for name, bits in (("BYTE", 8), ("WORD", 16), ("DWORD", 32), ("LWORD", 64))
+)
+REAL, LREAL = Type("REAL", "real"), Type("LREAL", "real")
+TIME = Type("TIME", "time", -(2**63), 2**63 - 1)
+STRING, WSTRING = String("STRING", "string", 0, 80), String("WSTRING", "string", 0, 80)
+VOID = Type("nothing", "void")
+
+INTEGERS = (SINT, USINT, INT, UINT, DINT, UDINT, LINT, ULINT)
+BITS = (BYTE, WORD, DWORD, LWORD)
+NUMBERS = (*INTEGERS, REAL, LREAL)
+ELEMENTARY = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, STRING, WSTRING)} | {"LTIME": TIME}
+
+
+def is_wide(kind: Type) -> bool:
+    """Whether a text is a WSTRING."""
+    return kind.name.startswith("WSTRING")
+
+
+def fits(source: Type, target: Type) -> bool:
+    """Whether a value of one type is one of the other by itself (IEC 61131-3:2013, figure 12): nothing is ever lost."""
+    source, into = source.base, target.base
+    if source == into:
+        return True
+    if source.kind == into.kind == "string":
+        return is_wide(source) == is_wide(into)
+    if source.kind == "int" and into.kind == "int":
+        return into.low <= source.low and source.high <= into.high
+    if source.kind == "bits" and into.kind == "bits":
+        return source.high <= into.high
+    if source.kind == "int" and into.kind == "real":
+        return source.width <= (16 if into == REAL else 32)
+    if isinstance(source, Array) and isinstance(into, Array):
+        return source.ranges == into.ranges and source.element == into.element
+    return source == REAL and into == LREAL
+
+
+def common(left: Type, right: Type) -> Type | None:
+    """The smallest type that both fit, in which they are compared and computed."""
+    if fits(left, right):
+        return right.base
+    if fits(right, left):
+        return left.base
+    candidates = BITS if left.base.kind == "bits" else NUMBERS
+    return next((one for one in candidates if fits(left, one) and fits(right, one)), None)

@@ -1,0 +1,165 @@
+"""What an expression comes to: a type and Python code; and how it is made fit for where it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from conveyor_sim.st.blocks import CLASSES
+from conveyor_sim.st.errors import Fault, Position, SourceError
+from conveyor_sim.st.operations import NAMES
+from conveyor_sim.st.types import (
+    BOOL,
+    DINT,
+    INT,
+    LINT,
+    LREAL,
+    REAL,
+    ULINT,
+    Array,
+    BlockType,
+    String,
+    Structure,
+    Subrange,
+    Type,
+    common,
+    fits,
+    single,
+)
+
+NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES}
+"""What code may call."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """The code stands by itself: it is a name, a call or in brackets."""
+
+    at: Position
+    type: Type
+    code: str
+    constant: Any = None
+    """What it is, where that is known."""
+    literal: str = ""
+    """int or real: a literal without a type, or computed of such; its type is that of its surroundings."""
+    raw: str = ""
+    """The code before it was brought into its type; for the next operator of the same kind."""
+    kind: str = ""
+    """Of operators that raw may be followed by."""
+
+
+@dataclass(frozen=True)
+class Place(Value):
+    """A variable, or a part of one."""
+
+    write: Callable[[str], str] = str
+    """Code that gives it what some code is."""
+    reference: str = ""
+    """Code that passes it as VAR_IN_OUT; "" where it can't be."""
+    fixed: str = ""
+    """Why it can't be written; "" where it can."""
+    root: tuple[str, str] = ("", "")
+    """Code of the object, and slot, of the variable that it is part of."""
+
+
+def text_of(value: Any) -> str:
+    """Code of a constant."""
+    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+        return f"float('{value}')"
+    return (
+        f"({value!r})" if isinstance(value, (int, float)) and not isinstance(value, bool) and value < 0 else repr(value)
+    )
+
+
+def constant(at: Position, kind: Type, value: Any) -> Value:
+    """A value that is known."""
+    return Value(at, kind, text_of(value), value)
+
+
+def untyped(at: Position, value: int | float) -> Value:
+    """A literal without a type."""
+    if isinstance(value, float):
+        return Value(at, LREAL, text_of(value), value, "real")
+    kind = next((one for one in (INT, DINT, LINT, ULINT) if one.low <= value <= one.high), None)
+    if kind is None:
+        raise SourceError(at, f"found {value}, expected a number of at most 64 bits")
+    return Value(at, kind, text_of(value), value, "int")
+
+
+def folded(value: Value, *operands: Value) -> Value:
+    """The value, computed now if its operands are known."""
+    if any(one.constant is None for one in operands):
+        return value
+    try:
+        known = eval(value.code, dict(NAMESPACE))
+    except Fault as error:
+        raise SourceError(value.at, str(error)) from None
+    except (ArithmeticError, ValueError, MemoryError) as error:
+        raise SourceError(value.at, f"found a constant that can't be computed ({error}), expected a number") from None
+    return replace(value, code=text_of(known), constant=known, raw="", kind="")
+
+
+def described(value: Value) -> str:
+    """What it is, in words."""
+    if value.literal:
+        return f"the number {value.constant}"
+    return f"a {value.type.name}" if value.constant is None else f"the {value.type.name} {value.constant}"
+
+
+def converts(value: Value, target: Type) -> bool:
+    """Whether it may stand where the type is expected."""
+    if value.literal:
+        return target.base.kind == "real" or (value.literal == "int" and target.base.kind in ("int", "bits", "bool"))
+    return fits(value.type, target)
+
+
+def converted(value: Value, target: Type, what: str = "") -> str:
+    """Code of the value in a type. what: it is expected for. Raises SourceError."""
+    expected = f"{target.name}{f' for {what}' if what else ''}"
+    if not converts(value, target):
+        raise SourceError(value.at, f"found {described(value)}, expected {expected}{_advice(value, target)}")
+    into, known = target.base, value.constant
+    if known is not None and into.kind in ("int", "bits", "bool") and not target.low <= known <= target.high:
+        raise SourceError(value.at, f"found {known}, expected {expected}, {target.low} to {target.high}")
+    if into.kind == "bool":
+        return text_of(bool(known)) if value.literal else value.code
+    if into.kind == "real":
+        if known is not None:
+            return text_of(single(known) if into == REAL else float(known))
+        return f"float({value.code})" if value.type.base.kind == "int" else value.code
+    if isinstance(target, Subrange) and known is None:
+        inside = target.low <= value.type.low and value.type.high <= target.high
+        return value.code if inside else f"_in_range({value.code}, {target.low}, {target.high})"
+    if isinstance(target, String) and target.high < value.type.high:
+        return f"{value.code}[:{target.high}]"
+    if isinstance(target, BlockType):
+        raise SourceError(value.at, f"found a block, {target.name}, expected a value: blocks are not copied")
+    if isinstance(target, (Array, Structure)):
+        return f"_copied({value.code})"
+    return value.code
+
+
+def _advice(value: Value, target: Type) -> str:
+    source, into = value.type.base, target.base
+    kinds = {"int", "real", "bits", "bool", "time", "string"}
+    if value.literal or source.kind not in kinds or into.kind not in kinds:
+        return ""
+    return f"; {source.name.partition('[')[0]}_TO_{into.name.partition('[')[0]} converts"
+
+
+def unified(left: Value, right: Value, hint: Type | None) -> Type | None:
+    """The type in which two values are computed or compared; None if there is none."""
+    if left.literal and right.literal:
+        return LREAL if "real" in (left.literal, right.literal) else common(left.type, right.type)
+    for literal, other in ((left, right), (right, left)):
+        if not literal.literal:
+            continue
+        kind = other.type.base
+        if literal.literal == "real" and kind.kind == "int":
+            return next((one for one in ((REAL,) if hint == REAL else ()) + (LREAL,) if fits(kind, one)), None)
+        if not converts(literal, kind):
+            return None
+        inside = kind.kind == "real" or kind.low <= literal.constant <= kind.high
+        return kind if inside or kind == BOOL else common(kind, literal.type)
+    return common(left.type, right.type)
