@@ -176,12 +176,8 @@ class Device:
         """Why its mode can't change as it stands now, "" if it can."""
         return ""
 
-    def stops(self, name: str, value: float) -> bool:
-        """Whether a command of its own stops it for safety: what people may give in any mode."""
-        return False
-
     def stop_by_hand(self, name: str, value: float) -> None:
-        """Take such a command from a person who has no control of it."""
+        """Take a command that stops it (`authority.stops`) from a person who has no control of it."""
         raise NotImplementedError(f"{self.name} takes no stops")
 
     def take_mode(self, mode: int, now: ScanContext) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Sequence
 from types import SimpleNamespace
 
 from conveyor_sim.line.alarms.declaration import Declared, error
+from conveyor_sim.line.authority import CNTRL_CMD
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.failures import Draws, FailureClock, PlannedTimes
 from conveyor_sim.line.packml import COMMAND_TEXTS, STATE_TEXTS, Command, State, StateMachine, mode_objection, objection
@@ -62,7 +63,7 @@ class MachineDevice(Device):
                 count(f"{name}/failures", "counter", "How often it has failed."),
                 number(f"{name}/cur_rate", "actual", "Rate at which it works.", "1/s", 0.0, most, rate),
                 switch(f"{name}/run", "command", "Runs while on.", 1.0),
-                choice(f"{name}/cntrl_cmd", "command", "Command of PackML, as it changes.", COMMAND_TEXTS),
+                choice(f"{name}{CNTRL_CMD}", "command", "Command of PackML, as it changes.", COMMAND_TEXTS),
                 number(f"{name}/rate", "setpoint", "Bottles a second.", "1/s", 0.0, most, rate, nominal=rate),
                 switch(f"{name}/stop", "fault", "Stopped from outside while on."),
             ],
@@ -140,7 +141,7 @@ class MachineDevice(Device):
     def objection(self, name: str, value: float, now: ScanContext) -> str:
         """Why a command of its own can't be taken now, "" if it can."""
         command = int(value)
-        if not name.endswith("/cntrl_cmd") or command in (0, self.cntrl_cmd):
+        if not name.endswith(CNTRL_CMD) or command in (0, self.cntrl_cmd):
             return ""
         if wrong := objection(command, self.state):
             return f"{name}: {wrong}"
@@ -153,10 +154,6 @@ class MachineDevice(Device):
     def mode_objection(self) -> str:
         """Why its mode can't change in the present state, "" if it can."""
         return mode_objection(self.state)
-
-    def stops(self, name: str, value: float) -> bool:
-        """Whether a command of its own is Stop or Abort."""
-        return name.endswith("/cntrl_cmd") and value in (Command.STOP, Command.ABORT)
 
     def stop_by_hand(self, name: str, value: float) -> None:
         """Take Stop or Abort; cntrl_cmd stays as who has control gave it."""

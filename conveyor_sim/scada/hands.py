@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from fnmatch import fnmatchcase
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES
+from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, stops
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.source import Shown
 
 
-def objection(shown: Shown, device: str, where: str, kind: WriterKind, writer: str) -> str:
-    """Why a device takes no command from a writer, as the line was last; "" if it does. where: the line's place."""
+def objection(
+    shown: Shown, device: str, where: str, kind: WriterKind, writer: str, command: str = "", value: float = 0.0
+) -> str:
+    """Why a device takes no command from a writer, as the line was last; "" if it does. where: the line's place;
+    command, value: which one it is, where that is known.
+    """
+    if stops(command, value, kind):
+        return ""
     mode = int(shown.values.get(f"{device}/mode", AUTOMATIC))
     if kind not in IN_CONTROL[mode]:
         return f"{device}: is in {MODES[mode]}"

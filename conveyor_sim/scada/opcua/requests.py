@@ -156,8 +156,10 @@ class Requests:
     def _judge_number(self, client: User, tag: Tag, number: float) -> int:
         if refusal(self._commands, "command", [tag.name], [number]):
             return Codes.BadOutOfRange
-        kind = _kind(client)
-        if kind is None or objection(self._source.shown, tag.device, self._source.about.where, kind, _writer(client)):
+        kind, source = _kind(client), self._source
+        if kind is None:
+            return Codes.BadInvalidState
+        if objection(source.shown, tag.device, source.about.where, kind, _writer(client), tag.name, number):
             return Codes.BadInvalidState
         return Codes.Good
 

@@ -175,3 +175,13 @@ def _own(writer: str, released: tuple[str, ...]) -> object:
     from conveyor_sim.line.inputs import OWN, Input
 
     return Input("lockstep", writer, "controller", OWN, (), (), released)
+
+
+def test_an_operator_stops_a_machine_in_automatic_and_does_nothing_else(line: Line) -> None:
+    node = line.node("machines/filler/cntrl_cmd", line.client("operator"))
+    with refused(Codes.BadInvalidState):
+        node.write_value(ua.DataValue(ua.Variant(1, ua.VariantType.UInt32)))
+    node.write_value(ua.DataValue(ua.Variant(3, ua.VariantType.UInt32)))
+    line.advance()
+    assert line.outcomes() == [("opcua operator", "set", ("machines/filler/cntrl_cmd",), (3.0,), True)]
+    assert line.read("machines/filler/state") == 2
