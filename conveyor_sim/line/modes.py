@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, OPERATORS_MODES, stops, unauthorized, who
+from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, OPERATORS_MODES, PEOPLE, stops, unauthorized, who
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input
@@ -160,6 +160,8 @@ class Modes:
 
     def _stops(self, given: Input) -> Collection[str]:
         """Commands of an input that stop devices, and may be given in any mode: if a person gives them."""
+        if given.writer_kind not in PEOPLE:
+            return ()
         own, kind = zip(given.names, given.values, strict=True), given.writer_kind
         return [name for name, value in own if name in self._device_of and stops(name, value, kind)]
 
