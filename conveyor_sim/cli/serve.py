@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.console import Console
 
 from conveyor_sim.cli.output import OUTSIDE_TABLES
+from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
 if TYPE_CHECKING:
-    from conveyor_sim.line.inputs import WriterKind
+    from conveyor_sim.ros.node_source import NodeSource
+    from conveyor_sim.scada.bag_source import BagSource
     from conveyor_sim.scada.face import Stamps
     from conveyor_sim.scada.scene_source import SceneSource
     from conveyor_sim.scada.serving import Serving
+
+    Source = SceneSource | BagSource | NodeSource
 
 LOOK = 1.0
 """s of wall time between two looks at how it goes, on a terminal."""
@@ -26,9 +30,21 @@ PLAIN_LOOK = 10.0
 
 PORT = click.IntRange(0, 65535)
 
+OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables")
+TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
+OF_BAG = ("loop",)
+
+_WHERE = {
+    **dict.fromkeys(OF_SCENE, "it with a scene only"),
+    "loop": "it with a bag only",
+    "real_time_factor": "it with a scene or a bag: the node has a parameter of that name",
+    "modbus_role": "none: a recording can't be commanded",
+}
+
 
 @click.command()
-@click.argument("what", metavar="SCENE")
+@click.argument("what", required=False, metavar="[SCENE|BAG]")
+@click.option("--node", is_flag=False, flag_value="", metavar="[NAMESPACE]", help="Serve the line of a ROS 2 node.")
 @click.option("--opcua", type=PORT, is_flag=False, flag_value=4840, help="Serve OPC UA on this port.")
 @click.option("--opcua-users", type=click.Path(path_type=Path), help="File of its users, who may do more than read.")
 @click.option("--opcua-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
@@ -39,35 +55,24 @@ PORT = click.IntRange(0, 65535)
 @click.option("--bind", default="127.0.0.1", help="Address to listen on, for other machines (default: this one only).")
 @click.option("--stamps", type=click.Choice(["wall", "simulated"]), default="wall", help="What times of values are.")
 @click.option("--real-time-factor", type=click.FloatRange(0.0, 1e6), default=1.0, help="0: as fast as possible.")
-@click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
+@click.option("--loop", is_flag=True, help="Of BAG: begin anew at its end.")
+@click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of its own.")
 @click.option(
-    "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
+    "--out",
+    "--record",
+    "out",
+    type=click.Path(path_type=Path),
+    help="Of SCENE: folder to record to (default: runs/<UTC time>).",
 )
-@click.option("--no-record", is_flag=True, help="Nothing is written.")
-@click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
+@click.option("--no-record", is_flag=True, help="Of SCENE: nothing is written.")
+@click.option("--threads", type=click.IntRange(1), help="Of SCENE: threads to step with.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
-def serve(
-    what: str,
-    opcua: int | None,
-    opcua_users: Path | None,
-    opcua_certificates: Path | None,
-    opcua_anonymous: bool,
-    modbus: int | None,
-    modbus_role: WriterKind | None,
-    modbus_map: Path | None,
-    bind: str,
-    stamps: Stamps,
-    real_time_factor: float,
-    duration: float | None,
-    out: Path | None,
-    no_record: bool,
-    threads: int | None,
-    outside_tables: bool,
-) -> None:
+def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
     """Serve a line to SCADA systems, HMIs and PLCs.
 
-    SCENE is simulated in real time, and recorded with all that clients write. Without the option of any protocol, all
-    that are installed are served, each on its port. Ctrl-C ends it.
+    SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node it is the
+    line that a running node simulates. Without the option of any protocol, all that are installed are served, each on
+    its port. Ctrl-C ends it.
     """
     with collected_later():
         from conveyor_sim.scada.face import Settings
@@ -75,26 +80,49 @@ def serve(
         from conveyor_sim.scada.serving import Serving
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
-    ports = {"opcua": opcua, "modbus": modbus}
-    chosen = [(kind, port) for kind in FACES if (port := ports[kind.name]) is not None]
+    chosen = [(kind, port) for kind in FACES if (port := given[kind.name]) is not None]
     chosen = chosen or [(kind, kind.port) for kind in FACES if kind.installed]
-    if not chosen:
-        FACES[0].require()
-    settings = Settings(bind, stamps, modbus_role, modbus_map, opcua_users, opcua_anonymous, opcua_certificates)
-    with (
-        _simulated(what, console, out, no_record, duration, real_time_factor, threads, outside_tables) as source,
-        Serving(source, chosen, settings) as serving,
-    ):
-        for sentence in serving.greeting:
-            console.print(sentence)
-        _watch(serving, console)
-        summary = serving.summary()
-    bags = [] if no_record else source.recordings
+    for kind, _ in chosen or [(FACES[0], 0)]:
+        kind.require()
+    of_faces = ("modbus_role", "modbus_map", "opcua_users", "opcua_anonymous", "opcua_certificates")
+    settings = Settings(bind, stamps, **{name: given[name] for name in of_faces})
+    with ExitStack() as stack:
+        if (what is None) == (node is None):
+            raise ConveyorError("serve: expected one of SCENE, BAG and --node")
+        if what is None:
+            _require_not_given("--node", (*OF_SCENE, *OF_BAG, "real_time_factor"))
+            source: Source = stack.enter_context(_node(node or "", console))
+        elif _is_bag(what):
+            _require_not_given(what, (*OF_SCENE, "modbus_role"))
+            source = stack.enter_context(_bag(Path(what), console, given["real_time_factor"], given["loop"]))
+        else:
+            _require_not_given(what, OF_BAG)
+            source = stack.enter_context(_scene(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
+        with Serving(source, chosen, settings) as serving:
+            for sentence in serving.greeting:
+                console.print(sentence)
+            _watch(serving, console)
+            summary = serving.summary()
+    bags = getattr(source, "recordings", [])
     click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
 
 
+def _is_bag(what: str) -> bool:
+    from conveyor_sim.bag.reader import SUFFIXES
+
+    return Path(what).is_dir() or Path(what).suffix in SUFFIXES
+
+
+def _require_not_given(what: str, names: Sequence[str]) -> None:
+    context = click.get_current_context()
+    for name in names:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            option = name.replace("_", "-")
+            raise ConveyorError(f"--{option}: given with {what}, expected {_WHERE[name]}")
+
+
 @contextmanager
-def _simulated(
+def _scene(
     what: str,
     console: Console,
     out: Path | None,
@@ -119,6 +147,29 @@ def _simulated(
         require_recordable(folder)
     with SceneSource(Task(scene, folder, 0, real_time_factor, threads), console.print) as source:
         source.wait_for_line()
+        yield source
+
+
+def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagSource:
+    from conveyor_sim.scada.bag_source import BagSource
+
+    return BagSource(path, console.print, speed=speed, loop=loop)
+
+
+@contextmanager
+def _node(namespace: str, console: Console) -> Iterator[NodeSource]:
+    """A node's line, once its tags are known."""
+    try:
+        from conveyor_sim.ros.node_source import NodeSource
+    except ImportError as error:
+        raise ConveyorError(
+            f"serve --node: {error}, expected ROS 2 with rclpy and conveyor_msgs: source it, or run in the environment "
+            "that `make` sets up"
+        ) from error
+    with NodeSource(console.print, namespace) as source:
+        with console.status("waiting for the line of a node, and for its first tick"):
+            while not source.wait(LOOK):
+                pass
         yield source
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -66,8 +66,11 @@ class Playback:
     and `photo_eyes/<eye>` from signals.
     """
 
-    def __init__(self, bag: Bag) -> None:
-        """Raises BagError if the bag's times are not simulated times of one run."""
+    def __init__(self, bag: Bag, only: Collection[str] | None = None) -> None:
+        """only: the recorded topics that are wanted, and nothing is made; None: all.
+
+        Raises BagError if the bag's times are not simulated times of one run.
+        """
         self._bag = bag
         first_ns, last_ns = bag.span_ns
         if first_ns > WALL_CLOCK:
@@ -84,13 +87,14 @@ class Playback:
             Topic(name, kind, qos[name], bag.type_hash(name))
             for name, kind in bag.types.items()
             if (name if name.startswith("/") else f"{bag.namespace}/{name}") not in OWN and name != RUN_STATE
+            if only is None or name in only
         ]
         known = {topic.name for topic in recorded}
         made = [Topic(RUN_STATE, messages.RUN_STATE, LATCHED, None)]
-        if "outcomes" in known:
+        if "outcomes" in known and only is None:
             made.append(Topic("commands", messages.COMMANDS, EVENTS, None))
             made += [Topic(speed_command(belt), messages.SPEED, EVENTS, None) for belt in bag.line.belts]
-        eyes = _photo_eyes(bag.line.signal_names) if "signals" in known else {}
+        eyes = _photo_eyes(bag.line.signal_names) if "signals" in known and only is None else {}
         made += [Topic(eye, messages.BOOL, LATCHED, None) for eye in eyes]
         self.topics = (*recorded, *(topic for topic in made if topic.name not in known))
         self._recorded = known
@@ -113,17 +117,15 @@ class Playback:
         after_ns = self.stamp_ns(tick - 1) if tick > self.first_tick else -1
         self._cued_ns = self.stamp_ns(tick)
         self._seen.clear()
-        latched = {}
-        for topic, stamp, data in self._bag.raw(self._latched):
-            if stamp <= self._cued_ns or topic not in latched:  # the first one, where none came before
-                latched[topic] = Message(topic, data)
+        latched = self._last_before(self._cued_ns + 1, self._latched)
+        latched += self._first_after(self._cued_ns + 1, self._latched - {message.topic for message in latched})
         now = {topic for topic, _, _ in self._bag.raw(self._states, after_ns + 1, self._cued_ns + 1)}
         self._due = self._last_before(after_ns + 1, self._states - now)
         self._stream = self._bag.raw(self._recorded, after_ns + 1)
         self._next = next(self._stream, None)
         header = Header(tick, self._cued_ns, "")
         replaying = messages.run_state_message(RunState(REPLAYING, printable(self._bag.path)), header)
-        return [*latched.values(), Message(RUN_STATE, replaying)]
+        return [*latched, Message(RUN_STATE, replaying)]
 
     def take(self, tick: int) -> Iterator[Message]:
         """What is left up to a tick, in the order of recording."""
@@ -163,6 +165,15 @@ class Playback:
             missing -= found.keys()
             stop_ns, span = start_ns, 2 * span
         return [Message(topic, found[topic][2]) for topic in sorted(found, key=lambda name: found[name][:2])]
+
+    def _first_after(self, start_ns: int, topics: set[str]) -> list[Message]:
+        """The first message of each topic from a time on, in their order."""
+        found: dict[str, bytes] = {}
+        for topic, _, data in self._bag.raw(topics, start_ns) if topics else ():
+            found.setdefault(topic, data)
+            if len(found) == len(topics):
+                break
+        return [Message(topic, data) for topic, data in found.items()]
 
     def _sent(self, data: bytes) -> Iterator[Message]:
         """The command of an outcome, if it was one and the bag does not hold it itself."""

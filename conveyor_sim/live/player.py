@@ -68,6 +68,10 @@ class Player:
             self._pacer.restart()
             self.paused = False
 
+    def set_rate(self, rate: float) -> None:
+        """From the next tick on: recorded seconds per wall second, 0 for as fast as possible."""
+        self._pacer.factor = rate
+
     def toggle(self) -> None:
         """Pause, or resume."""
         if self.paused:

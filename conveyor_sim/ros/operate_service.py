@@ -1,4 +1,4 @@
-"""The service `operate`: what operators and engineers do to the line."""
+"""The service `operate`: what operators and engineers do to the line, and controllers that want an answer."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from conveyor_sim.live.lockstep import Refused
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.services import settled
 from conveyor_sim.support.printable import MOST, printable
+
+WRITERS = (*PEOPLE, "controller")
 
 
 class OperateService:
@@ -52,8 +54,8 @@ class OperateService:
 
 def _stranger(request: Any) -> str:
     """Why nobody of this name and kind can use the service, "" if they can."""
-    if request.writer_kind not in PEOPLE:
-        return f"writer_kind: {printable(request.writer_kind)!r} given, expected {' or '.join(PEOPLE)}"
+    if request.writer_kind not in WRITERS:
+        return f"writer_kind: {printable(request.writer_kind)!r} given, expected one of {', '.join(WRITERS)}"
     if not request.writer:
         return "writer: no name given, expected that of whoever does it"
     if len(request.writer) > MOST:

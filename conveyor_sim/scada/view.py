@@ -53,6 +53,7 @@ class View:
         self._listeners = Listeners()
         self._events = RecentEvents()
         self._known = threading.Event()
+        self._strange = False  # whether it has become another line
         self._shown = Shown(0, {}, lost=NOTHING)
         self._forget("")
 
@@ -83,7 +84,11 @@ class View:
     # By the thread that hears
 
     def take(self, topic: str, message: Any) -> None:
-        """A decoded message of one of the topics HEARD. Raises ViewError for another line than before."""
+        """A decoded message of one of the topics HEARD. Raises ViewError for another line than before, of which nothing
+        else is taken.
+        """
+        if self._strange and topic != "line":
+            return
         match topic:
             case "line":
                 self._take_line(message)
@@ -147,7 +152,9 @@ class View:
 
     def _take_line(self, message: Any) -> None:
         about = about_line(message)
-        if self._about is not None and self._about != about:
+        self._strange = self._about is not None and self._about != about
+        if self._about is not None and self._strange:
+            self._forget(message.run_id)
             raise ViewError(
                 f"{about.name}: another line than before, or with other tags; expected {self._about.name} as it was: "
                 "start serving anew"

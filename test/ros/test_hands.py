@@ -72,8 +72,8 @@ def test_an_operator_takes_a_belt_forces_a_signal_and_all_of_it_replays(
         until(lambda: len(outcomes.messages) >= 6, "outcomes, also that of the owner")
         assert (outcomes.messages[-1].operation, outcomes.messages[-1].writer) == (OWN, "plc")
     for more, reason in (
-        ({"writer_kind": "controller"}, "writer_kind: 'controller' given, expected operator or engineer"),
-        ({"writer_kind": "test"}, "writer_kind: 'test' given, expected operator or engineer"),
+        ({"writer_kind": "line"}, "writer_kind: 'line' given, expected one of operator, engineer, controller"),
+        ({"writer_kind": "test"}, "writer_kind: 'test' given, expected one of operator, engineer, controller"),
         ({"writer": ""}, "writer: no name given"),
         ({"writer": "x" * 201}, "writer: a name of 201 characters given"),
         ({}, "explode: no such operation, expected one of set, "),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from scada.waiting import until
 from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, segment
 from scenes import scene as bottle_scene
 
@@ -23,15 +23,7 @@ from conveyor_sim.scada.scene_source import SceneSource
 from conveyor_sim.scada.source import MOST_WAITING
 from conveyor_sim.scene import Scene, load_scene
 
-PATIENCE = 60.0  # s of wall time; only a failing test waits so long
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
-
-
-def until(condition: Callable[[], Any], what: str) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, f"in vain: {what}"
-        time.sleep(0.005)
 
 
 def zoned(**overrides: Any) -> Scene:

@@ -1,0 +1,236 @@
+"""`NodeSource`: a line that a node simulates, heard of by its topics, as a tag source."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any
+
+from conveyor_msgs import srv
+from rclpy.context import Context
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.run_state import ENDED, STOPPED
+from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
+from conveyor_sim.observe.events import Event
+from conveyor_sim.ros.context import new_node, one_sentence, start_ros
+from conveyor_sim.ros.direct import Aside, WaitSet, take_message
+from conveyor_sim.ros.publishers import message_class, ros_qos
+from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.scada.source import MOST_WAITING, Control
+from conveyor_sim.scada.view import HEARD, View, ViewError
+from conveyor_sim.support.printable import SENTENCE, printable
+
+LOOK = 1.0
+"""s of wall time between two requests for a sign of life."""
+
+SILENCE = 5.0
+"""s of wall time without one after which what is shown is stale."""
+
+
+class NodeSource(View, AbstractContextManager["NodeSource"]):
+    """Listens from its start until close(). The node may come, go and come back meanwhile."""
+
+    controls: frozenset[Control] = frozenset({"pause", "resume", "step", "reset"})
+
+    def __init__(self, say: Callable[[str], object], namespace: str = "") -> None:
+        """say: called with a sentence for people, by a thread of this source. namespace: of the node.
+
+        Raises ConveyorError if ROS can't start.
+        """
+        super().__init__()
+        self._say = say
+        self._closing = False
+        self._context = Context()
+        start_ros(self._context)
+        self._node = new_node("conveyor_serve", context=self._context, namespace=namespace or None)
+        self._spinner = Spinner(self._context)
+        with one_sentence():
+            self._topics = {
+                name: self._node.create_subscription(
+                    message_class(TOPICS[name].type),
+                    name,
+                    lambda _: None,
+                    ros_qos(TOPICS[name].qos),
+                    callback_group=Aside(),
+                    raw=True,
+                )
+                for name in HEARD
+            }
+            self._alive_client = self._node.create_client(srv.GetSimulationState, "get_simulation_state")
+            self._operate = self._node.create_client(srv.Operate, "operate")
+            self._services: dict[str, Any] = {
+                "pause": self._node.create_client(Trigger, "pause"),
+                "resume": self._node.create_client(Trigger, "resume"),
+                "step": self._node.create_client(srv.StepSimulation, "step_simulation"),
+                "reset": self._node.create_client(srv.ResetSimulation, "reset_simulation"),
+            }
+        self._lock = threading.Lock()
+        self._asked: dict[Future, Any] = {}  # with their clients
+        self._refusals: deque[Event] = deque(maxlen=MOST_WAITING)
+        self._alive = self._heard = 0.0  # s of wall time
+        self._sign: Future | None = None
+        self._why = ""  # it can't be shown although it is there
+        self._told = ""
+        self._waiting = WaitSet(self._context, subscriptions=list(self._topics.values()))
+        self._spinner.start(self._node)
+        self._thread = threading.Thread(target=self._listen, name="node", daemon=True)
+        self._thread.start()
+
+    def give(self, given: Input) -> str:
+        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does.
+
+        What the node refuses is among the events.
+        """
+        shown = self.shown
+        if shown.lost:
+            return shown.lost
+        if shown.run.state in (ENDED, STOPPED):
+            return f"the run has {shown.run.text}, expected a reset"
+        if size_of(given) > MESSAGE_BYTES:
+            return TOO_LARGE
+
+        def answered(future: Future) -> None:
+            answer = self._answer(future)
+            if answer is not None and not answer.accepted:
+                name = given.names[0] if given.names else given.operation
+                value = given.values[0] if given.values else 0.0
+                self._refusals.append(Event(int(answer.tick), "command_refused", name, -1, value, answer.reason))
+                self._waiting.wake()
+
+        request = srv.Operate.Request(
+            writer=given.writer,
+            writer_kind=given.writer_kind,
+            operation=given.operation,
+            names=given.names,
+            values=[float(value) for value in given.values],
+            texts=given.texts,
+        )
+        return self._ask(self._operate, request, answered)
+
+    def control(self, what: Control, value: float, by: str) -> str:
+        """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
+        if what not in self.controls:
+            return f"{what}: expected one of {', '.join(sorted(self.controls))} of a node"
+        if reason := self.shown.lost:
+            return reason
+        if what == "step" and not (1.0 <= value < 2**32 and float(value).is_integer()):
+            return f"step: {value:g} given, expected a whole number of ticks of at least 1"
+        client = self._services[what]
+
+        def answered(future: Future) -> None:
+            answer = self._answer(future)
+            if answer is None:
+                return
+            if isinstance(answer, Trigger.Response):
+                reason = "" if answer.success else answer.message
+            else:
+                reason = answer.result.error_message
+            self._say(f"{what}, asked for by {by}" + (f", refused: {reason}" if reason else ""))
+
+        request = client.srv_type.Request()
+        if what == "step":
+            request.steps = int(value)
+        return self._ask(client, request, answered)
+
+    def close(self) -> None:
+        """Listen no longer."""
+        self._closing = True
+        self._waiting.wake()
+        self._thread.join()
+        self._waiting.close()
+        self._spinner.close()
+        self._node.destroy_node()
+        self._context.shutdown()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _ask(self, client: Any, request: Any, answered: Callable[[Future], None]) -> str:
+        with self._lock:
+            if len(self._asked) >= MOST_WAITING:
+                return f"{MOST_WAITING} inputs wait for the node already"
+            future = client.call_async(request)
+            self._asked[future] = client
+        future.add_done_callback(answered)
+        return ""
+
+    def _answer(self, future: Future) -> Any:
+        """What was answered; None: nothing was, and nothing will be."""
+        with self._lock:
+            self._asked.pop(future, None)
+        return None if future.cancelled() or future.exception() else future.result()
+
+    # The thread that listens
+
+    def _listen(self) -> None:
+        looked = 0.0
+        while not self._closing:
+            self._waiting.wait(LOOK / 2)
+            now = time.monotonic()
+            try:
+                if self._take_all():
+                    self._heard, self._why = now, ""
+                    self.show()
+            except Exception as error:  # of a node of another version, its messages may be anything
+                text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
+                self._why = printable(text, SENTENCE)
+            if now > looked + LOOK:
+                looked = now
+                self._look(now)
+            if self._why:
+                self._lose(self._why)
+
+    def _take_all(self) -> bool:
+        """Take what has come; whether there was anything. Raises ViewError."""
+        came, strange = False, None
+        for name, subscription in self._topics.items():
+            taken = []
+            while (message := take_message(subscription)) is not None:
+                taken.append(message[0])
+            for data in taken if name == "events" else taken[-1:]:
+                came = True
+                try:
+                    self.take(name, typestore().deserialize_cdr(data, TOPICS[name].type))
+                except ViewError as error:
+                    strange = error
+        while self._refusals:
+            self.add(self._refusals.popleft())
+        if strange is not None:
+            raise strange
+        return came
+
+    def _look(self, now: float) -> None:
+        """Is it still there?"""
+        if (sign := self._sign) is not None:
+            if sign.done():
+                self._alive = now
+            else:
+                self._alive_client.remove_pending_request(sign)
+        self._sign = None
+        if not self._alive_client.service_is_ready():
+            self._lose("no node is there that simulates a line, or its run has not begun")
+            return
+        self._sign = self._alive_client.call_async(srv.GetSimulationState.Request())
+        if now > max(self._alive, self._heard) + SILENCE:
+            self._lose(f"nothing was heard of the node for {SILENCE:g} s")
+        elif self.shown.lost and not self._why and now < self._alive + LOOK:
+            self.show()  # it stands, and shows nothing new
+
+    def _lose(self, reason: str) -> None:
+        if self._told != reason and not self.shown.lost:
+            self._say(reason)
+        self._told = reason
+        self.lose(reason)
+        with self._lock:
+            asked, self._asked = self._asked, {}
+        for future, client in asked.items():
+            client.remove_pending_request(future)
