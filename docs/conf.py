@@ -43,7 +43,7 @@ NAVIGATION = {
     "README": {
         "First steps": ["docs/build_a_line", "docs/testing_control_logic", "docs/ros", "docs/scada", "docs/plc"],
         "A line": [
-            *("docs/scene", "docs/line", "docs/alarms", "docs/report"),
+            *("docs/scene", "docs/line", "docs/alarms", "docs/report", "docs/view"),
             *("docs/effects", "docs/base", "docs/energy_and_damage"),
         ],
         "What to rely on": ["docs/accuracy", "docs/stability", "docs/reliability", "docs/performance", "docs/paper"],

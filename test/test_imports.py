@@ -40,13 +40,13 @@ MAY_IMPORT: Mapping[str, str] = {
     "version | numpy rich ruamel scipy",
     "explain": "effects errors model scene simulation support timestep | rich",
     "plot": "accuracy bag errors line observe scene support | matplotlib numpy",
-    "view": "bag errors observe scene support | numpy",
-    "runs": "bag engine errors line model observe plot scene simulation support timestep | click numpy rich",
+    "view": "bag errors observe scene simulation support | numpy",
+    "runs": "bag engine errors line model observe plot scene simulation support timestep view | click numpy rich",
     "live": "bag errors line observe runs simulation support",
     "scada": "bag errors line live observe runs scene simulation support | asyncua cryptography numpy pymodbus",
     "ros": "bag control errors explain line live model observe runs scada scene simulation support version | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
-    "testing": "bag control engine errors line plot ros scada scene simulation support | numpy pytest",
+    "testing": "bag control engine errors line plot ros scada scene simulation support view | numpy pytest",
     "cli": "accuracy bag errors explain line model ros runs scada scene support version view | click rich",
 }
 """By room, from the lowest up: the rooms of the project, then the packages of others that it imports."""

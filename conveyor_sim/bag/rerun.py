@@ -52,11 +52,17 @@ class _Run:
     failed: bool
 
 
-def rerun(folder: Path, bag: Path, progress: Callable[[float, float], None] | None = None) -> Rerun:
+def rerun(
+    folder: Path,
+    bag: Path,
+    progress: Callable[[float, float], None] | None = None,
+    watch: Callable[[Simulation], None] | None = None,
+) -> Rerun:
     """Simulate a run again with the inputs in a folder, and record it to another folder, new or empty.
 
     A copy of the checkpoint from which the run began, if it did, is put into the bag's folder: a replay needs it.
-    progress(done, total) is called with simulated times, s. Raises BagError for inputs that are missing, damaged or
+    progress(done, total) is called with simulated times, s; watch with the simulation at its start and after each tick,
+    to look at. Raises BagError for inputs that are missing, damaged or
     still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not sound. What ends
     it early leaves no bag.
     """
@@ -75,7 +81,7 @@ def rerun(folder: Path, bag: Path, progress: Callable[[float, float], None] | No
         recorder = Recorder(bag)
         try:
             with recorder:
-                departure = _simulate(run, simulation, recorder, progress)
+                departure = _simulate(run, simulation, recorder, progress, watch)
             if run.from_checkpoint:
                 shutil.copyfile(start, bag / START_NAME)
         except BaseException:
@@ -87,7 +93,11 @@ def rerun(folder: Path, bag: Path, progress: Callable[[float, float], None] | No
 
 
 def _simulate(
-    run: _Run, simulation: Simulation, recorder: Recorder, progress: Callable[[float, float], None] | None
+    run: _Run,
+    simulation: Simulation,
+    recorder: Recorder,
+    progress: Callable[[float, float], None] | None,
+    watch: Callable[[Simulation], None] | None,
 ) -> str:
     """Run to the end; where it departs from the states that were noted, in words."""
     outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
@@ -96,6 +106,8 @@ def _simulate(
     total = run.last * simulation.model.tick_ns * 1e-9
     applied: list[Input] = []
     departure = _departure(run, simulation)
+    if watch is not None:
+        watch(simulation)
     while simulation.tick < run.last or run.failed:
         applied = run.inputs.get(simulation.tick, applied)
         for given in applied:
@@ -108,6 +120,8 @@ def _simulate(
             expected = run.failed and simulation.tick == run.last
             return departure or ("" if expected else f"the run stops at {simulation.time:.2f} s ({error})")
         outputs.after_tick()
+        if watch is not None:
+            watch(simulation)
         departure = departure or _departure(run, simulation)
         if simulation.tick > run.last:
             return departure or f"the run goes on after {total:.2f} s, where it stopped"

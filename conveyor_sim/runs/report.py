@@ -1,4 +1,4 @@
-"""What a person sees at the end of a run: the summary, pictures with their paths, and how fast it went."""
+"""What a person sees at the end of a run: the summary, the page and pictures by their paths, how fast it went."""
 
 from __future__ import annotations
 
@@ -21,10 +21,14 @@ from conveyor_sim.runs.summarize import summarize
 from conveyor_sim.runs.summary import write_summary
 from conveyor_sim.runs.summary_table import render
 from conveyor_sim.scene import Scene
+from conveyor_sim.view.one_file import write_page
+
+PAGE_SECONDS = 600.0
+"""s at the end of a run that its page draws: some MB at most."""
 
 
 def report(bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent | None = None) -> None:
-    """Print the summary of a run that took `wall` s, and write it and the pictures into the run's folder.
+    """Print the summary of a run that took `wall` s, and write it, a page and the pictures into the run's folder.
 
     drawing: None draws nothing.
     """
@@ -33,6 +37,8 @@ def report(bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent 
         drawing.begin(bag)
     summary = summarize(bag, wall)
     Console(markup=False, highlight=False).print(render(summary))
+    if drawing is not None:
+        click.echo(f"page: {write_page(bag, bag / 'page.html', PAGE_SECONDS)}")
     click.echo(f"summary: {write_summary(summary, bag)}")
     if drawing is not None and can_draw():
         try:

@@ -1,4 +1,4 @@
-"""What is kept of a scenario that failed: its bag, and a picture of the line at the moment of failure."""
+"""What is kept of a scenario that failed: its bag, a page of its last seconds, a picture of the moment of failure."""
 
 from __future__ import annotations
 
@@ -15,8 +15,13 @@ from conveyor_sim.plot.moment import Event, Trace, moment_figure
 from conveyor_sim.plot.recording import contact_lines
 from conveyor_sim.testing.history import History, Mark
 from conveyor_sim.testing.scenario import Scenario
+from conveyor_sim.view.one_file import Failure, write_page
+from conveyor_sim.view.watch import Watch
 
 PICTURE = "line.png"
+PAGE = "line.html"
+SHOWN = 120.0
+"""s at the end of the run that the page draws."""
 
 EYES = "photo_eyes/"
 
@@ -58,18 +63,27 @@ def draw_moment(scenario: Scenario, path: Path) -> Path:
         return style.save_png(figure, path)
 
 
-def keep_bag(scenario: Scenario, inputs: Path, folder: Path) -> str:
+def keep_bag(scenario: Scenario, inputs: Path, folder: Path, watch: Watch) -> str:
     """End a scenario, run it again with its inputs and record that to a folder, in place of one of that name.
 
-    Returns the folder, and why what is in it is not the same run, if so. Raises as `rerun`, and OSError.
+    watch: looks at that run. Returns the folder, and why what is in it is not the same run, if so. Raises as `rerun`,
+    and OSError.
     """
     scenario.close()
     folder.parent.mkdir(parents=True, exist_ok=True)
-    made = rerun(inputs, inputs / folder.name)
+    made = rerun(inputs, inputs / folder.name, watch=watch)
     if folder.exists():
         shutil.rmtree(folder)
     shutil.move(made.bag, folder)
     return f"{folder} ({made.departure})" if made.departure else str(folder)
+
+
+def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch) -> Path:
+    """Write the last seconds of a scenario as a page, with what happened from its start, from its bag.
+
+    Raises BagError, and ConveyorError if the file can't be written.
+    """
+    return write_page(bag, path, failures=[Failure(scenario.time, scenario.failure or "the test failed")], watch=watch)
 
 
 def traced(scenario: Scenario) -> list[str]:

@@ -70,18 +70,20 @@ class Lines:
                 remove_folder(folder)
 
     def keep(self, place: Path) -> list[str]:
-        """Keep bags and pictures in a folder; one line each, to be shown, that says where it is or why it is not.
+        """Keep bags, pages and pictures in a folder; one line each, to be shown: where it is, or why it is not.
 
         Inputs of which no bag could be made stay where they are.
         """
         from conveyor_sim.errors import ConveyorError
-        from conveyor_sim.testing.evidence import PICTURE, draw_moment, keep_bag
+        from conveyor_sim.testing.evidence import PAGE, PICTURE, SHOWN, draw_moment, keep_bag, keep_page
+        from conveyor_sim.view.watch import Watch
 
         lines = []
         for number, (scenario, inputs) in enumerate(self.made):
-            part = _part(place, number)
+            part, watch = _part(place, number), Watch(SHOWN)
             for what, keep in (
-                ("bag", partial(keep_bag, scenario, inputs, part / "bag")),
+                ("bag", partial(keep_bag, scenario, inputs, part / "bag", watch)),
+                ("page", partial(keep_page, scenario, part / "bag", part / PAGE, watch)),
                 ("picture", partial(draw_moment, scenario, part / PICTURE)),
             ):
                 # A plugin that limits a test's time ends by `Failed` what is done for its report, too.
@@ -139,7 +141,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--line-failures",
         metavar="DIR",
         default=DEFAULT_FOLDER,
-        help="folder for the bag and the picture of every line whose test failed, a folder a test "
+        help="folder for the bag, the page and the picture of every line whose test failed, a folder a test "
         "(default: %(default)s)",
     )
 
@@ -149,8 +151,8 @@ def line(request: pytest.FixtureRequest) -> Iterator[Lines]:
     """Makes lines under test: `line("accumulation_table")`, `line("my_line.yaml", {"seed": 2})` is a Scenario.
 
     `start="warm.npz"` begins from a checkpoint. The inputs are written as the line runs. If the test fails, a bag is
-    made of them and kept with a picture (option --line-failures); if it passes, nothing is. A test that is killed
-    leaves its inputs.
+    made of them and kept with a page and a picture (option --line-failures); if it passes, nothing is. A test that is
+    killed leaves its inputs.
     """
     lines = Lines(_root(request.config) / _name(request.node))
     request.node.stash[_LINES] = lines

@@ -29,6 +29,13 @@ UNKNOWN = -(2**40)
 """Stands for NaN and what is beyond all measure."""
 FORCE_FRAMES = 5
 """Frames that share one peak force."""
+SECONDS = 4.0
+"""Of simulated time, that a block is long."""
+
+
+def block_ticks(tick_ns: int) -> int:
+    """Ticks of a block."""
+    return max(1, round(SECONDS * 1e9 / tick_ns))
 
 
 @dataclass
@@ -55,7 +62,8 @@ def pack(content: Content, start: int) -> bytes:
 
 def levels(force: Floats) -> Integers:
     """Forces (N) as whole numbers, on a scale of logarithms: none is off by more than a twentieth, or LEAST_FORCE."""
-    return np.round(LEVELS * np.log2(1.0 + np.maximum(force, 0.0) / LEAST_FORCE)).astype(np.int64)
+    known = np.nan_to_num(np.maximum(force, 0.0))
+    return np.round(LEVELS * np.log2(1.0 + known / LEAST_FORCE)).astype(np.int64)
 
 
 def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[Integers, list[Integers]]:

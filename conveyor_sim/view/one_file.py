@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.view.bundle import one_file
 from conveyor_sim.view.recording import Detail, Recording, text
+from conveyor_sim.view.watch import Watch
 
 
 @dataclass(frozen=True)
@@ -23,16 +24,26 @@ class Failure:
     text: str
 
 
-def write_page(bag: Path, file: Path, last: float | None = None, failures: Sequence[Failure] = ()) -> Path:
+def write_page(
+    bag: Path, file: Path, last: float | None = None, failures: Sequence[Failure] = (), watch: Watch | None = None
+) -> Path:
     """Write a recording as one HTML file, and return it.
 
-    last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning.
+    last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning. watch: what
+    is drawn instead, of the same run.
     Raises BagError, SceneError, and ConveyorError if the file can't be written.
     """
     with open_bag(bag) as opened:
         end = opened.span_ns[1] * 1e-9
         recording = Recording(opened, Detail(), None if last is None else end - last)
-        parts = {name: zlib.compress(part, 9) for name, part in _parts(recording, failures)}
+        if watch is not None and watch.end >= 0:
+            recording.first, recording.last = watch.first, watch.end
+            blocks: Iterable[bytes] = watch.blocks()
+        else:
+            blocks = (_deflated(recording.block(number)) for number in range(recording.blocks))
+        head = {**recording.head(), "failures": [vars(failure) for failure in failures]}
+        parts = {"head": _deflated(text(head)), "story": _deflated(recording.story())}
+        parts.update((f"block/{number}", block) for number, block in enumerate(blocks))
         page = one_file(parts, recording.name)
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -42,9 +53,5 @@ def write_page(bag: Path, file: Path, last: float | None = None, failures: Seque
     return file
 
 
-def _parts(recording: Recording, failures: Sequence[Failure]) -> Iterator[tuple[str, bytes]]:
-    head = {**recording.head(), "failures": [vars(failure) for failure in failures]}
-    yield "head", text(head)
-    yield "story", recording.story()
-    for number in range(recording.blocks):
-        yield f"block/{number}", recording.block(number)
+def _deflated(part: bytes) -> bytes:
+    return zlib.compress(part, 9)

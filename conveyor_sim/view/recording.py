@@ -9,13 +9,10 @@ from typing import Any
 
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.scene import parse_overrides, parse_scene
-from conveyor_sim.view.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN, pack
+from conveyor_sim.view.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN, block_ticks, pack
 from conveyor_sim.view.content import DRAWN, Collector
 from conveyor_sim.view.head import head
 from conveyor_sim.view.story import TOPICS_READ, Story, fields
-
-BLOCK = 4.0
-"""s of simulated time."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class Recording:
         self.last = max(self.first, bag.span_ns[1] // self._tick_ns)
         if start is not None:
             self.first = min(self.last, max(self.first, round(start * 1e9 / self._tick_ns)))
-        self._block_ticks = max(1, round(BLOCK * 1e9 / self._tick_ns))
+        self._block_ticks = block_ticks(self._tick_ns)
 
     @property
     def name(self) -> str:

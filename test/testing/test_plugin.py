@@ -73,7 +73,8 @@ def test_a_failure_leaves_bag_and_picture_and_tells_where(run: pytest.RunResult,
     folder = kept / "test_table.py_test_fails"
     text = "eventually(s['belts/table/bottles'] > 90) did not come true within 0.5 s, from 0.50 s to 1.00 s"
     assert f"E       AssertionError: {text}; the signals that it reads:\n" in run.stdout.str()
-    assert f"\nbag: {folder}/bag\npicture: {folder}/line.png\n" in run.stdout.str()
+    assert f"\nbag: {folder}/bag\npage: {folder}/line.html\npicture: {folder}/line.png\n" in run.stdout.str()
+    assert (folder / "line.html").read_text().count('data-part="block/') == 1
     assert (folder / "line.png").read_bytes().startswith(b"\x89PNG")
     with open_bag(folder / "bag") as bag:
         assert bag.counts["signals"] == 101  # from the start to the moment of failure
@@ -94,7 +95,7 @@ def test_what_cannot_be_kept_is_told(pytester: pytest.Pytester) -> None:
     (pytester.path / "kept").write_text("a file in the way")
     result = pytester.runpytest_inprocess(*PLUGIN, "--line-failures", "kept", "-k", "test_fails")
     result.assert_outcomes(failed=1, deselected=5)
-    result.stdout.fnmatch_lines(["bag: not kept: *", "picture: not kept: *"])
+    result.stdout.fnmatch_lines(["bag: not kept: *", "page: not kept: *", "picture: not kept: *"])
 
 
 def test_another_run_replaces_what_the_last_one_left(pytester: pytest.Pytester) -> None:
