@@ -34,7 +34,8 @@ def bottle(page: Any) -> None:
     """The bottle that waits for it, dark."""
     line(page)
     page.click("#theme")
-    page.click("#plan", position={"x": 410, "y": 420})
+    x, y, scale, width, height = map(float, page.get_attribute("#plan", "data-camera").split())
+    page.click("#plan", position={"x": width / 2 + (1.96 - x) * scale, "y": height / 2 + y * scale})
     page.keyboard.press("f")
     for _ in range(5):
         page.keyboard.press("+")
