@@ -43,7 +43,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "view": "bag errors observe scene simulation support | numpy",
     "runs": "bag engine errors line model observe plot scene simulation support timestep view | click numpy rich",
     "live": "bag errors line observe runs simulation support",
-    "scada": "bag errors line live observe runs scene simulation support | asyncua cryptography numpy pymodbus",
+    "scada": "bag control errors line live observe runs scene simulation support | asyncua cryptography numpy pymodbus",
     "ros": "bag control errors explain line live model observe runs scada scene simulation support version | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control engine errors line plot ros scada scene simulation support view | numpy pytest",

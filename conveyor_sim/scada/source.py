@@ -23,7 +23,10 @@ MODBUS = "modbus"
 OPCUA = "opcua"
 """Source of inputs that come by OPC UA."""
 
-FACES = (MODBUS, OPCUA)
+PLC = "plc"
+"""Source of what a PLC commands whose client the line is."""
+
+FACES = (MODBUS, OPCUA, PLC)
 """Sources of inputs that SCADA clients give."""
 
 MOST_WAITING = 1000

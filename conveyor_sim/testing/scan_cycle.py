@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from conveyor_sim.scada.face import Face
     from conveyor_sim.scada.source import TagSource
     from conveyor_sim.testing.plc import AttachedPlc
+    from conveyor_sim.testing.plc_server import ServedPlc
 
 CONTROLLER = "controller"
 """Source of the attached controller's commands, in the bag's outcomes."""
@@ -34,7 +36,7 @@ class ScanCycle:
         self._simulation, self._give = simulation, give
         self._controller: Controller | None = None
         self._node: AttachedNode | None = None
-        self._plc: AttachedPlc | None = None
+        self._plc: AttachedPlc | ServedPlc | None = None
         self._answer: Mapping[str, float] = {}
         self._changes = AlarmChanges()
         self.read: dict[str, None] = {}
@@ -72,13 +74,20 @@ class ScanCycle:
         command: Sequence[str],
         environment: Mapping[str, str],
         patience: float,
-    ) -> str:
-        """Have a PLC scan that is a client of a server, as `AttachedPlc` says; where the server is."""
+    ) -> None:
+        """Have a PLC scan that is a client of a server, as `AttachedPlc` says."""
         from conveyor_sim.testing.plc import AttachedPlc
 
         self.close()
         self._plc = self._controller = AttachedPlc(self._simulation, make, command, environment, patience)
-        return self._plc.address
+
+    def attach_served_plc(self, url: str, tags: Path, user: str, password: str, patience: float) -> None:
+        """Have a PLC scan that is a server, as `ServedPlc` says."""
+        from conveyor_sim.testing.plc_server import ServedPlc
+
+        self.close()
+        image = self._simulation.process_image
+        self._plc = self._controller = ServedPlc(image, url, tags, user, password, patience)
 
     def close(self) -> None:
         """End the node or the PLC, if one is attached."""

@@ -191,6 +191,27 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._cycle.attach_plc(plc.opcua(password, port), command, {plc.PASSWORD: password}, patience)
         self._scan()
 
+    def attach_plc(
+        self,
+        url: str,
+        tags: str | PathLike[str],
+        *,
+        user: str = "",
+        password: str = "",
+        patience: float = PATIENCE,
+    ) -> None:
+        """Have a PLC scan that is a server, and runs already, in place of the one before: the line is its client.
+
+        url: "opc.tcp://host:port" or "modbus://host:port". tags: the CSV file that says which of its tags stands for
+        which of ours, `run/tick` and `run/target_tick` among them (docs/plc.md). user: "" for anonymous. patience: s of
+        wall time that it has for each scan.
+
+        Raises TagMapError for a map that does not fit; LinkError if the PLC can't be reached; ControlError if it does
+        not answer, as every later tick does; ImportError without the protocol's library.
+        """
+        self._cycle.attach_served_plc(url, Path(tags), user, password, patience)
+        self._scan()
+
     def source(self) -> TickSource:
         """The line as a SCADA face sees it, from now on. What clients of that give is applied at the next tick.
 

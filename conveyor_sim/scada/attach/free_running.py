@@ -1,0 +1,125 @@
+"""`PlcFace`: a PLC that is a server controls a line without waiting for it, as a real one does.
+
+Every `period` the signals are written to it, and what it commands is read and given to the line. The lag between both
+is measured and told, for it is part of what is tested; a test that is to have the same bits every time goes in
+lockstep (testing/plc.py).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from conveyor_sim.control.scan import ALARMS, AlarmChanges
+from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.scada.attach.link import Link, LinkError
+from conveyor_sim.scada.attach.tag_map import TagMap
+from conveyor_sim.scada.face import Status
+from conveyor_sim.scada.source import PLC, Shown, TagSource
+
+AGAIN = 1.0
+"""s of wall time between two attempts to reach a PLC that was lost."""
+
+
+class PlcFace:
+    """One PLC: a Face."""
+
+    def __init__(
+        self,
+        source: TagSource,
+        url: str,
+        tags: TagMap,
+        make: Callable[[], Link],
+        period: float,
+        say: Callable[[str], object],
+    ) -> None:
+        """make: the way to it. period: s of wall time from scan to scan. say: takes sentences for the user."""
+        self._source, self._url, self._tags, self._make = source, url, tags, make
+        self._period, self._say = period, say
+        self._writer = f"{PLC} {url}"
+        self._link: Link | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._alarms = AlarmChanges()
+        self._written: Shown | None = None
+        self._given = self._refused = 0
+        self._lag = 0.0
+
+    @property
+    def address(self) -> str:
+        """Where the PLC is."""
+        return self._url
+
+    async def start(self) -> None:
+        """Reach it. Raises LinkError, TagMapError."""
+        self._link = await self._reach()
+        self._task = asyncio.create_task(self._run())
+
+    async def stop(self) -> None:
+        """Leave it."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+        await self._leave()
+
+    def status(self) -> Status:
+        """Scans that gave commands, and those that were not taken; the lag from a tick to what the PLC made of it."""
+        lag, self._lag = self._lag, 0.0
+        return Status(int(self._link is not None), 0, self._given, self._refused, lag)
+
+    async def _run(self) -> None:
+        while True:
+            began = time.monotonic()
+            try:
+                if self._link is None:
+                    self._link = await self._reach()
+                    self._say(f"{self._url}: reached again")
+                await self._scan(self._link)
+            except LinkError as error:
+                if self._link is not None:
+                    self._say(f"{error}; it commands nothing until it is reached again")
+                await self._leave()
+                await asyncio.sleep(AGAIN)
+            await asyncio.sleep(max(0.0, self._period - (time.monotonic() - began)))
+
+    async def _scan(self, link: Link) -> None:
+        began, shown, before = time.monotonic(), self._source.shown, self._written
+        if shown.lost or (before is not None and shown.tick == before.tick and shown.run_id == before.run_id):
+            return
+        last = {} if before is None else before.values
+        names = [each.tag.name for each in self._tags.written]
+        changed = {name: shown.values[name] for name in names if shown.values[name] != last.get(name)}
+        if self._tags.tick is not None:
+            changed[self._tags.tick.tag.name] = float(shown.tick)
+        if changed:
+            await link.write(changed)
+        self._written = shown
+        if self._tags.read:
+            self._give(await link.read([each.tag.name for each in self._tags.read]))
+        self._lag = max(self._lag, time.monotonic() - began)
+
+    def _give(self, answer: dict[str, float]) -> None:
+        commands = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
+        commands |= self._alarms.of({name: value for name, value in answer.items() if name not in commands})
+        if commands:
+            given = Input(PLC, self._writer, "controller", SET, tuple(commands), tuple(commands.values()))
+            refused = bool(self._source.give(given))
+            self._given, self._refused = self._given + (not refused), self._refused + refused
+
+    async def _reach(self) -> Link:
+        link = self._make()
+        try:
+            await link.connect()
+        except BaseException:
+            await link.close()
+            raise
+        self._written, self._alarms = None, AlarmChanges()
+        return link
+
+    async def _leave(self) -> None:
+        link, self._link = self._link, None
+        if link is not None:
+            with suppress(LinkError):
+                await link.close()

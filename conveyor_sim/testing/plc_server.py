@@ -1,0 +1,79 @@
+"""`ServedPlc`: a soft PLC as the controller of a line under test, which is a client of the PLC's server.
+
+In lockstep: the line writes its signals, then the tick; the PLC scans, and sets its target tick last. By then all its
+outputs are in place, so the test has the same bits however fast the PLC is.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+
+from conveyor_sim.control.scan import ControlError, Inputs
+from conveyor_sim.line.process_image import ProcessImage
+from conveyor_sim.scada.attach.link import LinkError
+from conveyor_sim.scada.attach.links import all_of, link
+from conveyor_sim.scada.attach.tag_map import TagMapError, read_tag_map
+from conveyor_sim.scada.handshake import TARGET, TICK
+from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.scada.source import PLC
+
+
+class ServedPlc(AbstractContextManager["ServedPlc"]):
+    """To the test, a controller; it is to be scanned at every tick."""
+
+    source = PLC
+    """By which way its commands come."""
+
+    def __init__(self, image: ProcessImage, url: str, tags: Path, user: str, password: str, patience: float) -> None:
+        """image: of the line. url, user, password: as `link`. tags: the map. patience: s of wall time for each scan.
+
+        Raises TagMapError for a map that does not fit or lacks the handshake, LinkError, ImportError.
+        """
+        self.writer = f"{PLC} {url}"
+        self._map = read_tag_map(tags, image.tags)
+        if self._map.tick is None or self._map.target is None:
+            raise TagMapError(f"{tags}: {TICK} and {TARGET} are not both in it, expected them for lockstep")
+        self._url, self._patience = url, patience
+        self._target = -1
+        self._answer: dict[str, float] = {}
+        with ExitStack() as stack:
+            self._thread = stack.enter_context(ServerThread())
+            self._link = link(url, all_of(self._map), user, password)
+            stack.callback(lambda: self._thread.run(self._link.close()))
+            self._thread.run(self._link.connect())
+            self._open = stack.pop_all()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the PLC."""
+        self._open.close()
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """What it answers to the inputs of this tick; the same once more before the tick that it has named.
+
+        Raises ControlError if it does not answer, LinkError if it is lost.
+        """
+        if inputs.tick >= self._target:
+            signals = {each.tag.name: inputs[each.tag.name] for each in self._map.written}
+            try:
+                self._thread.run(self._link.write({**signals, TICK: float(inputs.tick)}))
+                self._target = self._wait(inputs)
+                self._answer = self._thread.run(self._link.read([each.tag.name for each in self._map.read]))
+            except LinkError as error:
+                raise ControlError(f"at {inputs.time:.2f} s no PLC: {error}") from error
+        return self._answer
+
+    def _wait(self, inputs: Inputs) -> int:
+        end = time.monotonic() + self._patience
+        while (target := self._thread.run(self._link.read([TARGET]))[TARGET]) <= inputs.tick:
+            if time.monotonic() > end:
+                raise ControlError(
+                    f"at {inputs.time:.2f} s no {TARGET} after {inputs.tick} within {self._patience:g} s of wall time, "
+                    f"expected from the PLC at {self._url}; it is {target:g} there"
+                )
+        return int(target)

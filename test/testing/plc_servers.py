@@ -1,0 +1,139 @@
+"""Soft PLCs that are servers, made with the protocols' own libraries: each scans once `tick` has changed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+from testing.soft_plc import BOTTLES, SETPOINT, speed
+
+ALARM = "alarms/second zone full"
+Program = Callable[[float], "tuple[float, bool]"]
+
+
+def program(bottles: float) -> tuple[float, bool]:
+    """Speed of the first zone, and whether the alarm stands."""
+    return speed(bottles), speed(bottles) == 0.0
+
+
+class OpcUaPlc:
+    """Variables of namespace 2."""
+
+    def __init__(self) -> None:
+        self.scans = 0
+
+    async def start(self, port: int) -> str:
+        from asyncua import Server, ua
+
+        self._server = server = Server()
+        await server.init()
+        server.set_endpoint(f"opc.tcp://127.0.0.1:{port}")
+        server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+        assert await server.register_namespace("urn:plc") == 2
+        types = {"bottles": "UInt16", "tick": "UInt32", "target": "UInt32", "speed": "Float", "full": "Boolean"}
+        self._nodes = {}
+        for name, kind in types.items():
+            first = False if kind == "Boolean" else 0
+            node = await server.nodes.objects.add_variable(
+                ua.NodeId(f"GVL.{name}", 2), name, ua.Variant(first, ua.VariantType[kind])
+            )
+            await node.set_writable()
+            self._nodes[name] = node
+        await self._write("tick", 2**32 - 1, "UInt32")
+        await server.start()
+        self._task = asyncio.create_task(self._run())
+        return f"opc.tcp://127.0.0.1:{server.bserver.port}"
+
+    async def _write(self, name: str, value: float, kind: str) -> None:
+        from asyncua import ua
+
+        await self._nodes[name].write_value(ua.Variant(value, ua.VariantType[kind]))
+
+    async def _run(self) -> None:
+        last = await self._nodes["tick"].read_value()
+        while True:
+            tick = await self._nodes["tick"].read_value()
+            if tick != last:
+                last = tick
+                answer, full = program(await self._nodes["bottles"].read_value())
+                await self._write("speed", answer, "Float")
+                await self._write("full", full, "Boolean")
+                self.scans += 1
+                await self._write("target", tick + 1, "UInt32")
+            await asyncio.sleep(0.0005)
+
+    async def stop(self) -> None:
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+        await self._server.stop()
+
+    @staticmethod
+    def places() -> dict[str, str]:
+        names = {BOTTLES: "bottles", SETPOINT: "speed", ALARM: "full", "run/tick": "tick", "run/target_tick": "target"}
+        return {ours: f"ns=2;s=GVL.{theirs}" for ours, theirs in names.items()}
+
+
+class ModbusPlc:
+    """Its program reads and writes the registers of its own server, as a client."""
+
+    def __init__(self) -> None:
+        self.scans = 0
+
+    async def start(self, port: int) -> str:
+        from pymodbus.client import AsyncModbusTcpClient
+        from pymodbus.server import ModbusTcpServer
+        from pymodbus.simulator import DataType, SimData, SimDevice
+
+        words = SimData(0, values=[0xFFFF, 0xFFFF, *[0] * 20], datatype=DataType.REGISTERS)
+        bits = SimData(0, values=[False] * 16, datatype=DataType.BITS)
+        nothing = SimData(0, values=[0], datatype=DataType.REGISTERS)
+        self._server = ModbusTcpServer(
+            SimDevice(1, simdata=([bits], [bits], [words], [nothing])), address=("127.0.0.1", port)
+        )
+        await self._server.serve_forever(background=True)
+        port = self._server.transport.sockets[0].getsockname()[1]  # type: ignore[union-attr,attr-defined]
+        self._client = AsyncModbusTcpClient("127.0.0.1", port=port)
+        await self._client.connect()
+        self._task = asyncio.create_task(self._run())
+        return f"modbus://127.0.0.1:{port}"
+
+    async def _run(self) -> None:
+        client, word, real = self._client, self._client.DATATYPE.UINT32, self._client.DATATYPE.FLOAT32
+        last = 2**32 - 1
+        while True:
+            registers = (await client.read_holding_registers(0, count=4)).registers
+            tick = client.convert_from_registers(registers[:2], word)
+            if tick != last:
+                last = tick
+                answer, full = program(registers[2])
+                await client.write_registers(8, client.convert_to_registers(answer, real, word_order="little"))
+                await client.write_coil(3, full)
+                self.scans += 1
+                await client.write_registers(10, client.convert_to_registers(tick + 1, word))
+            await asyncio.sleep(0.0005)
+
+    async def stop(self) -> None:
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+        self._client.close()
+        await self._server.shutdown()
+
+    @staticmethod
+    def places() -> dict[str, str]:
+        return {
+            BOTTLES: "holding register 2 uint16",
+            SETPOINT: "holding register 8 float32 little",
+            ALARM: "coil 3 bool",
+            "run/tick": "holding register 0 uint32",
+            "run/target_tick": "holding register 10 uint32 big",
+        }
+
+
+KINDS = {"opcua": OpcUaPlc, "modbus": ModbusPlc}
+
+
+def write_map(path: Path, places: dict[str, str]) -> Path:
+    """A file of tags."""
+    path.write_text("tag,theirs\n" + "".join(f"{ours},{theirs}\n" for ours, theirs in places.items()))
+    return path

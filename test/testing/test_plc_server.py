@@ -1,0 +1,185 @@
+"""A line as the client of a PLC: in lockstep in a test, with the bits of the same program inside; and free-running."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from testing.plc_servers import ALARM, KINDS, program, write_map
+from testing.soft_plc import BOTTLES, SETPOINT
+
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.control.scan import ControlError, Inputs
+from conveyor_sim.scada.attach.free_running import PlcFace
+from conveyor_sim.scada.attach.link import LinkError
+from conveyor_sim.scada.attach.links import all_of, link
+from conveyor_sim.scada.attach.tag_map import TagMapError, read_tag_map
+from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.testing.scenario import Scenario
+
+LINE = "scenarios/zoned_line"
+SECONDS = 8.0
+
+
+class Twin:
+    """The same program, in this process."""
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        answer, full = program(inputs[BOTTLES])
+        return {SETPOINT: answer, ALARM: float(full)}
+
+
+class Plc:
+    """One that runs, with its map."""
+
+    def __init__(self, kind: str, folder: Path) -> None:
+        self.thread = ServerThread()
+        self.made: Any = KINDS[kind]()
+        self.places = KINDS[kind].places()
+        self.url = self.thread.run(self.made.start(0))
+        self.tags = write_map(folder / "tags.csv", self.places)
+
+    def stop(self) -> None:
+        self.thread.run(self.made.stop())
+
+
+@pytest.fixture(params=["modbus", "opcua"])
+def plc(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Plc]:
+    library = {"modbus": "pymodbus", "opcua": "asyncua"}[request.param]
+    pytest.importorskip(library, reason=f"{library} is not installed: pip install conveyor-sim[scada]")
+    plc = Plc(request.param, tmp_path)
+    yield plc
+    plc.stop()
+    plc.thread.close()
+
+
+def test_a_served_plc_gives_the_bits_of_its_program(plc: Plc, tmp_path: Path) -> None:
+    with Scenario(LINE) as inside, Scenario(LINE, bag=tmp_path / "bag") as outside:
+        inside.attach(Twin())
+        outside.attach_plc(plc.url, plc.tags)
+        for plant in (inside, outside):
+            plant.run_for(SECONDS)
+        assert outside.simulation.state_hash() == inside.simulation.state_hash()
+        for name in (BOTTLES, SETPOINT, ALARM):
+            assert np.array_equal(outside.history[name], inside.history[name])
+        assert np.ptp(outside.history[SETPOINT]) > 0.0 and np.ptp(outside.history[ALARM]) > 0.0
+        assert plc.made.scans == SECONDS / inside.scene.tick + 1
+    assert replay(tmp_path / "bag").difference is None
+
+
+def test_a_plc_that_goes_away_fails_the_test(plc: Plc) -> None:
+    with Scenario(LINE) as plant:
+        plant.attach_plc(plc.url, plc.tags)
+        plant.run_for(0.1)
+        plc.thread.run(plc.made.stop())
+        try:
+            with pytest.raises(ControlError, match=rf"at 0\.1\d? s no PLC: {plc.url}"):
+                plant.run_for(0.1)
+        finally:
+            plc.thread.run(plc.made.start(int(plc.url.rpartition(":")[2])))
+
+
+def test_a_plc_that_does_not_scan_is_waited_for_so_long(plc: Plc) -> None:
+    plc.made._task.cancel()
+    with Scenario(LINE) as plant, pytest.raises(ControlError, match=r"no run/target_tick after 0 within 0\.2 s"):
+        plant.attach_plc(plc.url, plc.tags, patience=0.2)
+
+
+def test_a_plc_that_is_not_there_is_said(plc: Plc) -> None:
+    url = f"{plc.url.rpartition(':')[0]}:1"
+    with Scenario(LINE) as plant, pytest.raises(LinkError, match=f"^{url}: "):
+        plant.attach_plc(url, plc.tags)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("", "line 1: nothing given, expected tag,theirs"),
+        ("ours,theirs\n", "line 1: ours,theirs given, expected tag,theirs"),
+        ("tag,theirs\n", "names no tag, expected one or more"),
+        ("tag,theirs\nbelts/zone9/speed,x\n", "line 2: belts/zone9/speed given, expected a signal or command"),
+        ("tag,theirs\nbelts/zone1/trip,x\n", "line 2: belts/zone1/trip given, expected a signal or command"),
+        ("tag,theirs\nalarms/,x\n", "line 2: alarms/ given, expected a signal or command"),
+        ("tag,theirs\nalarms/a,x\nalarms/a,y\n", "line 3: alarms/a given twice"),
+        ("tag,theirs\nalarms/a\n", "line 2: alarms/a given, expected a tag and what it is in the PLC"),
+        ("tag,theirs\nalarms/a,coil 0 bool\n", "run/tick and run/target_tick are not both in it"),
+    ],
+)
+def test_a_map_that_can_t_be_is_refused(tmp_path: Path, lines: str, said: str) -> None:
+    path = tmp_path / "tags.csv"
+    path.write_text(lines)
+    with Scenario(LINE) as plant, pytest.raises(TagMapError) as refused:
+        plant.attach_plc("modbus://127.0.0.1:1", path)
+    assert str(refused.value).startswith(f"{path}: {said}")
+
+
+@pytest.mark.parametrize(
+    ("theirs", "said"),
+    [
+        ("register 3 bool", "register 3 bool given, expected such as"),
+        ("coil 3", "coil 3 given, expected such as"),
+        ("coil 3 float32", "float32 given in a coil, expected such as"),
+        ("holding register 65536 uint16", "address 65536 given, expected 0 to 65535"),
+        ("holding register 1 float32 middle", "middle given, expected such as"),
+    ],
+)
+def test_a_place_in_modbus_that_can_t_be_is_refused(tmp_path: Path, theirs: str, said: str) -> None:
+    pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+    tags = write_map(tmp_path / "tags.csv", {SETPOINT: theirs})
+    with Scenario(LINE) as plant:
+        mapped = read_tag_map(tags, plant.simulation.process_image.tags)
+    with pytest.raises(TagMapError) as refused:
+        link("modbus://127.0.0.1:1", all_of(mapped))
+    assert str(refused.value).startswith(f"{tags}: line 2: ") and said in str(refused.value)
+
+
+@pytest.mark.parametrize("url", ["http://127.0.0.1:1", "127.0.0.1", "opc.tcp://", "modbus://[", "modbus://a:b"])
+def test_a_url_that_can_t_be_is_refused(url: str) -> None:
+    with pytest.raises(LinkError, match=r"expected opc\.tcp://host:port or modbus://host:port"):
+        link(url, ())
+
+
+def test_a_variable_that_the_plc_lacks_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("asyncua", reason="asyncua is not installed: pip install conveyor-sim[scada]")
+    plc = Plc("opcua", tmp_path)
+    try:
+        tags = write_map(tmp_path / "tags.csv", plc.places | {ALARM: "ns=2;s=GVL.lost"})
+        with Scenario(LINE) as plant, pytest.raises(TagMapError, match=r"line 4: ns=2;s=GVL\.lost"):
+            plant.attach_plc(plc.url, tags)
+    finally:
+        plc.stop()
+        plc.thread.close()
+
+
+def test_a_free_running_plc_commands_a_line_and_is_reached_again(plc: Plc) -> None:
+    """Real time has no bits to compare: what it sees reaches it, what it says acts, and its loss is told."""
+    said: list[str] = []
+    with Scenario(LINE) as plant, ServerThread() as thread:
+        source = plant.source()
+        tags = read_tag_map(plc.tags, source.about.tags)
+        face = PlcFace(source, plc.url, tags, lambda: link(plc.url, all_of(tags)), 0.005, said.append)
+        thread.run(face.start())
+
+        def until(done: Any) -> None:
+            end = time.monotonic() + 60.0
+            while not done():
+                assert time.monotonic() < end
+                plant.run_for(0.05)
+                time.sleep(0.01)
+
+        until(lambda: plant.signals[BOTTLES] > 2)
+        until(lambda: plant.simulation.line.read_back.values[0] == 0.0 and ALARM in plant.signals)
+        assert plant.simulation.line.read_back.writers[0] == (f"plc {plc.url}", "controller")
+        status = face.status()
+        assert status.clients == 1 and status.writes > 0 and status.refused == 0 and 0.0 < status.latency < 60.0
+        plc.thread.run(plc.made.stop())
+        until(lambda: said and face.status().clients == 0)
+        assert said[0].endswith("it commands nothing until it is reached again")
+        plc.thread.run(plc.made.start(int(plc.url.rpartition(":")[2])))
+        until(lambda: face.status().clients == 1 and face.status().writes > status.writes)
+        assert said[-1] == f"{plc.url}: reached again"
+        thread.run(face.stop())
