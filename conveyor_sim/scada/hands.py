@@ -6,23 +6,21 @@ from fnmatch import fnmatchcase
 
 from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, stops
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.scada.source import Shown
+from conveyor_sim.line.tag import Tag
+from conveyor_sim.scada.source import TagSource
 
 
-def objection(
-    shown: Shown, device: str, where: str, kind: WriterKind, writer: str, command: str = "", value: float = 0.0
-) -> str:
-    """Why a device takes no command from a writer, as the line was last; "" if it does. where: the line's place;
-    command, value: which one it is, where that is known.
-    """
-    if stops(command, value, kind):
+def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
+    """Why a command is not taken of a writer, as the line was last; "" if it is."""
+    shown, device = source.shown, command.device
+    if stops(command.name, value, kind):
         return ""
     mode = int(shown.values.get(f"{device}/mode", AUTOMATIC))
     if kind not in IN_CONTROL[mode]:
         return f"{device}: is in {MODES[mode]}"
     if kind != "controller" or shown.owner in ("", writer):
         return ""
-    names = (device, f"{where}/{device}")
+    names = (device, f"{source.about.where}/{device}")
     if any(fnmatchcase(name, pattern) for name in names for pattern in shown.released):
         return ""
     return f"{device}: the line is owned by controller {shown.owner}"

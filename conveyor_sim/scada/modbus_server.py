@@ -193,7 +193,11 @@ class _Image:
         if names and refusal(self._commands, "command", names, numbers):
             return ExcCodes.ILLEGAL_VALUE
         writer = f"{MODBUS} {_client.get()}"
-        if not all(self._in_control(name, writer) for name in names):
+        commands = [self._commands[name] for name in names]
+        if any(
+            objection(self._source, tag, value, self._role, writer)
+            for tag, value in zip(commands, numbers, strict=True)
+        ):
             return ExcCodes.DEVICE_BUSY
         if target is not None and "target" not in self._source.controls:
             return ExcCodes.DEVICE_BUSY
@@ -203,11 +207,6 @@ class _Image:
         if target is None:
             return None
         return ExcCodes.ILLEGAL_VALUE if self._source.control("target", target, writer) else None
-
-    def _in_control(self, name: str, writer: str) -> bool:
-        """Whether the device of a command takes it, as the line was last; the line itself decides."""
-        source, device = self._source, self._commands[name].device
-        return self._role is not None and not objection(source.shown, device, source.about.where, self._role, writer)
 
 
 def _require_free(host: str, port: int) -> None:

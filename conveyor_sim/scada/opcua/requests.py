@@ -156,10 +156,8 @@ class Requests:
     def _judge_number(self, client: User, tag: Tag, number: float) -> int:
         if refusal(self._commands, "command", [tag.name], [number]):
             return Codes.BadOutOfRange
-        kind, source = _kind(client), self._source
-        if kind is None:
-            return Codes.BadInvalidState
-        if objection(source.shown, tag.device, source.about.where, kind, _writer(client), tag.name, number):
+        kind = _kind(client)
+        if kind is None or objection(self._source, tag, number, kind, _writer(client)):
             return Codes.BadInvalidState
         return Codes.Good
 
