@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from asyncua import ua
 from asyncua.crypto.permission_rules import User
 
+from conveyor_sim.line.alarms.alarm import WAITING
 from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
@@ -24,6 +25,8 @@ _LONGEST = 200
 """Characters of an argument."""
 _MOST = 1000
 """Elements of one."""
+
+_ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 
 _TEXT, _NUMBER, _WHOLE = ua.VariantType.String, ua.VariantType.Double, ua.VariantType.UInt32
 
@@ -131,6 +134,12 @@ def add_methods(nodes: Nodes, source: TagSource) -> None:
             _add(nodes, RUN, name, method)
 
 
+def add_alarm_methods(nodes: Nodes) -> None:
+    """Add those that all alarms have, to the object of all of them."""
+    for name, method in ALARM_METHODS.items():
+        _add(nodes, ALARM_STATES, name, method)
+
+
 def _add(nodes: Nodes, owner: str, name: str, method: Method) -> None:
     arguments = [parameter.as_argument for parameter in method.parameters]
     nodes.method(f"{owner}/{name}", node_id(owner), method.description, arguments)
@@ -139,8 +148,9 @@ def _add(nodes: Nodes, owner: str, name: str, method: Method) -> None:
 class Methods:
     """Calls of them, by clients."""
 
-    def __init__(self, source: TagSource, requests: Requests) -> None:
-        self._source, self._requests = source, requests
+    def __init__(self, source: TagSource, requests: Requests, is_last_event: Callable[[str, bytes], bool]) -> None:
+        """is_last_event: whether an alarm's last event had that id."""
+        self._source, self._requests, self._is_last_event = source, requests, is_last_event
         tags = source.about.tags
         self._tags = {tag.name: tag for tag in tags}
         self._devices = {tag.device for tag in tags}
@@ -159,6 +169,8 @@ class Methods:
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
         """What becomes of a call; None if it is of no method here."""
+        if request.MethodId == _ACKNOWLEDGE:
+            return self._acknowledge_event(client, request)
         owner, _, name = name_of(request.MethodId).rpartition("/")
         target = name_of(request.ObjectId)
         table = {LINE: LINE_METHODS, RUN: RUN_METHODS, ALARM_STATES: ALARM_METHODS}.get(owner, {})
@@ -183,6 +195,21 @@ class Methods:
         if owner == ALARM_STATES:
             return _result(self._requests.operate(client, method.operation, () if target == owner else (alarm,)))
         return self._operate(client, method, arguments)
+
+    def _acknowledge_event(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult:
+        """The method of conditions: EventId, Comment (OPC 10000-9, 5.7.3); the comment is not kept."""
+        alarm = name_of(request.ObjectId).removeprefix(f"{ALARM_STATES}/")
+        if not self.knows_alarm(alarm):
+            return _result(Codes.BadNodeIdInvalid)
+        if not self._requests.may(client, "acknowledge"):
+            return _result(Codes.BadUserAccessDenied)
+        given = request.InputArguments or []
+        if not given or not isinstance(given[0].Value, bytes) or not self._is_last_event(alarm, given[0].Value):
+            return _result(Codes.BadEventIdUnknown)
+        alarms = self._source.shown.alarms
+        if alarms is None or alarms.state[list(alarms.id).index(alarm)] not in WAITING:
+            return _result(Codes.BadConditionBranchAlreadyAcked)
+        return _result(self._requests.operate(client, "acknowledge", (alarm,)))
 
     def _operate(self, client: User, method: Method, arguments: Sequence[Any]) -> ua.CallMethodResult:
         if method.operation == SET:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import datetime, timezone
 from typing import Any
 
 from asyncua import ua
@@ -16,6 +17,9 @@ INDEX = 2
 
 LINE = "line"
 """Id of the object that stands for the line."""
+
+NEVER = datetime(1601, 1, 1, tzinfo=timezone.utc)
+"""How OPC UA writes no date (OPC 10000-6, 5.2.2.5)."""
 
 READ, READ_AND_WRITE = 1, 3
 """AccessLevel."""
@@ -118,7 +122,7 @@ class Nodes:
             attributes,
         )
         for field, kind in fields:
-            self.property(f"{name}/{field}", made, None, kind.value, kind, INDEX)
+            self.property(f"{name}/{field}", made, nothing(kind), kind.value, kind, INDEX)
         return made
 
     def refer(self, source: ua.NodeId, target: ua.NodeId, kind: int, target_class: ua.NodeClass) -> None:
@@ -126,6 +130,11 @@ class Nodes:
         item = ua.AddReferencesItem(source, ua.NodeId(kind), True, "", target, target_class)
         for result in self._server.node_mgt_service.add_references([item]):
             result.check()
+
+    async def write(self, name: str, value: ua.Variant, stamp: datetime, status: int = ua.StatusCodes.Good) -> None:
+        """Give a variable a value. stamp: its SourceTimestamp."""
+        code, now = ua.StatusCode(status), datetime.now(timezone.utc)
+        await self._server.write_attribute_value(node_id(name), ua.DataValue(value, code, stamp, now))
 
     def _add(
         self,
@@ -150,6 +159,13 @@ class Nodes:
         (result,) = self._server.node_mgt_service.add_nodes([item])
         result.StatusCode.check()
         return node_id(name)
+
+
+def nothing(kind: ua.VariantType) -> Any:
+    """What stands for no value of a type."""
+    if kind is ua.VariantType.DateTime:
+        return NEVER
+    return None if kind is ua.VariantType.String else ua.get_default_value(kind)
 
 
 def _variable(

@@ -15,6 +15,9 @@ from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
 from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status
 from conveyor_sim.scada.opcua.certificates import default_folder, identity
+from conveyor_sim.scada.opcua.conditions import AlarmStates
+from conveyor_sim.scada.opcua.emitter import Emitter
+from conveyor_sim.scada.opcua.line_events import LineEvents
 from conveyor_sim.scada.opcua.methods import Methods, add_methods
 from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.scada.opcua.requests import Client, Requests, reader
@@ -59,6 +62,7 @@ class OpcUaServer:
         self._requests = Requests(source)
         self._server: BoundedServer | None = None
         self._updates: asyncio.Task[None] | None = None
+        self._stopping: asyncio.Future[None] | None = None
 
     @property
     def port(self) -> int:
@@ -109,8 +113,12 @@ class OpcUaServer:
         nodes = Nodes(internal)
         add_line(nodes, self._source.about)
         add_methods(nodes, self._source)
-        internal.requests, internal.methods = self._requests, Methods(self._source, self._requests)
-        updates = Updates(self._source, internal, Clock(self._source.about, self._stamps))
+        emitter, clock = Emitter(internal), Clock(self._source.about, self._stamps)
+        alarms = AlarmStates(nodes, emitter, clock)
+        events = LineEvents(self._source, nodes, emitter, clock)
+        internal.requests = self._requests
+        internal.methods = Methods(self._source, self._requests, alarms.is_last_event)
+        updates = Updates(self._source, nodes, clock, alarms.follow, events.follow)
         await updates.bring_present()
         try:
             await server.listen(host, port)
@@ -119,6 +127,7 @@ class OpcUaServer:
             raise FaceError(f"opcua: {host}:{port} can't be listened on ({reason}), expected a free port") from error
         self._server = server
         self._updates = asyncio.create_task(updates.run())
+        self._updates.add_done_callback(self._ended)
 
     async def stop(self) -> None:
         """End all sessions and connections."""
@@ -129,6 +138,13 @@ class OpcUaServer:
             await asyncio.gather(updates, return_exceptions=True)
         if server is not None:
             await server.stop()
+
+    def _ended(self, updates: asyncio.Task[None]) -> None:
+        """Rather no server than one that shows what is stale."""
+        if not updates.cancelled() and (error := updates.exception()) is not None:
+            logging.getLogger(__name__).error("opcua: the server ends: %s", error, exc_info=error)
+            self._updates = None
+            self._stopping = asyncio.ensure_future(self.stop())
 
     def get_user(
         self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None

@@ -6,6 +6,7 @@ the address space. Here no write and no call reaches it, but the two that send c
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from struct import error as StructError
 from struct import unpack_from
@@ -26,6 +27,9 @@ from conveyor_sim.scada.opcua.transport import channel
 
 MOST_ITEMS = 20_000
 """Monitored items of all sessions; more are refused."""
+
+SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
+"""ms, at which clients are sent what has changed."""
 
 REFRESH = {
     ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
@@ -127,6 +131,16 @@ class Session(InternalSession):
                     results[place] = replace(results[place], Value=ua.Variant(READ, ua.VariantType.Byte))
         return results
 
+    async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
+        """The library would publish as often as it is asked to, and do nothing else."""
+        params.RequestedPublishingInterval = _interval(params.RequestedPublishingInterval)
+        return await super().create_subscription(params, *others, **named)
+
+    def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
+        """As when it was created."""
+        params.RequestedPublishingInterval = _interval(params.RequestedPublishingInterval)
+        return super().modify_subscription(params)
+
     async def create_monitored_items(
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
@@ -156,3 +170,7 @@ class Session(InternalSession):
     async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
         """Refused."""
         raise ServiceError(Codes.BadUserAccessDenied)
+
+
+def _interval(asked: float) -> float:
+    return min(max(asked, SHORTEST_INTERVAL), LONGEST_INTERVAL) if math.isfinite(asked) else LONGEST_INTERVAL

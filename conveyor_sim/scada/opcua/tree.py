@@ -7,7 +7,7 @@ from asyncua import ua
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
 from conveyor_sim.scada.handshake import TARGET
-from conveyor_sim.scada.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id
+from conveyor_sim.scada.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id, nothing
 from conveyor_sim.scada.opcua.values import as_variant, range_of, unit_of
 from conveyor_sim.scada.source import About
 
@@ -39,7 +39,7 @@ def add_line(nodes: Nodes, about: About) -> None:
             _add_tag(nodes, tag)
     run = node_id(RUN) if RUN in nodes else nodes.object(RUN, RUN, node_id(LINE), "The simulation itself.")
     for name, (kind, description) in RUN_VARIABLES.items():
-        nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(_FIRST.get(kind), kind), description)
+        nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(nothing(kind), kind), description)
     first = ua.Variant(0, ua.VariantType.Int64)
     text = "To which tick a line in lockstep is to go on: what was written before it acts as one set, with it."
     nodes.variable(TARGET, TARGET.rpartition("/")[2], run, first, text, access=READ_AND_WRITE)
@@ -53,13 +53,6 @@ def is_shown(tag: Tag) -> bool:
 def has_text(tag: Tag) -> bool:
     """Whether the text of its value has a variable of its own."""
     return tag.kind == "enumeration" and list(tag.texts) != list(range(len(tag.texts)))
-
-
-_FIRST: dict[ua.VariantType, int | float | str] = {
-    ua.VariantType.Int64: 0,
-    ua.VariantType.Double: 0.0,
-    ua.VariantType.String: "",
-}
 
 
 def _add_tag(nodes: Nodes, tag: Tag) -> None:
@@ -93,7 +86,7 @@ def _add_tag(nodes: Nodes, tag: Tag) -> None:
         nodes.property(f"{tag.name}/{VALUE_AS_TEXT}", variable, text, ua.ObjectIds.LocalizedText, texts)
     if writes:
         for name, kind in ((WRITTEN_BY, ua.VariantType.String), (WRITTEN_AT, ua.VariantType.DateTime)):
-            nodes.property(f"{tag.name}/{name}", variable, None, kind.value, kind, INDEX)
+            nodes.property(f"{tag.name}/{name}", variable, nothing(kind), kind.value, kind, INDEX)
 
 
 def _type_id(tag: Tag) -> int:

@@ -9,13 +9,12 @@ from contextlib import suppress
 from datetime import datetime, timezone
 
 from asyncua import ua
-from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.scada.handshake import TARGET, TICK
-from conveyor_sim.scada.opcua.nodes import node_id
+from conveyor_sim.scada.opcua.nodes import Nodes
 from conveyor_sim.scada.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.scada.opcua.values import Clock, as_variant, status_of
 from conveyor_sim.scada.source import Shown, TagSource
@@ -30,9 +29,9 @@ Follower = Callable[[Shown, datetime, bool], Awaitable[None]]
 class Updates:
     """Of one source, in one asyncio loop."""
 
-    def __init__(self, source: TagSource, server: InternalServer, clock: Clock, *others: Follower) -> None:
+    def __init__(self, source: TagSource, nodes: Nodes, clock: Clock, *others: Follower) -> None:
         """others: what follows the source besides."""
-        self._source, self._server, self._clock, self._others = source, server, clock, others
+        self._source, self._nodes, self._clock, self._others = source, nodes, clock, others
         self._variables = [_Variable(tag) for tag in source.about.tags if is_shown(tag) and tag.role != "run"]
         self._run_tag = next((tag for tag in source.about.tags if tag.name == f"{RUN}/state"), None)
         self._commands = [tag.name for tag in source.about.tags if tag.role in COMMANDS]
@@ -90,10 +89,10 @@ class Updates:
             if every or value != variable.value or forced != variable.forced:
                 variable.value, variable.forced = value, forced
                 code = ua.StatusCodes.GoodLocalOverride if forced else status
-                await self._write(variable.node, as_variant(variable.tag, value), stamp, code)
+                await self._nodes.write(variable.tag.name, as_variant(variable.tag, value), stamp, code)
                 if variable.text is not None:
                     text = ua.Variant(ua.LocalizedText(variable.tag.texts.get(int(value), "")))
-                    await self._write(variable.text, text, stamp, code)
+                    await self._nodes.write(variable.text, text, stamp, code)
         await self._bring_run(shown, last, stamp)
         if shown.read_back is not self._read_back and shown.read_back is not None:
             self._read_back = shown.read_back
@@ -106,23 +105,23 @@ class Updates:
         tick = shown.tick
         if self._run_tag is not None and (last is None or last.run.state != shown.run.state):
             tag, state = self._run_tag, float(shown.run.state)
-            await self._write(node_id(tag.name), as_variant(tag, state), stamp)
+            await self._nodes.write(tag.name, as_variant(tag, state), stamp)
             if has_text(tag):
                 text = ua.Variant(ua.LocalizedText(shown.run.text))
-                await self._write(node_id(f"{tag.name}/{VALUE_AS_TEXT}"), text, stamp)
+                await self._nodes.write(f"{tag.name}/{VALUE_AS_TEXT}", text, stamp)
         if last is None or last.tick != tick:
             now = self._clock.simulated(tick)
             for name in (TICK, TARGET):
-                await self._write(node_id(name), ua.Variant(tick, ua.VariantType.Int64), stamp)
+                await self._nodes.write(name, ua.Variant(tick, ua.VariantType.Int64), stamp)
             seconds = tick * self._source.about.tick
-            await self._write(node_id(f"{RUN}/time"), ua.Variant(seconds, ua.VariantType.Double), stamp)
-            await self._write(node_id(f"{RUN}/date_time"), ua.Variant(now, ua.VariantType.DateTime), stamp)
+            await self._nodes.write(f"{RUN}/time", ua.Variant(seconds, ua.VariantType.Double), stamp)
+            await self._nodes.write(f"{RUN}/date_time", ua.Variant(now, ua.VariantType.DateTime), stamp)
         for name, text, before in (
             ("reason", shown.run.reason, last and last.run.reason),
             ("lost", shown.lost, last and last.lost),
         ):
             if text != before:
-                await self._write(node_id(f"{RUN}/{name}"), ua.Variant(text, ua.VariantType.String), stamp)
+                await self._nodes.write(f"{RUN}/{name}", ua.Variant(text, ua.VariantType.String), stamp)
 
     async def _bring_read_back(self, columns: ReadBackColumns, stamp: datetime) -> None:
         rows = zip(self._commands, columns.since.tolist(), columns.writer.tolist(), strict=True)
@@ -132,21 +131,15 @@ class Updates:
             if self._written.get(name) != row:
                 self._written[name] = row
                 at = ua.Variant(self._clock.simulated(since), ua.VariantType.DateTime)
-                await self._write(node_id(f"{name}/{WRITTEN_BY}"), ua.Variant(row[1], ua.VariantType.String), stamp)
-                await self._write(node_id(f"{name}/{WRITTEN_AT}"), at, stamp)
-
-    async def _write(
-        self, node: ua.NodeId, value: ua.Variant, stamp: datetime, code: int = ua.StatusCodes.Good
-    ) -> None:
-        now = datetime.now(timezone.utc)
-        await self._server.write_attribute_value(node, ua.DataValue(value, ua.StatusCode(code), stamp, now))
+                await self._nodes.write(f"{name}/{WRITTEN_BY}", ua.Variant(row[1], ua.VariantType.String), stamp)
+                await self._nodes.write(f"{name}/{WRITTEN_AT}", at, stamp)
 
 
 class _Variable:
     """A tag, and what was written of it last."""
 
     def __init__(self, tag: Tag) -> None:
-        self.tag, self.node = tag, node_id(tag.name)
-        self.text = node_id(f"{tag.name}/{VALUE_AS_TEXT}") if has_text(tag) else None
+        self.tag = tag
+        self.text = f"{tag.name}/{VALUE_AS_TEXT}" if has_text(tag) else None
         self.value = tag.initial
         self.forced = False

@@ -1,0 +1,41 @@
+"""`Emitter`: hands events to clients that subscribed to the Server object, and keeps conditions for a refresh."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime, timezone
+from typing import Any
+
+from asyncua import ua
+from asyncua.server.internal_server import InternalServer
+
+
+class Emitter:
+    """Of one server. Events of other objects than Server do not reach who subscribed there, so all are of it."""
+
+    def __init__(self, server: InternalServer) -> None:
+        self._service = server.subscription_service
+        self.session = server.isession
+
+    @property
+    def heard(self) -> bool:
+        """Whether there is anybody who could have subscribed."""
+        return bool(self._service.subscriptions)
+
+    async def emit(self, event: Any, at: datetime) -> None:
+        """Send an event. at: its time."""
+        event.emitting_node = ua.NodeId(ua.ObjectIds.Server)
+        event.Time, event.ReceiveTime = at, datetime.now(timezone.utc)
+        event.LocalTime = ua.TimeZoneDataType(time.localtime().tm_gmtoff // 60, bool(time.localtime().tm_isdst))
+        condition = getattr(event, "NodeId", None)
+        if condition is not None:
+            if event.Retain:
+                self._service._conditions[condition] = event
+            else:
+                self.forget(condition)
+        for subscription in list(self._service.subscriptions.values()):
+            await subscription.monitored_item_srv.trigger_event(event)
+
+    def forget(self, condition: ua.NodeId) -> None:
+        """Have it not sent again at a refresh."""
+        self._service._conditions.pop(condition, None)
