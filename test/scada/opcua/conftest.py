@@ -62,7 +62,11 @@ class Line:
             client.set_password(password)
         if security:
             client.set_security_string(security)
-        client.connect()
+        try:
+            client.connect()
+        except BaseException:
+            client.tloop.stop()
+            raise
         self.open.append(client)
         return client
 

@@ -43,31 +43,29 @@ def test_what_is_written_together_is_given_together(line: Line) -> None:
     assert line.outcomes() == [("opcua controller", "set", names, (0.1, 0.2, 0.3), True)]
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "kind", "code"),
-    [
-        (SETPOINT, 1e6, ua.VariantType.Double, Codes.BadOutOfRange),
-        (SETPOINT, float("nan"), ua.VariantType.Double, Codes.BadOutOfRange),
-        (SETPOINT, 1, ua.VariantType.Int32, Codes.BadTypeMismatch),
-        (SETPOINT, "0.1", ua.VariantType.String, Codes.BadTypeMismatch),
-        (SETPOINT, [0.1], ua.VariantType.Double, Codes.BadTypeMismatch),
-        (SETPOINT, None, ua.VariantType.Null, Codes.BadTypeMismatch),
-        ("machines/filler/cntrl_cmd", 77, ua.VariantType.UInt32, Codes.BadOutOfRange),
-        (SPEED, 0.1, ua.VariantType.Double, Codes.BadNotWritable),
-        ("belts/zone1/trip", True, ua.VariantType.Boolean, Codes.BadNotWritable),
-        ("run/state", 1, ua.VariantType.UInt32, Codes.BadNotWritable),
-        ("belts/nowhere/speed", 0.1, ua.VariantType.Double, Codes.BadNotWritable),
-    ],
-)
-def test_what_can_not_be_is_refused_at_once(
-    line: Line, name: str, value: object, kind: ua.VariantType, code: int
-) -> None:
-    node = line.node(name, line.client("controller"))
-    with refused(code):
-        node.write_value(ua.DataValue(ua.Variant(value, kind)))
+REFUSED: list[tuple[str, object, ua.VariantType, int]] = [
+    (SETPOINT, 1e6, ua.VariantType.Double, Codes.BadOutOfRange),
+    (SETPOINT, float("nan"), ua.VariantType.Double, Codes.BadOutOfRange),
+    (SETPOINT, 1, ua.VariantType.Int32, Codes.BadTypeMismatch),
+    (SETPOINT, "0.1", ua.VariantType.String, Codes.BadTypeMismatch),
+    (SETPOINT, [0.1], ua.VariantType.Double, Codes.BadTypeMismatch),
+    (SETPOINT, None, ua.VariantType.Null, Codes.BadTypeMismatch),
+    ("machines/filler/cntrl_cmd", 77, ua.VariantType.UInt32, Codes.BadOutOfRange),
+    (SPEED, 0.1, ua.VariantType.Double, Codes.BadNotWritable),
+    ("belts/zone1/trip", True, ua.VariantType.Boolean, Codes.BadNotWritable),
+    ("run/state", 1, ua.VariantType.UInt32, Codes.BadNotWritable),
+    ("belts/nowhere/speed", 0.1, ua.VariantType.Double, Codes.BadNotWritable),
+]
+
+
+def test_what_can_not_be_is_refused_at_once(line: Line) -> None:
+    controller = line.client("controller")
+    for name, value, kind, code in REFUSED:
+        with refused(code):
+            line.node(name, controller).write_value(ua.DataValue(ua.Variant(value, kind)))
     line.advance()
     assert line.outcomes() == []
-    assert line.server.status().refused == 1
+    assert line.server.status().refused == len(REFUSED)
 
 
 def test_only_values_can_be_written(line: Line) -> None:

@@ -74,30 +74,30 @@ def told(serve: Serve, request: pytest.FixtureRequest) -> Line:
 simulated = pytest.mark.parametrize("told", ["simulated"], indirect=True)
 
 
-@pytest.mark.parametrize(
-    ("run", "lost", "code"),
-    [
-        (RUNNING, "", Codes.Good),
-        (LOCKSTEP, "", Codes.Good),
-        (REPLAYING, "", Codes.Good),
-        (PAUSED, "", Codes.UncertainLastUsableValue),
-        (ENDED, "", Codes.BadOutOfService),
-        (STOPPED, "", Codes.BadOutOfService),
-        (RUNNING, "the node is gone", Codes.BadNoCommunication),
-    ],
-)
-def test_the_status_says_what_values_are_worth(told: Line, run: int, lost: str, code: int) -> None:
-    told.source.show(run=RunState(run, "why"), lost=lost, forced=frozenset({SPEED}))
-    told.until(lambda: told.read("run/reason") == "why" and told.read("run/lost") == lost)
-    expected = Codes.GoodLocalOverride if code == Codes.Good else code
-    for name, status in ((SETPOINT, code), (SPEED, expected)):
-        with_status = told.open[0].get_node(f"ns=2;s={name}").read_data_value(raise_on_bad_status=False)
-        assert with_status.StatusCode.value == status, name
-        assert (with_status.Value.Value is None) == (code >= 0x80000000)
-    assert told.read("run/state") == run  # which is Good
-    told.source.show(run=RunState(RUNNING), lost="")
-    told.until(lambda: told.read("run/reason") == "")
-    assert told.read(SETPOINT) is not None
+WORTH = [
+    (RUNNING, "", Codes.Good),
+    (PAUSED, "", Codes.UncertainLastUsableValue),
+    (LOCKSTEP, "", Codes.Good),
+    (ENDED, "", Codes.BadOutOfService),
+    (REPLAYING, "", Codes.Good),
+    (STOPPED, "", Codes.BadOutOfService),
+    (RUNNING, "the node is gone", Codes.BadNoCommunication),
+    (RUNNING, "", Codes.Good),
+]
+
+
+def test_the_status_says_what_values_are_worth(told: Line) -> None:
+    for run, lost, code in WORTH:
+        why = f"{run} {lost}"
+        told.source.show(run=RunState(run, why), lost=lost, forced=frozenset({SPEED}))
+        told.until(lambda why=why: told.read("run/reason") == why)
+        assert told.read("run/lost") == lost
+        override = Codes.GoodLocalOverride if code == Codes.Good else code
+        for name, expected in ((SETPOINT, code), (SPEED, override), ("alarm_states/belts/zone1/tripped/state", code)):
+            found = told.node(name).read_data_value(raise_on_bad_status=False)
+            assert found.StatusCode.value == expected, (name, run)
+            assert (found.Value.Value is None) == (code >= 0x80000000)
+        assert told.read("run/state") == run  # which is Good
 
 
 def test_nothing_is_taken_where_nothing_would_act(told: Line) -> None:

@@ -1,0 +1,61 @@
+"""node-opcua, an implementation of OPC UA in JavaScript, as a client."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conveyor_sim.line.packml import STATE_TEXTS
+from test.scada.opcua.conftest import PASSWORD
+
+if TYPE_CHECKING:
+    from test.scada.opcua.conftest import Line
+
+CLIENT = Path(__file__).parent / "node_client"
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("node") is None or not (CLIENT / "node_modules").is_dir(),
+    reason=f"node-opcua is not installed: npm install --no-package-lock --prefix {CLIENT}",
+)
+
+
+def run(line: Line, user: str, password: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = ["node", str(CLIENT / "client.js"), line.server.address, user, password, str(folder)]
+    home = {**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder)}
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=home, check=False)
+
+
+def test_it_reads_writes_subscribes_and_calls(line: Line, tmp_path: Path) -> None:
+    line.client()
+    line.advance(7)
+    done = run(line, "controller", PASSWORD, tmp_path)
+    assert done.returncode == 0, done.stderr
+    told: dict[str, Any] = json.loads(next(row for row in done.stdout.splitlines() if row.startswith("{")))
+    assert told["namespaces"][2] == "urn:conveyor_sim:line"
+    assert {"speed", "cmd_speed", "running", "mode"} <= set(told["children"])
+    shown = line.source.shown.values
+    assert told["speed"] == {"value": shown["belts/zone1/cmd_speed"], "type": "Double", "status": "Good"}
+    assert told["bottles"] == {"value": shown["belts/zone1/bottles"], "type": "UInt32", "status": "Good"}
+    assert told["running"] == {"value": True, "type": "Boolean", "status": "Good"}
+    assert told["unit"] == [5067859, "m/s"] and told["range"] == [0, 1]
+    assert told["states"] == list(STATE_TEXTS.values())
+    assert told["tick"] == 7 and told["stamped"]
+    codes = [told[name] for name in ("good", "beyond", "wrong", "signal", "called")]
+    later = "GoodCompletesAsynchronously"
+    assert codes == [later, "BadOutOfRange", "BadTypeMismatch", "BadNotWritable", later]
+    line.advance()
+    assert [row[:4] for row in line.outcomes()] == [
+        ("opcua controller", "disown", (), ()),
+        ("opcua controller", "set", ("belts/zone1/cmd_speed",), (0.125,)),
+    ]
+
+
+def test_it_is_refused_with_a_wrong_password(line: Line, tmp_path: Path) -> None:
+    done = run(line, "controller", "open sesam", tmp_path)
+    assert done.returncode == 1 and "BadUserAccessDenied" in done.stderr
