@@ -93,12 +93,12 @@ class Updates:
                 if variable.text is not None:
                     text = ua.Variant(ua.LocalizedText(variable.tag.texts.get(int(value), "")))
                     await self._nodes.write(variable.text, text, stamp, code)
-        await self._bring_run(shown, last, stamp)
         if shown.read_back is not self._read_back and shown.read_back is not None:
             self._read_back = shown.read_back
             await self._bring_read_back(shown.read_back, stamp)
         for follow in self._others:
             await follow(shown, heard, back)
+        await self._bring_run(shown, last, stamp)  # at last: who sees the tick finds all else of it
 
     async def _bring_run(self, shown: Shown, last: Shown | None, stamp: datetime) -> None:
         """Always Good: it says what has become of the rest."""
