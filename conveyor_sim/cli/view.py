@@ -6,13 +6,31 @@ from pathlib import Path
 
 import click
 
+from conveyor_sim.errors import ConveyorError
+
 
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))
-@click.option("--html", type=click.Path(path_type=Path), required=True, help="Write the page and BAG to this one file.")
-@click.option("--last", type=float, help="Only so many s at the end; what happened is listed from the start.")
-def view(bag: Path, html: Path, last: float | None) -> None:
-    """Show the line in BAG on a page: play it, scrub, look at machines, alarms, forces and trends."""
-    from conveyor_sim.view.one_file import write_page
+@click.option("--html", type=click.Path(path_type=Path), help="Write the page and BAG to this one file, and end.")
+@click.option("--last", type=float, help="With --html: only so many s at the end.")
+@click.option("--port", type=click.IntRange(0, 65535), help="Without --html: serve the page here (default: any).")
+def view(bag: Path, html: Path | None, last: float | None, port: int | None) -> None:
+    """Show the line in BAG on a page: play it, scrub, look at machines, alarms, forces and trends.
 
-    click.echo(write_page(bag, html, last))
+    The page is served to this machine, however long BAG is, until Ctrl-C; or it is written to one file with --html.
+    """
+    if html is not None:
+        if port is not None:
+            raise ConveyorError("--port: given with --html, expected one of them")
+        from conveyor_sim.view.one_file import write_page
+
+        click.echo(write_page(bag, html, last))
+        return
+    if last is not None:
+        raise ConveyorError("--last: given without --html, expected both or neither")
+    from conveyor_sim.support.stop_request import StopRequest
+    from conveyor_sim.view.server import RecordingServer
+
+    with StopRequest() as stop, RecordingServer(bag, port or 0) as server:
+        click.echo(f"{bag}: {server.url} (Ctrl-C ends it)")
+        stop.wait()

@@ -30,12 +30,12 @@ UNKNOWN = -(2**40)
 FORCE_FRAMES = 5
 """Frames that share one peak force."""
 SECONDS = 4.0
-"""Of simulated time, that a block is long."""
+"""Of simulated time, that a block is long in one file."""
 
 
-def block_ticks(tick_ns: int) -> int:
+def block_ticks(tick_ns: int, seconds: float = SECONDS) -> int:
     """Ticks of a block."""
-    return max(1, round(SECONDS * 1e9 / tick_ns))
+    return max(1, round(seconds * 1e9 / tick_ns))
 
 
 @dataclass

@@ -42,7 +42,7 @@ def write_page(
         else:
             blocks = (_deflated(recording.block(number)) for number in range(recording.blocks))
         head = {**recording.head(), "failures": [vars(failure) for failure in failures]}
-        parts = {"head": _deflated(text(head)), "story": _deflated(recording.story())}
+        parts = {"head": _deflated(text(head)), "story/0": _deflated(recording.story())}
         parts.update((f"block/{number}", block) for number, block in enumerate(blocks))
         page = one_file(parts, recording.name)
     try:

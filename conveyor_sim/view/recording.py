@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from conveyor_sim.bag.messages import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.scene import parse_overrides, parse_scene
-from conveyor_sim.view.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN, block_ticks, pack
+from conveyor_sim.view.block import (
+    FORCE_FRAMES,
+    LEAST_FORCE,
+    LEVELS,
+    MM,
+    SECONDS,
+    SIGNAL_STEPS,
+    UNKNOWN,
+    block_ticks,
+    pack,
+)
 from conveyor_sim.view.content import DRAWN, Collector
 from conveyor_sim.view.head import head
 from conveyor_sim.view.story import TOPICS_READ, Story, fields
@@ -24,6 +36,10 @@ class Detail:
     belts: float = 25.0
     signals: float = 25.0
     counters: float = 0.5
+    block: float = SECONDS
+    """s, not Hz: how long a block is."""
+    story: float = math.inf
+    """s: how much of what happened is read at a time."""
 
 
 class Recording:
@@ -37,11 +53,11 @@ class Recording:
         self._scene = parse_scene(
             bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
         )
-        self.first = int(bag.line.tick)
+        self._began = self.first = int(bag.line.tick)
         self.last = max(self.first, bag.span_ns[1] // self._tick_ns)
         if start is not None:
             self.first = min(self.last, max(self.first, round(start * 1e9 / self._tick_ns)))
-        self._block_ticks = block_ticks(self._tick_ns)
+        self._block_ticks = block_ticks(self._tick_ns, detail.block)
 
     @property
     def name(self) -> str:
@@ -53,9 +69,20 @@ class Recording:
         """How many there are; the first one begins at the first tick."""
         return 1 + (self.last - self.first) // self._block_ticks
 
+    @property
+    def stories(self) -> int:
+        """How many stretches what happened is told in."""
+        return 1 + math.floor((self.last - self._began) * self._tick_ns * 1e-9 / self._detail.story)
+
     def head(self) -> dict[str, Any]:
         """As `head.head`, and how to read the rest."""
-        times = {"first": self.first, "last": self.last, "block": self._block_ticks, "blocks": self.blocks}
+        times = {
+            "first": self.first,
+            "last": self.last,
+            "block": self._block_ticks,
+            "blocks": self.blocks,
+            "stories": self.stories,
+        }
         steps = {
             "mm": MM,
             "signal": SIGNAL_STEPS,
@@ -64,7 +91,8 @@ class Recording:
             "unknown": UNKNOWN,
             "forceFrames": FORCE_FRAMES,
         }
-        return {**head(self._bag, self._scene), "times": times, "steps": steps, "fields": fields()}
+        forced: list[int] = next((to_image(frame.data).forced.tolist() for frame in self._bag.messages("signals")), [])
+        return {**head(self._bag, self._scene), "times": times, "steps": steps, "fields": fields(), "forced": forced}
 
     def block(self, number: int) -> bytes:
         """A block, from 0 on, as `block.pack` writes it."""
@@ -75,12 +103,17 @@ class Recording:
             collector.add(topic, tick, raw)
         return pack(collector.content, start)
 
-    def story(self) -> bytes:
-        """What happened from the beginning to the end, as JSON (`Story`)."""
+    def story(self, number: int = 0) -> bytes:
+        """What happened in a stretch of the recording, from 0 on, as JSON (`Story`)."""
         story = Story(self._bag, 1.0 / self._detail.counters)
-        for topic, _, raw in self._messages(TOPICS_READ, None, None):
+        start = stop = None
+        if self.stories > 1:
+            length = round(self._detail.story * 1e9 / self._tick_ns)
+            start = self._began + number * length
+            stop = start + length
+        for topic, _, raw in self._messages(TOPICS_READ, start, stop):
             story.add(topic, raw)
-        return story.text()
+        return text(story.data)
 
     def _messages(
         self, topics: tuple[str, ...], start: int | None, stop: int | None
@@ -92,5 +125,13 @@ class Recording:
 
 
 def text(value: Any) -> bytes:
-    """As JSON."""
-    return json.dumps(value, separators=(",", ":")).encode()
+    """As JSON, which has neither NaN nor infinities."""
+    return json.dumps(_clean(value), separators=(",", ":")).encode()
+
+
+def _clean(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _clean(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_clean(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

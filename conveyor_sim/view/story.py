@@ -5,7 +5,6 @@ Every list is in the order of time; what says a state says it when it changes.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -13,8 +12,8 @@ from typing import Any
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.bag.topics import TOPICS
 
-TOPICS_READ = ("events", "alarm_states", "readback", "counters", "signals", "run_state")
-"""Those that it is made of; of `signals` what is forced."""
+TOPICS_READ = ("events", "alarm_states", "readback", "counters", "run_state")
+"""Those that it is made of."""
 
 _DECLARED = ("id", "text", "alarm_class", "priority", "tag", "group", "latching")
 _ALARM = ("state", "active", "first_out", "since", "changed_by")
@@ -34,14 +33,12 @@ class Story:
         self._counters_every = counters_every
         self._last: dict[str, dict[Any, Any]] = {"alarms": {}, "commands": {}}
         self._counted = -math.inf
-        self._forced: list[int] = []
         self.data: dict[str, Any] = {
             "events": {name: [] for name in ("at", "kind", "name", "bottle", "value", "text")},
             "alarms": {},
             "alarm_changes": [],
             "readback": [],
             "counters": [],
-            "forced": [],
             "runs": [],
         }
 
@@ -49,10 +46,6 @@ class Story:
         """A message of one of TOPICS_READ."""
         message = self._bag.decode(topic, raw)
         getattr(self, f"_{topic}")(message, self._bag.time(message.tick))
-
-    def text(self) -> bytes:
-        """All of it as JSON."""
-        return json.dumps(_clean(self.data), separators=(",", ":")).encode()
 
     def _events(self, message: Any, _: float) -> None:
         columns = TOPICS["events"].unpack(message)
@@ -93,12 +86,6 @@ class Story:
         names, bottleneck = list(message.name), list(message.bottleneck)
         self.data["counters"].append({"at": time, "name": names, "rows": rows, "bottleneck": bottleneck})
 
-    def _signals(self, message: Any, time: float) -> None:
-        forced = [] if not hasattr(message, "forced") else message.forced.tolist()
-        if forced != self._forced:
-            self._forced = forced
-            self.data["forced"].append([time, forced])
-
     def _run_state(self, message: Any, time: float) -> None:
         self.data["runs"].append([time, message.text, message.reason])
 
@@ -110,12 +97,3 @@ def fields() -> Mapping[str, tuple[str, ...]]:
 
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
-
-
-def _clean(value: Any) -> Any:
-    """Without NaN and infinities, which JSON has not."""
-    if isinstance(value, dict):
-        return {key: _clean(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_clean(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

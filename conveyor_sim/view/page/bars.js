@@ -11,14 +11,17 @@ const ROW = 26, NAME = 96;
 export class Bars {
   constructor(view) {
     this.view = view;
-    this.names = [...view.story.machines.keys()];
-    this.canvas = element("canvas", {
-      class: "bars", height: 1, role: "img", "aria-label": `States over time of ${this.names.join(", ") || "no machine"}`,
-      onclick: (event) => this._jump(event),
-    });
-    this.canvas.style.height = `${this.names.length * ROW + 4}px`;
-    this.note = element("p", { class: "muted" }, this.names.length ? "A click on a bar jumps to that time." : "No machine has changed its state.");
+    this.canvas = element("canvas", { class: "bars", height: 1, role: "img", onclick: (event) => this._jump(event) });
+    this.note = element("p", { class: "muted" });
+    this.named();
     this.root = element("section", {}, element("h2", {}, "Machines"), this.canvas, this.note);
+  }
+
+  named() {
+    this.names = [...this.view.story.machines.keys()].sort();
+    this.canvas.setAttribute("aria-label", `States over time of ${this.names.join(", ") || "no machine"}`);
+    this.canvas.style.height = `${this.names.length * ROW + 4}px`;
+    this.note.textContent = this.names.length ? "A click on a bar jumps to that time." : "No machine has changed its state.";
   }
 
   _span() {

@@ -40,12 +40,12 @@ export class Faceplate {
   }
 
   draw() {
-    const { clock, recording, story } = this.view, forced = new Set(story.forcedAt(clock.time));
+    const { clock, recording, story } = this.view, forced = story.forcedAt(clock.time);
     for (const { tag, signal, command, value, note } of this.cells) {
       let now = tag.initial, said = "";
       if (signal !== undefined) {
         now = recording.at("signals", signal, clock.time);
-        if (forced.has(signal)) said = "forced";
+        if (forced.has(tag.name)) said = "forced";
       } else if (command >= 0) {
         const read = story.readBackAt(command, clock.time);
         if (read) [now, said] = [read.value, `by ${read.writer} since ${seconds(read.since)}`];

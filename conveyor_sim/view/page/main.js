@@ -35,8 +35,10 @@ class View {
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
     this.alarms = new Alarms(this);
-    const line = { title: "Line", parts: [new Bars(this), new Tiles(this)] };
-    const panels = { line, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [new Events(this)] },
+    this.bars = new Bars(this);
+    this.events = new Events(this);
+    const line = { title: "Line", parts: [this.bars, new Tiles(this)] };
+    const panels = { line, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [this.events] },
       device: { title: "Device", parts: [this.faceplate] }, bottle: { title: "Bottle", parts: [new Bottle(this)] } };
     this.tabs = new Tabs(panels, "line");
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
@@ -59,6 +61,13 @@ class View {
 
   signal(name) {
     return this.recording.signal(name, this.clock.time);
+  }
+
+  toldMore(part) {
+    this.story.add(part);
+    this.events.filter();
+    this.bars.named();
+    this.touch();
   }
 
   _loaded() {
@@ -262,8 +271,9 @@ function wire(view) {
 
 async function start() {
   const source = openSource(), read = async (name) => JSON.parse(new TextDecoder().decode(await source.bytes(name)));
-  const [head, story] = await Promise.all([read("head"), read("story")]);
-  const recording = new Recording(source, head), view = new View(recording, new Story({ ...story, failures: head.failures }));
+  const head = await read("head"), story = new Story(head), parts = head.times.stories;
+  if (parts === 1) story.add(await read("story/0"));
+  const recording = new Recording(source, head), view = new View(recording, story);
   wire(view);
   view.plan.resize();
   const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
@@ -285,6 +295,13 @@ async function start() {
   };
   requestAnimationFrame(loop);
   document.body.dataset.ready = "yes";
+  // A long recording is gone through while one looks at it already.
+  for (let part = 0; parts > 1 && part < parts; part++) {
+    view.say(`reading what happened: ${Math.round((100 * part) / parts)} %`);
+    view.toldMore(await read(`story/${part}`));
+  }
+  if (parts > 1) view.say("");
+  document.body.dataset.told = "yes";
 }
 
 start().catch((error) => {

@@ -15,14 +15,27 @@ const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
 
 export const stateName = (number) => STATE_NAMES[number] ?? `state ${number}`;
 
+const LISTS = ["alarm_changes", "readback", "counters", "runs"];
+
 export class Story {
-  constructor(data) {
-    this.data = data;
-    const { events } = data;
-    this.events = events.at.map((time, i) => ({
-      time, kind: events.kind[i], name: events.name[i], bottle: events.bottle[i], value: events.value[i], text: events.text[i],
-    }));
-    this.eventTimes = events.at;
+  constructor(head) {
+    this.head = head;
+    this.data = { events: {}, alarms: {} };
+    for (const list of LISTS) this.data[list] = [];
+    this.build();
+  }
+
+  // What happened after what is there already.
+  add(data) {
+    for (const [name, column] of Object.entries(data.events)) this.data.events[name] = (this.data.events[name] ?? []).concat(column);
+    for (const list of LISTS) this.data[list] = this.data[list].concat(data[list]);
+    Object.assign(this.data.alarms, data.alarms);
+    this.build();
+  }
+
+  build() {
+    const { data } = this, { at = [], kind, name, bottle, value, text } = data.events;
+    this.events = at.map((time, i) => ({ time, kind: kind[i], name: name[i], bottle: bottle[i], value: value[i], text: text[i] }));
     this.fed = new Map();
     this.rejected = new Set();
     this.machines = new Map();
@@ -55,7 +68,7 @@ export class Story {
       if (event.kind === "fault_injected") marks.push({ time: event.time, kind: "fault", text: `fault ${event.name}` });
       if (event.kind === "command_refused") marks.push({ time: event.time, kind: "refused", text: `refused ${event.name}: ${event.text}` });
     }
-    for (const failure of this.data.failures ?? []) marks.push({ ...failure, kind: "failed" });
+    for (const failure of this.head.failures ?? []) marks.push({ ...failure, kind: "failed" });
     return marks.sort((a, b) => a.time - b.time);
   }
 
@@ -82,12 +95,14 @@ export class Story {
     return found;
   }
 
+  // Names of signals that are forced at a time.
   forcedAt(time) {
-    let found = [];
-    for (const [at, forced] of this.data.forced) {
-      if (at > time + 1e-6) break;
-      found = forced;
+    const forced = new Set(this.head.forced.map((index) => this.head.signals[index]));
+    for (const event of this.events) {
+      if (event.time > time + 1e-6) break;
+      if (event.kind === "signal_forced") forced.add(event.name);
+      if (event.kind === "signal_unforced") forced.delete(event.name);
     }
-    return found;
+    return forced;
   }
 }

@@ -1,0 +1,129 @@
+"""The page on a recording of any length, from a small server on this machine: what it asks for is read by the index."""
+
+from __future__ import annotations
+
+import threading
+import zlib
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.printable import SENTENCE, printable
+from conveyor_sim.view.bundle import PAGE
+from conveyor_sim.view.recording import Detail, Recording, text
+
+ADDRESS = "127.0.0.1"
+SERVED = Detail(bottles=50.0, contacts=25.0, belts=50.0, signals=50.0, block=2.0, story=60.0)
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+
+
+class RecordingServer(AbstractContextManager["RecordingServer"]):
+    """Serves a bag's page until it is closed."""
+
+    def __init__(self, path: Path, port: int = 0) -> None:
+        """port: 0 for any that is free. Raises BagError, SceneError, and ConveyorError if it can't listen there."""
+        with ExitStack() as stack:
+            # Whoever reads on through the whole recording does not throw out what somebody looks at.
+            self._shown = Recording(stack.enter_context(open_bag(path, by_index=True)), SERVED)
+            self._read_on = Recording(stack.enter_context(open_bag(path, by_index=True)), SERVED)
+            self._locks = {id(recording): threading.Lock() for recording in (self._shown, self._read_on)}
+            try:
+                self._server = _Server((ADDRESS, port), _Handler)
+            except OSError as error:
+                raise ConveyorError(
+                    f"--port: {port} given, expected one that is free ({error.strerror or error})"
+                ) from error
+            self._server.answer = self.answer
+            stack.callback(self._server.server_close)
+            self._thread = threading.Thread(target=self._server.serve_forever, name="page", daemon=True)
+            self._thread.start()
+            stack.callback(self._server.shutdown)
+            self._stack = stack.pop_all()
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{ADDRESS}:{self._server.server_address[1]}/"
+
+    def answer(self, name: str) -> bytes:
+        """The deflated part of a name: head, story/<n>, block/<n>. Raises KeyError if there is none, and BagError."""
+        kind, _, number = name.partition("/")
+        if name == "head":
+            return self._deflated(self._shown, lambda: text(self._shown.head()))
+        counts = {"story": self._shown.stories, "block": self._shown.blocks}
+        if kind not in counts or not number.isdecimal() or int(number) >= counts[kind]:
+            raise KeyError(name)
+        recording = self._shown if kind == "block" else self._read_on
+        return self._deflated(recording, lambda: getattr(recording, kind)(int(number)))
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is answered any more."""
+        self._stack.close()
+        self._thread.join()
+
+    def _deflated(self, recording: Recording, make: Callable[[], bytes]) -> bytes:
+        with self._locks[id(recording)]:
+            made = make()
+        return zlib.compress(made, 1)
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    answer: Callable[[str], bytes]
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    server_version, sys_version = "conveyor_sim", ""
+
+    def do_GET(self) -> None:
+        path = urlsplit(self.path).path.removeprefix("/") or "index.html"
+        # A page of somebody else's, whose name has been made to lead here, asks for that name.
+        if self.headers.get("Host", "").rpartition(":")[0] not in (ADDRESS, "localhost"):
+            self._send(HTTPStatus.FORBIDDEN, b"expected to be asked for as 127.0.0.1", "text/plain")
+        elif path.startswith("data/"):
+            self._send_part(path.removeprefix("data/"))
+        elif path in _files():
+            self._send(HTTPStatus.OK, (PAGE / path).read_bytes(), _TYPES[Path(path).suffix])
+        else:
+            self._send(HTTPStatus.NOT_FOUND, b"there is no such file", "text/plain")
+
+    def _send_part(self, name: str) -> None:
+        try:
+            self._send(HTTPStatus.OK, self.server.answer(name), "application/octet-stream")
+        except KeyError:
+            self._send(HTTPStatus.NOT_FOUND, b"there is no such part of the recording", "text/plain")
+        except ConveyorError as error:
+            said = printable(error, SENTENCE).encode()
+            self._send(HTTPStatus.INTERNAL_SERVER_ERROR, said, "text/plain")
+
+    def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
+        self.send_response(status)
+        headers = {
+            "Content-Type": f"{kind}; charset=utf-8" if kind.startswith("text/") else kind,
+            "Content-Length": str(len(content)),
+            "Content-Security-Policy": POLICY,
+            "X-Content-Type-Options": "nosniff",
+            "Cache-Control": "no-store",
+        }
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: what can't be read is shown on the page."""
+
+
+def _files() -> set[str]:
+    return {file.relative_to(PAGE).as_posix() for file in PAGE.rglob("*") if file.suffix in _TYPES}

@@ -1,0 +1,141 @@
+"""The page on a recording that a server reads by its index: what is read and refused, and that the same is drawn."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from view.line import LINE
+from view.test_page import canvas, clock, settled
+
+from conveyor_sim.bag import own_source
+from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.scene import load_scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.view.one_file import write_page
+from conveyor_sim.view.recording import Recording
+from conveyor_sim.view.server import SERVED, RecordingServer
+
+
+@pytest.fixture
+def server(bag: Path) -> Iterator[RecordingServer]:
+    with RecordingServer(bag) as made:
+        yield made
+
+
+def get(server: RecordingServer, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+    """Status, content and headers of an answer."""
+    connection = HTTPConnection(urlsplit(server.url).netloc, timeout=60)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    found = answer.status, answer.read(), dict(answer.getheaders())
+    connection.close()
+    return found
+
+
+def test_parts_of_a_recording_are_answered_by_name(server: RecordingServer, bag: Path) -> None:
+    with open_bag(bag) as opened:
+        recording = Recording(opened, SERVED)
+        assert zlib.decompress(get(server, "/data/block/3")[1]) == recording.block(3)
+        assert zlib.decompress(get(server, "/data/story/0")[1]) == recording.story(0)
+
+
+@pytest.mark.parametrize(
+    "path", ["/data/block/99", "/data/block/-1", "/data/block/x", "/data/", "/../setup.py", "/x.py"]
+)
+def test_what_there_is_not_is_not_found(server: RecordingServer, path: str) -> None:
+    assert get(server, path)[0] == 404
+
+
+def test_it_listens_on_this_machine_only_and_lets_in_no_other_page(server: RecordingServer) -> None:
+    assert server.url.startswith("http://127.0.0.1:")
+    status, content, headers = get(server, "/")
+    assert status == 200 and b"<canvas" in content
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert get(server, "/data/head", Host="evil.example")[0] == 403
+
+
+def test_a_port_that_is_taken_is_said_in_one_sentence(server: RecordingServer, bag: Path) -> None:
+    taken = urlsplit(server.url).port
+    assert taken is not None
+    with pytest.raises(ConveyorError, match=rf"^--port: {taken} given, expected one that is free"):
+        RecordingServer(bag, taken)
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match="no such bag"):
+        RecordingServer(tmp_path / "bag")
+
+
+def test_the_page_draws_what_the_one_file_draws(
+    browser: Any, server: RecordingServer, bag: Path, tmp_path: Path
+) -> None:
+    html = write_page(bag, tmp_path / "page.html")
+    pictures = []
+    for url in (server.url, html.as_uri()):
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        page = context.new_page()
+        page.goto(url)
+        page.wait_for_selector("body[data-told]", timeout=60_000)
+        page.uncheck("#forces")  # shown twice as often where they are served
+        page.click("#plan", position={"x": 20, "y": 20})
+        for key in ("Home", "ArrowRight", "ArrowRight", "ArrowRight"):
+            page.keyboard.press(key)
+        settled(page)
+        assert clock(page) == 3.0
+        pictures.append(canvas(page))
+        assert page.inner_text("#tab_alarms") == "Alarms"
+        context.close()
+    assert np.array_equal(*pictures)
+
+
+def written(folder: Path, seconds: float) -> Path:
+    """A recording of 300 bottles at 50 Hz on the small line, not simulated."""
+    simulation = Simulation(load_scene(LINE))
+    ids, zeros = np.arange(300, dtype=np.uint64), np.zeros(300)
+    kinds, belts = np.zeros(300, np.uint16), np.zeros(300, np.int32)
+    with Recorder(folder) as recorder:
+        Outputs(simulation, [recorder], run_id="run").start()
+        for tick in range(2, round(100 * seconds) + 1, 2):
+            x = 0.01 * np.arange(300) + 0.5 * np.sin(0.001 * tick)
+            bottles = BottleColumns(ids, kinds, x, zeros, zeros, zeros, zeros, zeros, belts, zeros, zeros)
+            header = Header(tick, tick * 10_000_000, "world")
+            recorder.write("bottles", TOPICS["bottles"].pack(bottles, header), header.stamp_ns)
+    return folder
+
+
+def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[int] = []
+    really_read = own_source.read_content
+
+    def counted(data: Any, chunk: Any) -> bytes:
+        read.append(chunk.start)
+        return really_read(data, chunk)
+
+    bag = written(tmp_path / "bag", 120.0)
+    monkeypatch.setattr(own_source, "read_content", counted)
+    with open_bag(bag, by_index=True) as opened:
+        recording = Recording(opened, SERVED)
+        recording.head()
+        assert len(read) <= 2, "what is latched is at the beginning"
+        before = len(read)
+        recording.block(recording.blocks // 2)
+        assert 1 <= len(read) - before <= 4
+    index = own_source.own_source(next(bag.glob("*.mcap")))
+    assert index is not None
+    assert len(index._index.chunks) > 20, "there were others to be read"
+    index.close()
