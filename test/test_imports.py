@@ -35,19 +35,20 @@ MAY_IMPORT: Mapping[str, str] = {
     "stepping": "accounts engine errors model scene state | numpy",
     "simulation": "accounts engine line model observe scene state stepping | numpy",
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
-    "st": "control | lark",
     "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
     "version | numpy rich ruamel scipy",
     "explain": "effects errors model scene simulation support timestep | rich",
     "plot": "accuracy bag errors line observe scene support | matplotlib numpy",
     "view": "bag errors observe scene simulation support | numpy",
-    "runs": "bag engine errors line model observe plot scene simulation support timestep view | click numpy rich",
+    "runs": "bag control engine errors line model observe plot scene simulation support timestep view "
+    "| click numpy rich",
     "live": "bag errors line observe runs simulation support",
     "scada": "bag control errors line live observe runs scene simulation support | asyncua cryptography numpy pymodbus",
-    "ros": "bag control errors explain line live model observe runs scada scene simulation support version | "
+    "st": "control scada | lark",
+    "ros": "bag control errors explain line live model observe runs scada scene simulation st support version | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control engine errors line plot ros scada scene simulation support view | numpy pytest",
-    "cli": "accuracy bag errors explain line model ros runs scada scene support version view | click rich",
+    "cli": "accuracy bag control errors explain line model ros runs scada scene st support version view | click rich",
 }
 """By room, from the lowest up: the rooms of the project, then the packages of others that it imports."""
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from conveyor_sim.cli.output import OUTSIDE_TABLES, say
+from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.garbage import collected_later
 from conveyor_sim.support.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from conveyor_sim.control.scan import Controller
 
 
 @click.command()
@@ -17,6 +22,7 @@ from conveyor_sim.support.progress import ProgressBar
     "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
 )
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
+@click.option("--controller", help="Has it scan at every tick: program.st, file.py:factory or module:factory.")
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
@@ -25,6 +31,7 @@ def run(
     scene: str,
     out: Path | None,
     duration: float | None,
+    controller: str | None,
     no_record: bool,
     no_pictures: bool,
     threads: int | None,
@@ -46,6 +53,7 @@ def run(
         from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path
 
+    controls = None if controller is None else _controller(controller)
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
     click.echo(setting_line(model))
@@ -58,10 +66,20 @@ def run(
             drawing.get_ready()
     Compilation(loaded, say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
-        done = run_scene(loaded, folder, bar.update, threads)
+        done = run_scene(loaded, folder, bar.update, threads, controls)
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:
         report_unrecorded(loaded, model, done)
     else:
         report(done.bag, done.wall, drawing, done.spent)
+
+
+def _controller(reference: str) -> Controller:
+    from conveyor_sim.control.scan import ControlError
+    from conveyor_sim.st.load import load
+
+    try:
+        return load(reference)
+    except ControlError as error:
+        raise ConveyorError(str(error)) from error

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 from conveyor_sim.control.alarm import Alarm
+from conveyor_sim.control.line_tags import LineTags, bind
 
 ALARMS = "alarms/"
 """What a key of an answer begins with that is an alarm (0 or 1), not a command."""
@@ -60,7 +62,8 @@ class Inputs(Mapping[str, float]):
 
 class Controller(Protocol):
     """Anything with a scan. One with an attribute `declared_alarms` (a sequence of Alarm) says by it what its alarms
-    are; the others are as by default.
+    are; the others are as by default. One with a method `bind` is given the line's tags (`line_tags.py`) before its
+    first scan; one with an attribute `variables` (a mapping of numbers by name) shows these to a test's conditions.
     """
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
@@ -114,6 +117,16 @@ class _Together:
     def declared_alarms(self) -> tuple[Alarm, ...]:
         return tuple(alarm for controller in self.controllers for alarm in declared_alarms(controller))
 
+    def bind(self, tags: LineTags) -> None:
+        """Hand the line's tags on."""
+        for controller in self.controllers:
+            bind(controller, tags)
+
+    @property
+    def variables(self) -> Mapping[str, float]:
+        """Those of all of them."""
+        return ChainMap(*(dict(getattr(controller, "variables", {})) for controller in self.controllers))
+
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
         given_by: dict[str, Controller] = {}
@@ -138,6 +151,16 @@ class _Priority:
             for alarm in declared_alarms(controller):
                 found.setdefault(alarm.id, alarm)
         return tuple(found.values())
+
+    def bind(self, tags: LineTags) -> None:
+        """Hand the line's tags on."""
+        for controller in self.controllers:
+            bind(controller, tags)
+
+    @property
+    def variables(self) -> Mapping[str, float]:
+        """Those of all of them."""
+        return ChainMap(*(dict(getattr(controller, "variables", {})) for controller in self.controllers))
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}

@@ -1,6 +1,7 @@
 """Executable `controller_node`: runs any controller, by name, beside the node `conveyor_sim`.
 
     controller_node --ros-args -p controller:=my_line.py:make -p parameters:="{table: accumulation}"
+    controller_node --ros-args -p controller:=program.st
 
 The simulation must wait (start_paused:=true) for a controller in lockstep; for one that runs free (mode:=free) it
 must play and output `signals`.
@@ -15,13 +16,14 @@ from typing import Any
 from conveyor_sim.support.interrupt import while_importing
 
 with while_importing():
-    from conveyor_sim.control.load import load
+    from conveyor_sim.control.line_tags import LineTags, bind
     from conveyor_sim.control.scan import ControlError, Controller
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
     from conveyor_sim.ros.declared import Entry, declare_table
     from conveyor_sim.scene.yaml_lines import Document
+    from conveyor_sim.st.load import load
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.stop_request import StopRequest
 
@@ -29,8 +31,8 @@ NAME = "controller"
 MODES = ("lockstep", "free")
 
 PARAMETERS = (
-    Entry("controller", "", "module:factory or file.py:factory."),
-    Entry("parameters", "", "The factory's parameters by name, as a YAML mapping."),
+    Entry("controller", "", "program.st, module:factory or file.py:factory."),
+    Entry("parameters", "", "The factory's parameters by name, as a YAML mapping; of a program tags, modbus_map."),
     Entry("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
     Entry("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
     Entry("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
@@ -48,7 +50,12 @@ def run(stop: StopRequest) -> None:
 
     def make(line: Any) -> Controller:
         try:
-            return load(given["controller"], parameters)
+            controller = load(given["controller"], parameters)
+            if line is not None:
+                kinds = dict(zip(line.tag_names, line.tag_kinds, strict=True))
+                named = ({name: kinds[name] for name in names} for names in (line.signal_names, line.command_names))
+                bind(controller, LineTags(*named))
+            return controller
         except ControlError as error:
             raise ConveyorError(str(error)) from error
 

@@ -13,8 +13,10 @@ from pathlib import Path
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
+from conveyor_sim.runs.controlled import Controlled
 from conveyor_sim.runs.force_check import PeakWatch
 from conveyor_sim.runs.speed import Spent
 from conveyor_sim.runs.stopped import keep_stopped
@@ -46,13 +48,19 @@ class Run:
 
 
 def run_scene(
-    scene: Scene, bag: Path | None, progress: Callable[[float], None] | None = None, threads: int | None = None
+    scene: Scene,
+    bag: Path | None,
+    progress: Callable[[float], None] | None = None,
+    threads: int | None = None,
+    controller: Controller | None = None,
 ) -> Run:
     """Runs a scene for its duration and records it to the folder `bag`, if given.
 
-    progress(simulated time, s) is called after every tick. threads: to step with, None has them chosen. Ctrl-C ends the
-    run at the next tick, with a whole bag; a second one ends the process.
-    Raises SceneError, SimulationError, and BagError if the recording can't be written.
+    progress(simulated time, s) is called after every tick. threads: to step with, None has them chosen.
+    controller: scans at every tick. Ctrl-C ends the run at the next tick, with a whole bag; a second one ends the
+    process.
+    Raises SceneError, SimulationError, BagError if the recording can't be written, and ConveyorError for a controller
+    that can't go on.
     """
     simulation = Simulation(scene, threads)
     recorder = Recorder(bag) if bag is not None else None
@@ -61,9 +69,12 @@ def run_scene(
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         peaks = PeakWatch(simulation)
+        controlled = None if controller is None else Controlled(simulation, controller)
         stepping, start = 0.0, time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             began = time.perf_counter()
+            if controlled is not None:
+                controlled.before_tick()
             try:
                 simulation.advance(1)
             except SimulationError as error:
@@ -71,7 +82,9 @@ def run_scene(
                 outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
                 raise keep_stopped(simulation, bag, error) from error
             stepping += time.perf_counter() - began
-            outputs.after_tick()
+            outcomes = outputs.after_tick()
+            if controlled is not None:
+                controlled.after_tick(outcomes)
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)

@@ -6,3 +6,21 @@ Python, and `compile.py` puts that together. `functions.py`, `conversions.py` an
 `operations.py` what code needs at run time. `program.py` runs it. What the standard leaves open is decided in
 docs/structured_text.md.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from conveyor_sim.st.controller import StructuredText
+
+__all__ = ["StructuredText"]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports `StructuredText` when it is first asked for: `load.py` is there without lark."""
+    if name == "StructuredText":
+        from conveyor_sim.st.controller import StructuredText
+
+        return StructuredText
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -52,6 +52,8 @@ class Compiled:
     globals: BlockType
     digest: str
     """Of the text: a snapshot fits the same program only."""
+    trace: bool
+    """Whether assignments note that they were the last to write."""
 
 
 def compile_file(path: Path, trace: bool = False) -> Compiled:
@@ -110,6 +112,7 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
         tuple(sorted(_schedule(source, programs, declared, calls), key=lambda one: one.priority)),
         declared.names.globals,
         hashlib.sha256(text.encode()).hexdigest(),
+        trace,
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
-from conveyor_sim.st.types import TIME, BlockType, Type
+from conveyor_sim.st.types import TIME, Type
 from conveyor_sim.st.values import NAMESPACE
 from conveyor_sim.st.variables import Variable, dump, leaves, load, retain
 
@@ -99,9 +99,15 @@ class Program:
             for name, way, leaf in leaves(kind, prefix):
                 yield name, Variable(owner, way, leaf)
 
-    def last_written(self, owner: Any, slot: str) -> tuple[int, int] | None:
-        """Line and column of the statement that wrote a variable last, for a program compiled to trace."""
-        return self._written.get((id(owner), slot))
+    def last_written(self, variable: Variable) -> str:
+        """File, line and column of the statement that wrote a variable last, "" if none did.
+
+        Raises StructuredTextError if the program was not compiled to trace.
+        """
+        if not self.compiled.trace:
+            raise StructuredTextError(f"{self.compiled.file}: found a program without a trace, expected trace=True")
+        at = self._written.get(variable.root())
+        return f"{self.compiled.file}:{at[0]}:{at[1]}" if at else ""
 
     # State
     def snapshot(self) -> dict[str, Any]:
@@ -148,6 +154,3 @@ def python_value(kind: Type, number: float) -> Any:
     if not kind.low <= whole <= kind.high:
         raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
     return whole
-
-
-__all__ = ["BUDGET", "BlockType", "Program", "python_value"]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from conveyor_sim.st.errors import StructuredTextError
-from conveyor_sim.st.operations import Attribute, Element
+from conveyor_sim.st.operations import Attribute, Element, Record
 from conveyor_sim.st.types import TIME, Array, BlockType, Structure, Type
 
 Step = str | int
@@ -33,6 +33,15 @@ class Variable:
             holder[self._last] = value
         else:
             setattr(holder, self._last, value)
+
+    def root(self) -> tuple[int, str]:
+        """The innermost instance of a unit on the way, and the variable of it that this is part of."""
+        owner, found = self._owner, (0, "")
+        for step in (*self._way, self._last):
+            if isinstance(step, str) and not isinstance(owner, Record):
+                found = id(owner), step
+            owner = owner[step] if isinstance(step, int) else getattr(owner, step)
+        return found
 
     def number(self) -> float:
         """Its value as a signal has it: a bool is 0 or 1, a TIME is in s, a text is its length."""

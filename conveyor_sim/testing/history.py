@@ -89,8 +89,8 @@ class History:
         return "" if unit == "1" else unit
 
     def kind(self, name: str) -> Kind:
-        """The type of a column; of an alarm it is bool."""
-        return "bool" if name.startswith(ALARMS) else self._kind[name]
+        """The type of a column; of an alarm it is bool, of a controller's variable number."""
+        return "bool" if name.startswith(ALARMS) else self._kind.get(name, "number")
 
     def begin_tick(self, time: float, signals: F8) -> None:
         """A tick is reached; commands, faults and alarms go on as they are."""
@@ -126,11 +126,18 @@ class History:
 
     def alarms(self, alarms: Mapping[str, float]) -> None:
         """The alarms of the last tick, by their whole names."""
-        for name, value in alarms.items():
+        self._note(alarms, 0.0)
+
+    def watch(self, variables: Mapping[str, float]) -> None:
+        """Variables of the controller at the last tick, by name; NaN until this is called with them."""
+        self._note(variables, math.nan)
+
+    def _note(self, columns: Mapping[str, float], before: float) -> None:
+        for name, value in columns.items():
             if name not in self._other_index:
                 self._other_index[name] = len(self._now)
-                self._now = np.append(self._now, 0.0)
-                self._others = np.hstack([self._others, np.zeros((len(self._others), 1))])
+                self._now = np.append(self._now, before)
+                self._others = np.hstack([self._others, np.full((len(self._others), 1), before)])
             self._set(name, value)
 
     def _set(self, name: str, value: float) -> None:

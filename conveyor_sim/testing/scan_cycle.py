@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.simulation import Simulation
@@ -49,9 +51,22 @@ class ScanCycle:
         """Whether anything scans."""
         return self._controller is not None
 
+    @property
+    def variables(self) -> Mapping[str, float]:
+        """Those that the controller shows to conditions."""
+        shown: Mapping[str, float] = getattr(self._controller, "variables", {})
+        return shown
+
+    def with_variables(self, signals: Mapping[str, float]) -> Mapping[str, float]:
+        """Signals, and the controller's variables behind them."""
+        return _Behind(signals, self.variables) if self.variables else signals
+
     def attach(self, controller: Controller) -> None:
         """Have a controller scan, in place of what did."""
         self.close()
+        image = self._simulation.process_image
+        kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
+        bind(controller, LineTags(*kinds))
         self._controller = controller
         if declared := declared_alarms(controller):
             ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
@@ -134,3 +149,19 @@ class ScanCycle:
         """What became of inputs at a tick."""
         if self._node is not None:
             self._node.note(outcomes)
+
+
+class _Behind(Mapping[str, float]):
+    """Two mappings as one, without a copy: a program's variables are read when a condition asks for them."""
+
+    def __init__(self, first: Mapping[str, float], second: Mapping[str, float]) -> None:
+        self._first, self._second = first, second
+
+    def __getitem__(self, name: str) -> float:
+        return self._first[name] if name in self._first else self._second[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return chain(self._first, self._second)
+
+    def __len__(self) -> int:
+        return len(self._first) + len(self._second)

@@ -114,8 +114,10 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     @property
     def signals(self) -> Present:
-        """The present signals by name, alarms among them ("alarms/<id>"), 1 while they stand."""
-        return self._present({**self._signals, **self._alarms})
+        """The present signals by name, alarms among them ("alarms/<id>"), 1 while they stand, and the variables of a
+        PLC program (plc/main/speed).
+        """
+        return self._present(self._cycle.with_variables({**self._signals, **self._alarms}))
 
     @property
     def alarms(self) -> frozenset[str]:
@@ -345,6 +347,7 @@ class Scenario(AbstractContextManager["Scenario"]):
             self._scan()
         for assertion in self._standing:
             self._check(assertion)
+        self._watch()
 
     def _look(self) -> None:
         """Read the signals of a tick that is reached."""
@@ -355,6 +358,11 @@ class Scenario(AbstractContextManager["Scenario"]):
         if alarms.changed:
             self._alarms |= alarms.said()
             self.history.alarms(self._alarms)
+
+    def _watch(self) -> None:
+        """Note the controller's variables that conditions have read: the history has them from then on."""
+        variables = self._cycle.variables
+        self.history.watch({name: variables[name] for name in self._read if name in variables})
 
     def _scan(self) -> None:
         said = self._cycle.scan(self._present(self._signals))

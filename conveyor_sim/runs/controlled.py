@@ -1,0 +1,55 @@
+"""A controller in a run without ROS: it scans at every tick, as one that is attached to a scenario does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from conveyor_sim.control.line_tags import LineTags, bind
+from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs, declared_alarms
+from conveyor_sim.errors import CommandError, ConveyorError
+from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.simulation import Simulation
+
+SOURCE = "controller"
+"""Of its commands, in the bag's outcomes."""
+
+
+class Controlled:
+    """A simulation with a controller: `before_tick`, then the tick, then `after_tick` with what became of inputs."""
+
+    def __init__(self, simulation: Simulation, controller: Controller) -> None:
+        """Raises ConveyorError for a controller that does not fit the line."""
+        self._simulation, self._controller = simulation, controller
+        self._names = simulation.process_image.signal_names
+        self._changes = AlarmChanges()
+        image = simulation.process_image
+        kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
+        try:
+            bind(controller, LineTags(*kinds))
+            declared = declared_alarms(controller)
+        except ControlError as error:
+            raise ConveyorError(str(error)) from error
+        if declared:
+            ids, texts = tuple(one.id for one in declared), tuple(one.as_text() for one in declared)
+            simulation.give(Input(SOURCE, type(controller).__name__, "controller", DECLARE, ids, (), texts))
+
+    def before_tick(self) -> None:
+        """One scan, and its commands. Raises ConveyorError for one that can't go on."""
+        simulation = self._simulation
+        signals = dict(zip(self._names, simulation.signals().tolist(), strict=True))
+        inputs = Inputs(signals, simulation.time, simulation.tick, simulation.scene.tick)
+        try:
+            answer = self._controller.scan(inputs)
+        except ControlError as error:
+            raise ConveyorError(f"at {simulation.time:.2f} s: {error}") from error
+        commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+        commands |= self._changes.of(answer)
+        if commands:
+            names, values = tuple(commands), tuple(commands.values())
+            simulation.command(names, values, SOURCE, writer=type(self._controller).__name__)
+
+    def after_tick(self, outcomes: Sequence[CommandOutcome]) -> None:
+        """Raises CommandError for a command that was refused."""
+        refused = [one.reason for one in outcomes if one.source == SOURCE and not one.accepted]
+        if refused:
+            raise CommandError(f"at {self._simulation.time:.2f} s a command was refused: {'; '.join(refused)}")

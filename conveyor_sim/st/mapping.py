@@ -1,0 +1,190 @@
+"""Which variable is which tag of a line: by a pragma, by the caller's word, by its address in a map, by its name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.scan import ALARMS
+from conveyor_sim.st.compile import Compiled
+from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.st.types import ELEMENTARY, Member, Type
+
+_ADDRESS = re.compile(r"%([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?")
+_WIDTHS = {"X": "bool", "": "bool", "W": 16, "D": 32, "L": 64}
+_TABLES = {
+    ("I", True): "discrete input",
+    ("Q", True): "coil",
+    ("I", False): "input register",
+    ("Q", False): "holding register",
+}
+
+Addresses = Mapping[tuple[str, int], tuple[str, object]]
+"""Tag and type in Modbus by table and address."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A variable that is a tag."""
+
+    variable: str
+    """Its whole name: main/speed."""
+    tag: str
+    type: Type
+    is_input: bool
+    how: str
+    """tag, address or name."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """All of a program's; and what is left over on either side."""
+
+    bound: tuple[Bound, ...]
+    variables: tuple[str, ...]
+    """Inputs, outputs and located variables without a tag."""
+    commands: tuple[str, ...]
+    """Commands of the line that the program does not give."""
+
+    def __str__(self) -> str:
+        lines = [f"{one.variable} {'<-' if one.is_input else '->'} {one.tag} (by {one.how})" for one in self.bound]
+        lines += [f"{name}: no tag" for name in self.variables]
+        lines += [f"{name}: a command that the program does not give" for name in self.commands]
+        return "\n".join(lines)
+
+
+def read_addresses(path: Path) -> Addresses:
+    """A Modbus map (docs/scada.md), by table and address. Raises MapError."""
+    from conveyor_sim.scada.modbus_map import GONE, WORDS, read_map
+
+    return {
+        (row.table, row.address): (row.name, "bool" if row.type == "bool" else 16 * WORDS[row.type])
+        for row in read_map(path)
+        if row.description != GONE
+    }
+
+
+def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], addresses: Addresses) -> Mapped:
+    """The mapping of a program on a line.
+
+    given: tags by variable. Raises StructuredTextError for a variable or tag that there is not, for a type that does
+    not fit, for a direction that can't be, and for a command that two variables give.
+    """
+    file = compiled.file
+    known = {name: member for name, member, _ in _candidates(compiled)}
+    for name in given:
+        if name.lower() not in known:
+            raise StructuredTextError(
+                f"{file}: found {name} among the tags, expected one of {', '.join(known) or 'none'}"
+            )
+    wanted = {name.lower(): tag for name, tag in given.items()}
+    by_identifier = _by_identifier(tags)
+    bound: list[Bound] = []
+    left: list[str] = []
+    for name, member, shared in _candidates(compiled):
+        where = f"{file}:{member.at[0]}:{member.at[1]}: {member.name}"
+        tag, how = wanted.get(name) or member.tag, "tag"
+        if not tag and member.address:
+            tag, how = _located(where, member, addresses), "address"
+        if not tag and (member.section in ("VAR_INPUT", "VAR_OUTPUT") or shared) and not member.constant:
+            tag, how = by_identifier.get(member.name.lower(), ""), "name"
+        if tag:
+            bound.append(_checked(where, name, member, tag, how, tags))
+        elif member.address or member.section in ("VAR_INPUT", "VAR_OUTPUT"):
+            left.append(name)
+    given_by: dict[str, str] = {}
+    for one in bound:
+        if not one.is_input and one.tag in given_by:
+            both = f"{given_by[one.tag]} and {one.variable}"
+            raise StructuredTextError(f"{file}: {one.tag}: found {both} for it, expected one variable")
+        if not one.is_input:
+            given_by[one.tag] = one.variable
+    return Mapped(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in given_by))
+
+
+def _candidates(compiled: Compiled) -> Iterator[tuple[str, Member, bool]]:
+    """Variables that may be tags, by their whole names; and whether they are global."""
+    for member in compiled.globals.members.values():
+        yield member.name.lower(), member, True
+    for program in compiled.programs:
+        for member in program.type.members.values():
+            if member.section != "VAR_EXTERNAL":
+                yield f"{program.name.lower()}/{member.name.lower()}", member, False
+
+
+def _by_identifier(tags: LineTags) -> dict[str, str]:
+    """Tags by what they are called as a variable: belts_zone1_cmd_speed. Those that two would have are left out."""
+    found: dict[str, str] = {}
+    for tag in (*tags.signals, *tags.commands):
+        name = re.sub(r"\W", "_", tag).lower()
+        found[name] = "" if name in found else tag
+    return found
+
+
+def _located(where: str, member: Member, addresses: Addresses) -> str:
+    match = _ADDRESS.fullmatch(member.address)
+    if match is None:
+        raise StructuredTextError(f"{where}: found {member.address}, expected an address such as %IX0.3, %IW5 or %QD2")
+    area, size, number, bit = match.groups()
+    if area == "M":
+        return ""
+    if size == "B" or (bit is not None and (size not in ("X", "") or int(bit) > 7)):
+        raise StructuredTextError(
+            f"{where}: found {member.address}, expected %IX with a bit from 0 to 7, or %IW, %ID, %IL"
+        )
+    width = _WIDTHS[size]
+    address = int(number) * 8 + int(bit) if bit is not None else int(number)
+    table = _TABLES[area, width == "bool"]
+    if (found := addresses.get((table, address))) is None:
+        return ""
+    tag, there = found
+    if there != width:
+        expected = "one bit" if there == "bool" else f"{there} bits"
+        raise StructuredTextError(
+            f"{where}: found {member.address} for {tag}, expected {expected} at {table} {address}"
+        )
+    return tag
+
+
+def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> Bound:
+    inward = member.section == "VAR_INPUT" or member.address.startswith("%I")
+    outward = member.section == "VAR_OUTPUT" or member.address.startswith("%Q")
+    is_alarm = tag.startswith(ALARMS) and not inward
+    if is_alarm:
+        kind, is_input = "bool", False
+    elif tag in tags.signals:
+        kind, is_input = tags.signals[tag], True
+    elif tag in tags.commands:
+        kind, is_input = tags.commands[tag], False
+    else:
+        first = tag.split("/")[0] + "/"
+        alike = [one for one in (*tags.signals, *tags.commands) if one.startswith(first)]
+        listed = f"one of {', '.join(alike[:20])}" if alike else f"a tag of this line, which has no {first}"
+        raise StructuredTextError(f"{where}: found {tag}, expected {listed}")
+    if (is_input and outward) or (inward and not is_input):
+        direction = "a command" if outward else "a signal"
+        raise StructuredTextError(f"{where}: found {tag}, expected {direction}")
+    if member.constant:
+        raise StructuredTextError(f"{where}: found a CONSTANT for {tag}, expected a variable")
+    if not _suits(member.type, kind):
+        wanted = {"bool": "BOOL", "number": "REAL or LREAL (TIME for seconds)"}.get(kind, "an integer type")
+        raise StructuredTextError(f"{where}: found {member.type.name} for {tag}, a {kind}, expected {wanted}")
+    return Bound(name, tag, member.type, is_input, how)
+
+
+def _suits(kind: Type, tag: str) -> bool:
+    """Whether a variable can hold a tag's values; the kind of a tag is "" where it is not known."""
+    base = kind.base
+    if base.name not in ELEMENTARY and base.kind != "enum":
+        return False
+    allowed = {
+        "bool": ("bool",),
+        "number": ("real", "time"),
+        "count": ("int", "real"),
+        "enumeration": ("int", "enum", "bits"),
+        "": ("bool", "int", "real", "bits", "enum", "time"),
+    }
+    return base.kind in allowed[tag]

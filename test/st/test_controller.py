@@ -1,0 +1,244 @@
+"""A program as the controller of a line: what is mapped, what is refused, what tests see and keep of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.scan import Inputs, together
+from conveyor_sim.scada.modbus_map import modbus_map, to_csv
+from conveyor_sim.st.controller import StructuredText
+from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.testing import Scenario
+from conveyor_sim.testing.evidence import draw_moment
+
+TAGS = LineTags(
+    signals={
+        "belts/a/speed": "number",
+        "photo_eyes/e/blocked": "bool",
+        "zones/z/bottles": "count",
+        "machines/m/state": "enumeration",
+    },
+    commands={"belts/a/cmd_speed": "number", "machines/m/run": "bool"},
+)
+TABLE = Path(__file__).parent.parent / "testing" / "table.yaml"
+PROGRAMS = Path(__file__).parent.parent.parent / "examples" / "st"
+
+
+def controller(tmp_path: Path, declare: str, body: str = ";", **options: object) -> StructuredText:
+    path = tmp_path / "program.st"
+    path.write_text(declare if declare.startswith("CONF") else f"PROGRAM main {declare}\n{body}\nEND_PROGRAM\n")
+    return StructuredText(path, **options)  # type: ignore[arg-type]
+
+
+def bound(tmp_path: Path, declare: str, body: str = ";", **options: object) -> StructuredText:
+    made = controller(tmp_path, declare, body, **options)
+    made.bind(TAGS)
+    return made
+
+
+def scan(plc: StructuredText, tick: int, **signals: float) -> dict[str, float]:
+    names = {"speed": "belts/a/speed", "eye": "photo_eyes/e/blocked", "count": "zones/z/bottles"}
+    values = dict.fromkeys(TAGS.signals, 0.0) | {names[name]: value for name, value in signals.items()}
+    return dict(plc.scan(Inputs(values, tick * 0.01, tick, 0.01)))
+
+
+def test_variables_are_tags_by_pragma_by_name_and_by_word(tmp_path: Path) -> None:
+    plc = bound(
+        tmp_path,
+        "VAR_INPUT {tag: zones/z/bottles} n : INT; photo_eyes_e_blocked : BOOL; x : LREAL; lost : BOOL; END_VAR "
+        "VAR_OUTPUT belts_a_cmd_speed : LREAL; {tag: alarms/full} full : BOOL; END_VAR",
+        "belts_a_cmd_speed := x + n; full := photo_eyes_e_blocked;",
+        tags={"main/x": "belts/a/speed"},
+    )
+    assert scan(plc, 0, count=3, speed=0.25, eye=1) == {"belts/a/cmd_speed": 3.25, "alarms/full": 1.0}
+    assert str(plc.mapping).splitlines() == [
+        "main/n <- zones/z/bottles (by tag)",
+        "main/photo_eyes_e_blocked <- photo_eyes/e/blocked (by name)",
+        "main/x <- belts/a/speed (by tag)",
+        "main/belts_a_cmd_speed -> belts/a/cmd_speed (by name)",
+        "main/full -> alarms/full (by tag)",
+        "main/lost: no tag",
+        "machines/m/run: a command that the program does not give",
+    ]
+
+
+def test_located_variables_are_tags_by_their_address_in_the_modbus_map(tmp_path: Path) -> None:
+    plant = Scenario(TABLE)
+    rows = modbus_map(plant.simulation.process_image.tags)
+    kept = tmp_path / "map.csv"
+    kept.write_text(to_csv(rows))
+    where = {row.name: row for row in rows}
+    eye, speed = where["photo_eyes/high/blocked"], where["belts/table/cmd_speed"]
+    plc = controller(
+        tmp_path,
+        f"VAR eye AT %IX{eye.address // 8}.{eye.address % 8} : BOOL; speed AT %QD{speed.address} : REAL; END_VAR",
+        "speed := SEL(eye, 0.25, 0.0);",
+        modbus_map=kept,
+    )
+    plant.attach(plc)
+    plant.run_for(0.05)
+    assert plant.history["belts/table/cmd_speed"][-1] == 0.25
+    assert "main/eye <- photo_eyes/high/blocked (by address)" in str(plc.mapping)
+    wrong = controller(tmp_path, f"VAR speed AT %QW{speed.address} : INT; END_VAR", modbus_map=kept)
+    with pytest.raises(StructuredTextError, match=r"found %QW\d+ for belts/table/cmd_speed, expected 32 bits"):
+        plant.attach(wrong)
+
+
+@pytest.mark.parametrize(
+    ("declare", "text"),
+    [
+        ("VAR_OUTPUT {tag: belts/a/speed} x : LREAL; END_VAR", "found belts/a/speed, expected a command"),
+        ("VAR_INPUT {tag: belts/a/cmd_speed} x : LREAL; END_VAR", "found belts/a/cmd_speed, expected a signal"),
+        ("VAR {tag: belts/b/speed} x : LREAL; END_VAR", "expected one of belts/a/speed, belts/a/cmd_speed"),
+        ("VAR {tag: belts/a/speed} x : INT; END_VAR", "found INT for belts/a/speed, a number, expected REAL or LREAL"),
+        (
+            "VAR {tag: zones/z/bottles} x : BOOL; END_VAR",
+            "found BOOL for zones/z/bottles, a count, expected an integer",
+        ),
+        (
+            "VAR {tag: machines/m/run} x : BOOL; {tag: machines/m/run} y : BOOL; END_VAR",
+            "machines/m/run: found main/x and main/y for it, expected one variable",
+        ),
+    ],
+)
+def test_a_mapping_that_can_not_be_is_refused_before_the_first_scan(tmp_path: Path, declare: str, text: str) -> None:
+    with pytest.raises(StructuredTextError) as caught:
+        bound(tmp_path, declare)
+    assert text in str(caught.value)
+
+
+def test_a_signal_that_a_variable_can_not_hold_stops_the_program(tmp_path: Path) -> None:
+    plc = bound(tmp_path, "VAR {tag: zones/z/bottles} n : SINT; END_VAR")
+    with pytest.raises(StructuredTextError, match=r"zones/z/bottles: found 200, expected SINT, -128 to 127"):
+        scan(plc, 0, count=200)
+
+
+TASKS = """CONFIGURATION c
+  TASK slow (INTERVAL := T#30ms, PRIORITY := 1);
+  PROGRAM main WITH slow : counts;
+END_CONFIGURATION
+PROGRAM counts VAR RETAIN n : INT; END_VAR VAR m : INT; t : TON; END_VAR
+VAR_OUTPUT {tag: belts/a/cmd_speed} x : LREAL; END_VAR
+n := n + 1; m := m + 1; t(IN := TRUE, PT := T#60ms); x := n;
+END_PROGRAM
+"""
+
+
+def test_a_task_runs_at_its_interval_and_its_outputs_hold(tmp_path: Path) -> None:
+    plc = bound(tmp_path, TASKS)
+    assert [scan(plc, tick)["belts/a/cmd_speed"] for tick in range(7)] == [1, 1, 1, 2, 2, 2, 3]
+
+
+def test_an_interval_is_a_multiple_of_the_scan(tmp_path: Path) -> None:
+    plc = bound(tmp_path, TASKS.replace("30ms", "25ms"))
+    with pytest.raises(StructuredTextError, match="INTERVAL 25 ms, expected a multiple of a scan, 10 ms"):
+        scan(plc, 0)
+
+
+def test_a_snapshot_goes_on_as_the_program_would_have(tmp_path: Path) -> None:
+    plc = bound(tmp_path, TASKS)
+    for tick in range(5):
+        scan(plc, tick)
+    kept = json.loads(json.dumps(plc.snapshot()))
+    other = bound(tmp_path, TASKS)
+    other.restore(kept)
+    for tick in range(5, 20):
+        assert scan(plc, tick) == scan(other, tick)
+    assert dict(plc.variables) == dict(other.variables)
+    assert plc.variables["plc/main/t/q"] == 1.0
+
+
+def test_a_snapshot_of_another_program_is_refused(tmp_path: Path) -> None:
+    kept = bound(tmp_path, TASKS).snapshot()
+    with pytest.raises(StructuredTextError, match="found a snapshot of another program"):
+        bound(tmp_path, TASKS.replace("n + 1", "n + 2")).restore(kept)
+
+
+def test_a_warm_restart_keeps_what_is_retained_and_a_cold_one_nothing(tmp_path: Path) -> None:
+    plc = bound(tmp_path, TASKS)
+    for tick in range(7):
+        scan(plc, tick)
+    plc.restart(warm=True)
+    assert scan(plc, 7) == {"belts/a/cmd_speed": 4.0}
+    assert plc.variables["plc/main/m"] == 1
+    plc.restart()
+    assert scan(plc, 8) == {"belts/a/cmd_speed": 1.0}
+
+
+def test_a_variable_is_forced_and_let_go(tmp_path: Path) -> None:
+    plc = bound(tmp_path, TASKS.replace("30ms", "10ms"))
+    plc.force("plc/main/n", 100)
+    assert [scan(plc, tick)["belts/a/cmd_speed"] for tick in range(3)] == [101, 101, 101]
+    plc.unforce("plc/main/n")
+    assert scan(plc, 3) == {"belts/a/cmd_speed": 101.0}
+    with pytest.raises(StructuredTextError, match="plc/main/k: no such variable"):
+        plc.force("plc/main/k", 1)
+
+
+def test_a_trace_knows_the_statement_that_wrote_last(tmp_path: Path) -> None:
+    body = "IF eye THEN\n  x := 1.0;\nELSE\n  x := 2.0;\nEND_IF;\nv[2] := 3;\nt(IN := eye, Q => q);"
+    declare = (
+        "VAR {tag: photo_eyes/e/blocked} eye : BOOL; {tag: belts/a/cmd_speed} x : LREAL; q : BOOL; y : INT; "
+        "v : ARRAY [1..3] OF INT; t : TON; END_VAR"
+    )
+    plc = bound(tmp_path, declare, body, trace=True)
+    scan(plc, 0)
+    assert plc.last_written("plc/main/x").endswith("program.st:5:3")
+    scan(plc, 1, eye=1)
+    assert plc.last_written("plc/main/x").endswith("program.st:3:3")
+    assert plc.last_written("plc/main/v[2]").endswith("program.st:7:1")
+    assert plc.last_written("plc/main/q").endswith("program.st:8:1")
+    assert plc.last_written("plc/main/y") == ""
+    with pytest.raises(StructuredTextError, match="expected trace=True"):
+        bound(tmp_path, declare, body).last_written("plc/main/x")
+
+
+def test_two_of_one_program_share_nothing(tmp_path: Path) -> None:
+    one, other = bound(tmp_path, TASKS), bound(tmp_path, TASKS)
+    for tick in range(4):
+        scan(one, tick)
+    assert scan(other, 0) == {"belts/a/cmd_speed": 1.0}
+
+
+def test_conditions_read_variables_and_the_picture_shows_them(tmp_path: Path) -> None:
+    plant = Scenario(TABLE)
+    plant.attach(together(StructuredText(PROGRAMS / "table.st")))
+    plant.inject("machines/packer/stop")
+    plant.eventually(lambda s: s["plc/table/held"], within=40)
+    with pytest.raises(AssertionError, match="plc/table/free/et = 0") as caught:
+        plant.eventually(lambda s: s["plc/table/free/et"] > 1.0, within=0.5)
+    assert "plc/table/free/et" in str(caught.value)
+    assert plant.history["plc/table/held"][-1] == 1.0
+    assert draw_moment(plant, tmp_path / "line.png").stat().st_size > 0
+
+
+def fill(plant: Scenario, program: Path) -> None:
+    plant.attach(StructuredText(program))
+    plant.inject("machines/packer/stop")
+    plant.eventually(lambda s: s["alarms/table full"], within=40)
+
+
+def test_the_documented_line_and_its_fault(tmp_path: Path) -> None:
+    """docs/testing_control_logic.md: what is to clear the eye is stopped by the eye."""
+    faulty = tmp_path / "faulty.st"
+    faulty.write_text((PROGRAMS / "table.st").read_text().replace("table_speed := 0.4", "table_speed := feeder_speed"))
+    for program, goes_on in ((PROGRAMS / "table.st", True), (faulty, False)):
+        plant = Scenario(TABLE)
+        fill(plant, program)
+        plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
+        plant.inject("machines/packer/stop", 0)
+        if goes_on:
+            plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
+        else:
+            with pytest.raises(AssertionError, match="did not come true"):
+                plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
+
+
+def test_a_program_that_stops_says_where(tmp_path: Path) -> None:
+    plc = bound(tmp_path, "VAR n : INT; END_VAR", "WHILE TRUE DO\n  n := n + 1;\nEND_WHILE")
+    with pytest.raises(StructuredTextError, match=r"program\.st:2:1: watchdog: found more than 100000"):
+        scan(plc, 0)
