@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,9 @@ from click.testing import CliRunner
 
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError
+from conveyor_sim.st import StructuredText
 from conveyor_sim.st.load import load
+from conveyor_sim.testing import Scenario
 
 PROGRAMS = Path(__file__).parent.parent.parent / "examples" / "st"
 TABLE = Path(__file__).parent.parent / "testing" / "table.yaml"
@@ -60,3 +63,16 @@ def test_parameters_of_a_program_are_tags_and_a_map(tmp_path: Path) -> None:
         load(str(program), {"speed": 1})
     with pytest.raises(ControlError, match="no such file"):
         load("nowhere.st")
+
+
+def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached() -> None:
+    pytest.importorskip("rclpy")
+    program = PROGRAMS / "table.st"
+    node = [sys.executable, "-m", "conveyor_sim.ros.controller_node", "--ros-args", "-p", f"controller:={program}"]
+    hashes = []
+    for attach in (lambda plant: plant.attach(StructuredText(program)), lambda plant: plant.attach_node(node)):
+        with Scenario(TABLE) as plant:
+            attach(plant)
+            plant.run_for(2.0)
+            hashes.append(plant.simulation.state_hash())
+    assert hashes[0] == hashes[1]
