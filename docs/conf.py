@@ -41,7 +41,10 @@ default_role = "code"  # docstrings are Markdown in this
 STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
-        "First steps": ["docs/build_a_line", "docs/testing_control_logic", "docs/ros", "docs/scada", "docs/plc"],
+        "First steps": [
+            *("docs/build_a_line", "docs/testing_control_logic", "docs/ros"),
+            *("docs/scada", "docs/opcua", "docs/plc"),
+        ],
         "A line": [
             *("docs/scene", "docs/line", "docs/alarms", "docs/report", "docs/view"),
             *("docs/effects", "docs/base", "docs/energy_and_damage"),

@@ -18,6 +18,7 @@ with while_importing():
     from conveyor_sim.cli.run import run
     from conveyor_sim.cli.scenes import check, explain, tags
     from conveyor_sim.cli.serve import serve
+    from conveyor_sim.cli.user import user
     from conveyor_sim.cli.view import view
     from conveyor_sim.errors import ConveyorError
     from conveyor_sim.support.printable import printable_lines
@@ -54,5 +55,5 @@ def main(context: click.Context) -> None:
     context.with_resource(HandledOnce([signal.SIGINT], signal.default_int_handler))
 
 
-for command in (check, tags, explain, run, serve, accuracy, recover, replay, events, report, plot, view):
+for command in (check, tags, explain, run, serve, user, accuracy, recover, replay, events, report, plot, view):
     main.add_command(command)

@@ -2,27 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.face import Face, Stamps
 from conveyor_sim.scada.modbus_map import Row, modbus_map
 from conveyor_sim.scada.server_thread import ServerThread
 
 if TYPE_CHECKING:
     from conveyor_sim.scada.modbus_server import ModbusServer
+    from conveyor_sim.scada.opcua.server import OpcUaServer
+    from conveyor_sim.scada.opcua.users import Role
     from conveyor_sim.testing.scenario import Scenario
 
 MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
+OPCUA_MISSING = "asyncua is not installed: pip install 'conveyor_sim[scada]'"
 
 
-class ModbusFaces(AbstractContextManager["ModbusFaces"]):
-    """What the fixture `modbus` is: called, it serves a line to Modbus TCP clients on this machine."""
+class _Faces:
+    """Those of one test."""
 
     def __init__(self) -> None:
         self._thread: ServerThread | None = None
-        self._servers: list[ModbusServer] = []
+        self._servers: list[Face] = []
+
+    def _start(self, server: Face) -> None:
+        self._thread = self._thread or ServerThread()
+        self._thread.run(server.start())
+        self._servers.append(server)
+
+    def close(self) -> None:
+        """End all of them."""
+        if self._thread is not None:
+            for server in self._servers:
+                self._thread.run(server.stop())
+            self._thread.close()
+            self._thread, self._servers = None, []
+
+
+class ModbusFaces(_Faces, AbstractContextManager["ModbusFaces"]):
+    """What the fixture `modbus` is: called, it serves a line to Modbus TCP clients on this machine."""
 
     def __call__(
         self, line: Scenario, role: WriterKind | None = None, rows: Sequence[Row] | None = None
@@ -35,20 +58,39 @@ class ModbusFaces(AbstractContextManager["ModbusFaces"]):
         """
         from conveyor_sim.scada.modbus_server import ModbusServer
 
-        self._thread = self._thread or ServerThread()
         source = line.source()
         server = ModbusServer(source, modbus_map(source.about.tags) if rows is None else rows, role)
-        self._thread.run(server.start())
-        self._servers.append(server)
+        self._start(server)
         return server
-
-    def close(self) -> None:
-        """End all of them."""
-        if self._thread is not None:
-            for server in self._servers:
-                self._thread.run(server.stop())
-            self._thread.close()
-            self._thread, self._servers = None, []
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
+    """What the fixture `opcua` is: called, it serves a line to OPC UA clients on this machine."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._folder = TemporaryDirectory(prefix="opcua_")
+
+    def __call__(
+        self, line: Scenario, users: Mapping[str, tuple[Role, str]] | None = None, stamps: Stamps = "simulated"
+    ) -> OpcUaServer:
+        """Serve a line from now on; `.address` of what is returned is where.
+
+        users: who may do more than read, by name, each with role and password. stamps: what the times of values are.
+        What clients write acts at the next tick that the test lets pass. The certificate is one for the test. Raises
+        FaceError if there is no port, ImportError without asyncua.
+        """
+        from conveyor_sim.scada.opcua.server import OpcUaServer
+        from conveyor_sim.scada.opcua.users import new_user
+
+        known = {name: new_user(role, password) for name, (role, password) in (users or {}).items()}
+        server = OpcUaServer(line.source(), known, stamps=stamps, certificates=Path(self._folder.name) / "own")
+        self._start(server)
+        return server
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+        self._folder.cleanup()

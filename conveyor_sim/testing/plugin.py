@@ -1,4 +1,4 @@
-"""The pytest plugin: the fixtures `line`, `warm_start` and `modbus`, and what a test leaves that fails or is killed.
+"""The pytest plugin: fixtures (`line`, `warm_start`, `modbus`, `opcua`), and what a test leaves that fails or is killed.
 
 pytest loads it in every run by the entry point pytest11, so nothing of the simulation is imported until a test asks
 for a fixture. setup.py names it there by its module, so that `-p` of the same name does not load it twice.
@@ -19,7 +19,7 @@ import pytest
 
 if TYPE_CHECKING:
     from conveyor_sim.scene import Scene
-    from conveyor_sim.testing.faces import ModbusFaces
+    from conveyor_sim.testing.faces import ModbusFaces, OpcUaFaces
     from conveyor_sim.testing.scenario import Scenario
 
 DEFAULT_FOLDER = "line-failures"
@@ -168,6 +168,19 @@ def modbus() -> Iterator[ModbusFaces]:
     if find_spec("pymodbus") is None:
         pytest.skip(MODBUS_MISSING)
     with ModbusFaces() as faces:
+        yield faces
+
+
+@pytest.fixture
+def opcua() -> Iterator[OpcUaFaces]:
+    """Serves lines to OPC UA clients: `opcua(my_line, users={"jo": ("operator", "secret")}).address`. Skips a test
+    without asyncua.
+    """
+    from conveyor_sim.testing.faces import OPCUA_MISSING, OpcUaFaces
+
+    if find_spec("asyncua") is None:
+        pytest.skip(OPCUA_MISSING)
+    with OpcUaFaces() as faces:
         yield faces
 
 

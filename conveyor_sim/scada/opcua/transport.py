@@ -133,3 +133,10 @@ class BoundedServer(Server):
             await self.iserver.stop()
             raise
         return self.bserver.port
+
+    async def stop(self) -> None:
+        """The library waits for its clock, a second."""
+        clock, self.iserver.time_task = self.iserver.time_task, None
+        if clock is not None:
+            clock.cancel()
+        await super().stop()

@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple, get_args
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.printable import printable
 
 Role = Literal["viewer", "operator", "engineer", "controller", "test"]
@@ -93,6 +93,18 @@ def read_users(path: Path) -> dict[str, User]:
             raise UsersError(f"{where}: salt and hash of {name} can't be read, as `conveyor-sim user` writes them")
         users[name] = user
     return users
+
+
+def keep_user(path: Path, name: str, user: User) -> None:
+    """Add a user to a file, in place of one of the same name; all else in it stays. Raises UsersError."""
+    line, lines = line_of(name, user), []
+    if path.exists():
+        read_users(path)
+        lines = [kept for kept in path.read_text().splitlines() if kept.partition(":")[0].strip() != name]
+    try:
+        write_file(path, "".join(f"{kept}\n" for kept in (*lines, line)).encode())
+    except FileError as error:
+        raise UsersError(f"{path}: {error}, expected a file of users") from error
 
 
 def authenticate(users: Mapping[str, User], name: str, password: str) -> User | None:

@@ -102,7 +102,14 @@ Serve = Callable[..., Any]
 
 @pytest.fixture
 def serve(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
-    """Serves a scene: `serve("zoned_line", stamps="simulated")`."""
+    """Serves a scene: `serve(stamps="simulated")`."""
+    with serving(certificates, users) as make:
+        yield make
+
+
+@contextmanager
+def serving(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
+    """What `serve` is, for as long as is wanted."""
     with ServerThread() as thread:
         lines: list[Line] = []
 
@@ -132,6 +139,13 @@ def line(serve: Serve) -> Line:
     """The zoned line."""
     made: Line = serve()
     return made
+
+
+@pytest.fixture(scope="module")
+def still(certificates: Path, users: dict[str, User]) -> Iterator[Line]:
+    """The same for tests that don't change it: to start a server takes a second or two."""
+    with serving(certificates, users) as make:
+        yield make()
 
 
 @contextmanager

@@ -55,20 +55,20 @@ PACKETS = {
 }
 
 
-def test_packets_that_are_none_are_answered_by_the_end_of_the_connection(line: Line) -> None:
+def test_packets_that_are_none_are_answered_by_the_end_of_the_connection(still: Line) -> None:
     for name, packet in PACKETS.items():
-        with raw(line) as connection:
+        with raw(still) as connection:
             connection.sendall(packet)
             connection.shutdown(socket.SHUT_WR)
             answer = closed(connection)
         assert answer == b"" or answer[:3] == b"ERR", name
-    line.client()
-    line.advance()
+    still.client()
+    still.advance()
 
 
-def test_a_message_without_end_is_not_kept(line: Line) -> None:
+def test_a_message_without_end_is_not_kept(still: Line) -> None:
     """Its header says four gigabytes."""
-    with raw(line) as connection:
+    with raw(still) as connection:
         connection.sendall(struct.pack("<3scII", b"MSG", b"F", 2**32 - 1, 0))
         sent = 0
         try:
@@ -77,7 +77,7 @@ def test_a_message_without_end_is_not_kept(line: Line) -> None:
         except (BrokenPipeError, ConnectionResetError):
             pass
         assert sent < 1000 * CHUNK
-    line.advance()
+    still.advance()
 
 
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
@@ -90,19 +90,20 @@ def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
     assert line.client().get_node(f"ns=2;s={SETPOINT}").read_value() is not None
 
 
-def test_who_begins_no_session_is_not_waited_for(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_begins_no_session_is_not_waited_for(still: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport, "ACTIVATION", 0.2)
-    with raw(line) as silent, raw(line) as half:
+    others = still.server.status().clients
+    with raw(still) as silent, raw(still) as half:
         half.sendall(HELLO)
         assert closed(silent) == b"" and closed(half)[:3] == b"ACK"
-    line.until(lambda: line.server.status().clients == 0)
+    still.until(lambda: still.server.status().clients == others)
 
 
-def test_one_connection_begins_one_session(line: Line) -> None:
+def test_one_connection_begins_one_session(still: Line) -> None:
     """The library would keep each for ever."""
 
     async def come() -> int:
-        client = AsyncClient(line.server.address, timeout=PATIENCE)
+        client = AsyncClient(still.server.address, timeout=PATIENCE)
         async with client:
             before = len(sessions())
             for _ in range(5):
@@ -111,7 +112,7 @@ def test_one_connection_begins_one_session(line: Line) -> None:
             return len(sessions()) - before
 
     def sessions() -> dict[object, object]:
-        found: dict[object, object] = line.server._server.iserver._external_sessions  # type: ignore[union-attr]
+        found: dict[object, object] = still.server._server.iserver._external_sessions  # type: ignore[union-attr]
         return found
 
     assert asyncio.run(come()) == 0
@@ -175,8 +176,8 @@ def test_a_subscription_can_not_be_faster_than_the_server(line: Line) -> None:
     assert [each.data.RevisedPublishingInterval for each in found.values()] == [10.0]
 
 
-def test_a_port_that_is_taken_is_said(line: Line, certificates: Path) -> None:
-    port = line.server.port
-    other = OpcUaServer(line.source, certificates=certificates, port=port)
+def test_a_port_that_is_taken_is_said(still: Line, certificates: Path) -> None:
+    port = still.server.port
+    other = OpcUaServer(still.source, certificates=certificates, port=port)
     with ServerThread() as thread, pytest.raises(FaceError, match=f"opcua: 127.0.0.1:{port} can't be listened on"):
         thread.run(other.start())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import stat
 import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -224,3 +225,17 @@ def test_a_user_can_not_be_given_twice(tmp_path: Path) -> None:
     (tmp_path / "users.txt").write_text(f"{line}\n{line}\n")
     with pytest.raises(UsersError, match="line 2: jo given twice"):
         read_users(tmp_path / "users.txt")
+
+
+def test_a_user_is_added_and_changed_by_a_command(tmp_path: Path) -> None:
+    path = tmp_path / "users.txt"
+    command = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "user", str(path)]
+    for name, role, password in (("jo", "operator", "one"), ("al", "viewer", "two"), ("jo", "engineer", "three")):
+        done = subprocess.run([*command, name, "--role", role, "--password", password], capture_output=True, check=True)
+        assert password.encode() not in done.stdout
+    users = read_users(path)
+    assert {name: user.role for name, user in users.items()} == {"jo": "engineer", "al": "viewer"}
+    assert authenticate(users, "jo", "three") and not authenticate(users, "jo", "one")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    wrong = subprocess.run([*command, "a:b", "--password", "x"], capture_output=True, text=True, check=False)
+    assert wrong.returncode == 1 and "name: a:b given, expected 1 to 40 letters" in wrong.stderr
