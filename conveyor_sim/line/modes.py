@@ -86,8 +86,10 @@ class Modes:
         if kind == "test" or kind not in WRITER_KINDS or (quiet and kind == "controller" and self._is_free(given)):
             return None, given, ""
         later = self.later()
-        stops = self._stops(given)
-        devices = {name: self._device_of[name] for name in given.names if name in self._device_of and name not in stops}
+        freely = self._stops(given)
+        devices = {
+            name: self._device_of[name] for name in given.names if name in self._device_of and name not in freely
+        }
         objections = {device: later._objection(given, device) for device in dict.fromkeys(devices.values())}
         foreign = [index for index, name in enumerate(given.names) if objections.get(devices.get(name, ""))]
         if not foreign:
