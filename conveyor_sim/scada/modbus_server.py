@@ -3,11 +3,14 @@
 Modbus identifies nobody: whoever reaches the port can read, and writes are refused unless the server was given a role
 to write in. What is refused gets an exception: 1 if nobody may write, and for a function that is not served; 2 for an
 address that is not in the map, or a value written in part; 3 for a value out of range; 6 for a device that is in
-other hands, or if too much waits already (Modbus Application Protocol 1.1b3, 7).
+other hands, or if too much waits already; 11, for reads too, while the line behind the server is lost, so that nothing
+old is taken for new (Modbus Application Protocol 1.1b3, 7).
 """
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import socket
 import time
 from collections.abc import Mapping, Sequence
@@ -26,11 +29,21 @@ from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status
 from conveyor_sim.scada.hands import objection
 from conveyor_sim.scada.handshake import TARGET, TICK
+from conveyor_sim.scada.holding import Holding
 from conveyor_sim.scada.modbus_map import Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
 
 MOST_CLIENTS = 64
-"""Connections at once; one more is closed at once."""
+"""Connections at once; for one more, the one makes room that has been silent for longest, or it is closed at once."""
+
+SILENCE = 30.0
+"""s of wall time without a request after which a client no longer holds the line, nor its place among the clients."""
+
+MOST_UNREAD = 64 * 1024
+"""Bytes of answers that a client may leave lying; then its connection ends."""
+
+_LOOK = 0.5  # s of wall time between two looks at who is silent
+_KEEP_ALIVE = {socket.TCP_KEEPIDLE: 10, socket.TCP_KEEPINTVL: 5, socket.TCP_KEEPCNT: 3}  # s, s, 1
 
 _TABLE_OF: dict[int, Table] = {
     **dict.fromkeys((1, 5, 15), "coil"),
@@ -40,19 +53,30 @@ _TABLE_OF: dict[int, Table] = {
 }
 """By function code; others are not served."""
 
-_client: ContextVar[str] = ContextVar("client", default="?")
+_writer: ContextVar[str] = ContextVar("writer", default=MODBUS)
+"""Whose request is being answered."""
 
 
 class ModbusServer:
     """Serves one source: a Face."""
 
     def __init__(
-        self, source: TagSource, rows: Sequence[Row], role: WriterKind | None = None, host: str = HERE, port: int = 0
+        self,
+        source: TagSource,
+        rows: Sequence[Row],
+        role: WriterKind | None = None,
+        host: str = HERE,
+        port: int = 0,
+        silence: float = SILENCE,
     ) -> None:
-        """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free."""
+        """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free.
+        silence: s of wall time without a request after which a client holds nothing any more.
+        """
         self._image = _Image(source, rows, role)
         self._at = host, port
+        self._silence = silence
         self._server: _Server | None = None
+        self._watch: asyncio.Task[None] | None = None
 
     @property
     def port(self) -> int:
@@ -78,25 +102,35 @@ class ModbusServer:
 
     async def start(self) -> None:
         """Listen. Raises FaceError if that is not possible."""
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
         _require_free(host, port)
         # The library wants a device of its own; the image takes its place.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
         server.context = self._image  # type: ignore[assignment]
+        server.silence, server.holding = self._silence, self._image.holding
         try:
             await server.serve_forever(background=True)
         except (OSError, RuntimeError) as error:
             raise FaceError(f"modbus: {host}:{port} can't be listened on ({error})") from error
         self._server = server
+        self._watch = asyncio.create_task(server.watch())
 
     async def stop(self) -> None:
         """End all connections."""
+        if self._watch is not None:
+            self._watch.cancel()
+            self._watch = None
         if self._server is not None:
+            self._image.holding.leave(self._image.holding.holder)
             await self._server.shutdown()
             self._server = None
 
 
 class _Server(ModbusTcpServer):
+    silence: float
+    holding: Holding
+
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.connected: set[_Handler] = set()
@@ -105,40 +139,83 @@ class _Server(ModbusTcpServer):
     def callback_new_connection(self) -> ServerRequestHandler:
         return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
 
+    def make_room(self) -> bool:
+        """For one more connection; whether there is."""
+        if len(self.connected) >= MOST_CLIENTS:
+            oldest = min(self.connected, key=lambda handler: handler.asked)
+            if time.monotonic() - oldest.asked < self.silence:
+                return False
+            self.connected.discard(oldest)
+            oldest.cut()
+        return True
+
+    async def watch(self) -> None:
+        """Have whoever is silent give the line up."""
+        while True:
+            await asyncio.sleep(_LOOK)
+            now, holder = time.monotonic(), self.holding.holder
+            if holder and all(one.writer != holder or now > one.asked + self.silence for one in self.connected):
+                self.holding.leave(holder)
+            self.holding.look()
+
 
 class _Handler(ServerRequestHandler):
     """One connection, whose client its requests are recorded under."""
 
     server: _Server
+    writer = ""
+    """Who its client is on record."""
+    asked = 0.0
+    """s of wall time, when it asked for something last."""
 
     def callback_connected(self) -> None:
         super().callback_connected()
-        if len(self.server.connected) >= MOST_CLIENTS:
+        if not self.server.make_room():
             self.close()
             return
         self.server.connected.add(self)
+        self.asked = time.monotonic()
+        if (peer := self.transport.get_extra_info("peername")) is not None:
+            self.writer = f"{MODBUS} {peer[0]}:{peer[1]}"
         if (connection := self.transport.get_extra_info("socket")) is not None:
             # A client that is gone without a word is noticed.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_UNREAD)
+            for option, value in _KEEP_ALIVE.items():
+                connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def callback_disconnected(self, exc: Exception | None) -> None:
         self.server.connected.discard(self)
+        self.server.holding.leave(self.writer)
         super().callback_disconnected(exc)
+
+    @property
+    def _stream(self) -> asyncio.WriteTransport:
+        assert isinstance(self.transport, asyncio.WriteTransport)
+        return self.transport
+
+    def cut(self) -> None:
+        """End the connection at once; what was not sent is lost."""
+        self._stream.abort()
 
     async def handle_request(self) -> None:
         began = time.perf_counter()
+        self.asked = time.monotonic()
+        if self._stream.get_write_buffer_size() > MOST_UNREAD:
+            self.cut()  # it asks, and does not read what it is answered
+            return
         await self._answer()
         self.server.longest = max(self.server.longest, time.perf_counter() - began)
 
     async def _answer(self) -> None:
-        asked, peer = self.last_pdu, self.transport.get_extra_info("peername")
+        asked = self.last_pdu
         if asked is not None and asked.function_code not in _TABLE_OF:
             # Of the library's own functions some would change how it serves all others.
             answer = ExceptionResponse(asked.function_code, ExcCodes.ILLEGAL_FUNCTION)
             answer.transaction_id, answer.dev_id = asked.transaction_id, asked.dev_id
             self.server_send(answer, self.last_addr)
-        elif peer is not None:
-            _client.set(f"{peer[0]}:{peer[1]}")
+        elif self.writer:
+            _writer.set(self.writer)
             await super().handle_request()
 
 
@@ -147,6 +224,7 @@ class _Image:
 
     def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None) -> None:
         self._source, self._role = source, role
+        self.holding = Holding(source, MODBUS)
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
@@ -158,6 +236,8 @@ class _Image:
     async def async_getValues(self, device: int, function: int, address: int, count: int = 1) -> Any:
         """Words or bits of one tick, (count,)."""
         table, shown = _TABLE_OF[function], self._source.shown
+        if shown.lost:
+            return ExcCodes.GATEWAY_NO_RESPONSE
         values: list[int] = []
         while len(values) < count:
             at = address + len(values)
@@ -179,6 +259,8 @@ class _Image:
     def _write(self, table: Table, address: int, words: list[int]) -> ExcCodes | None:
         if self._role is None:
             return ExcCodes.ILLEGAL_FUNCTION
+        if self._source.shown.lost:
+            return ExcCodes.GATEWAY_NO_RESPONSE
         names: list[str] = []
         numbers: list[float] = []
         while words:
@@ -192,14 +274,18 @@ class _Image:
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
         if names and refusal(self._commands, "command", names, numbers):
             return ExcCodes.ILLEGAL_VALUE
-        writer = f"{MODBUS} {_client.get()}"
+        writer = _writer.get()
         commands = [self._commands[name] for name in names]
         if any(
             objection(self._source, tag, value, self._role, writer)
             for tag, value in zip(commands, numbers, strict=True)
         ):
             return ExcCodes.DEVICE_BUSY
-        if target is not None and "target" not in self._source.controls:
+        in_lockstep = "target" in self._source.controls
+        if target is not None and not in_lockstep:
+            return ExcCodes.DEVICE_BUSY
+        # Whoever attached a PLC that goes in lockstep has said whose the line is.
+        if self._role == "controller" and not in_lockstep and self.holding.take(writer):
             return ExcCodes.DEVICE_BUSY
         given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
         if names and self._source.give(given):

@@ -7,17 +7,25 @@ import shutil
 import socket
 import struct
 import subprocess
-from collections.abc import Iterator
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
+from scada.waiting import until
 
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.bag.messages import Header, line_message
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.line.inputs import DISOWN, OWN, WriterKind
 from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.modbus_map import Row, modbus_map
 from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import MOST_WAITING, TickSource
+from conveyor_sim.scada.source import MOST_WAITING, Control, TickSource
+from conveyor_sim.scada.view import View
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -27,7 +35,8 @@ from pymodbus.client import ModbusTcpClient
 
 from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer
 
-ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY = 1, 2, 3, 6
+ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY, NO_RESPONSE = 1, 2, 3, 6, 11
+PATIENCE = 1.5  # s of wall time that the server has with who is silent
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
 
 
@@ -47,9 +56,21 @@ class Line:
             self.simulation.advance()
             self.source.after_tick()
 
+    def advance_until(self, condition: Callable[[], Any], what: str) -> None:
+        """What clients do comes when it comes."""
+
+        def is_so() -> bool:
+            self.advance()
+            return bool(condition())
+
+        until(is_so, what)
+
     def read(self, name: str) -> float:
         """As the client's own library decodes it."""
-        row, client = self.rows[name], self.client
+        return self.read_with(self.client, name)
+
+    def read_with(self, client: ModbusTcpClient, name: str) -> float:
+        row = self.rows[name]
         ask = {
             "coil": client.read_coils,
             "discrete input": client.read_discrete_inputs,
@@ -79,7 +100,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[Line]:
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     source = TickSource(simulation)
     rows = modbus_map(source.about.tags)
-    server = ModbusServer(source, rows, role)
+    server = ModbusServer(source, rows, role, silence=PATIENCE)
     with ServerThread() as thread:
         thread.run(server.start())
         with ModbusTcpClient("127.0.0.1", port=server.port, timeout=20) as client:
@@ -113,7 +134,8 @@ def test_a_write_acts_at_the_next_tick_and_is_read_back(line: Line) -> None:
     assert not line.write(SETPOINT, 0.1).isError()
     assert line.read(SETPOINT) != pytest.approx(0.1)  # no tick has passed
     line.advance()
-    (outcome,) = line.simulation.take_outcomes()
+    taken, outcome = line.simulation.take_outcomes()
+    assert taken.accepted and (taken.operation, taken.input.writer) == (OWN, outcome.input.writer)
     assert outcome.accepted, outcome.reason
     assert (outcome.names, outcome.values) == ((SETPOINT,), (0.1,))  # as it was typed, not as a float32
     given = outcome.input
@@ -130,7 +152,7 @@ def test_values_that_come_in_one_request_act_together_or_not_at_all(line: Line) 
     assert len(coils) >= 2
     assert not line.client.write_coils(0, [True, False]).isError()
     line.advance()
-    (outcome,) = line.simulation.take_outcomes()
+    _, outcome = line.simulation.take_outcomes()
     assert outcome.names == (coils[0].name, coils[1].name)
     row = line.rows[SETPOINT]
     good = line.client.convert_to_registers(0.1, line.client.DATATYPE.FLOAT32)
@@ -175,7 +197,7 @@ def test_without_a_role_nobody_writes(line: Line) -> None:
 @controller
 def test_more_writes_than_can_wait_are_refused_and_no_more_is_kept(line: Line) -> None:
     codes = [line.write(SETPOINT, 0.1).isError() for _ in range(MOST_WAITING + 5)]
-    assert codes == [False] * MOST_WAITING + [True] * 5
+    assert codes == [False] * (MOST_WAITING - 1) + [True] * 6  # to take the line is an input, too
     assert line.write(SETPOINT, 0.1).exception_code == BUSY
     line.advance()
     assert len(line.simulation.take_outcomes()) == MOST_WAITING
@@ -199,7 +221,7 @@ def test_packets_that_are_none_end_nothing(line: Line) -> None:
             raw.sendall(packet)
     assert not line.write(SETPOINT, 0.1).isError()
     line.advance()
-    assert [outcome.names for outcome in line.simulation.take_outcomes()] == [(SETPOINT,)]
+    assert [outcome.names for outcome in line.simulation.take_outcomes()] == [(), (SETPOINT,)]
 
 
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
@@ -220,6 +242,133 @@ def test_a_port_that_is_taken_is_said(line: Line) -> None:
     other = ModbusServer(line.source, list(line.rows.values()), port=taken)
     with ServerThread() as thread, pytest.raises(FaceError, match=f"modbus: 127.0.0.1:{taken} can't be listened on"):
         thread.run(other.start())
+
+
+@controller
+def test_the_first_to_write_holds_the_line_until_it_leaves(line: Line) -> None:
+    assert not line.write(SETPOINT, 0.1).isError()
+    with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=20) as another:
+        address = line.rows[SETPOINT].address
+        words = another.convert_to_registers(0.2, another.DATATYPE.FLOAT32)
+        assert another.write_registers(address, words).exception_code == BUSY  # before the tick, too
+        line.advance()
+        assert another.write_registers(address, words).exception_code == BUSY
+        assert line.simulation.line.modes.owner == f"modbus 127.0.0.1:{line.client.socket.getsockname()[1]}"
+        line.simulation.take_outcomes()
+        line.client.close()
+        line.advance_until(lambda: not line.simulation.line.modes.owner, "its release")
+        (given_up,) = line.simulation.take_outcomes()
+        assert given_up.accepted and given_up.operation == DISOWN
+        assert not another.write_registers(address, words).isError()
+        line.advance()
+        assert line.read_with(another, SETPOINT) == pytest.approx(0.2)
+
+
+@controller
+def test_who_is_silent_no_longer_holds_the_line(line: Line) -> None:
+    """As when its cable is cut: nothing ends the connection."""
+    with socket.create_connection(("127.0.0.1", line.server.port), timeout=20) as silent:
+        speed = struct.pack(">f", 0.1)
+        silent.sendall(struct.pack(">HHHBBHHB", 1, 0, 11, 1, 16, line.rows[SETPOINT].address, 2, 4) + speed)
+        assert silent.recv(64)[7] == 16
+        line.advance()
+        assert line.simulation.line.modes.owner
+        line.advance_until(lambda: not line.simulation.line.modes.owner, "the end of its patience")
+        assert not line.write(SETPOINT, 0.2).isError()
+
+
+@controller
+def test_a_release_waits_for_room(line: Line) -> None:
+    while not line.write(SETPOINT, 0.1).isError():
+        pass
+    line.client.close()
+    line.advance_until(lambda: not line.simulation.line.modes.owner, "its release")
+
+
+@controller
+def test_what_is_lost_is_not_read_as_if_it_were_there(line: Line) -> None:
+    """A client gets exception 11, whatever it asks for, until the line is back."""
+    header = Header(1, 1, "world")
+
+    def hear(topic: str, data: bytes) -> None:
+        view.take(topic, typestore().deserialize_cdr(data, TOPICS[topic].type))
+
+    class Source(View):
+        """What is heard of the line, and a way in."""
+
+        controls = frozenset[Control]()
+        give, control = line.source.give, line.source.control
+
+    view = Source()
+    hear("line", line_message(line.simulation, "a run", header))
+    hear("signals", TOPICS["signals"].pack(line.simulation.line.signals(), header))
+    server = ModbusServer(view, list(line.rows.values()), "controller")
+    with ServerThread() as thread:
+        thread.run(server.start())
+        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=20) as client:
+            speed = line.rows[SPEED].address
+            assert client.read_input_registers(speed, count=2).exception_code == NO_RESPONSE
+            view.show()
+            assert not client.read_input_registers(speed, count=2).isError()
+            view.lose("the cable is cut")
+            assert client.read_input_registers(speed, count=2).exception_code == NO_RESPONSE
+            assert client.read_coils(0).exception_code == NO_RESPONSE
+            words = client.convert_to_registers(0.1, client.DATATYPE.FLOAT32)
+            assert client.write_registers(line.rows[SETPOINT].address, words).exception_code == NO_RESPONSE
+            view.show()
+            assert not client.write_registers(line.rows[SETPOINT].address, words).isError()
+        thread.run(server.stop())
+
+
+@controller
+def test_three_clients_that_write_as_fast_as_they_can_hold_up_nobody(line: Line) -> None:
+    """One of them holds the line. All are answered, the line goes on, and a fourth one reads."""
+    stop, counts = threading.Event(), Counter[int]()
+
+    def flood() -> None:
+        with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=60) as client:
+            words = client.convert_to_registers(0.1, client.DATATYPE.FLOAT32)
+            while not stop.is_set():
+                answer = client.write_registers(line.rows[SETPOINT].address, words)
+                counts[answer.exception_code if answer.isError() else 0] += 1
+
+    floods = [threading.Thread(target=flood) for _ in range(3)]
+    for one in floods:
+        one.start()
+    for _ in range(50):
+        line.advance()
+        assert line.read(SPEED) >= 0.0
+        assert len(line.simulation.take_outcomes()) <= MOST_WAITING
+    stop.set()
+    for one in floods:
+        one.join(60.0)
+    assert counts.keys() == {0, BUSY}
+    status = line.server.status()
+    assert status.writes == counts[0] and status.refused == counts[BUSY]
+
+
+def test_who_asks_and_never_reads_is_cut_off(line: Line) -> None:
+    """Its answers would be kept for ever."""
+    ask = struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, 0, 100)
+    with socket.socket() as greedy:
+        greedy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        greedy.settimeout(60)
+        greedy.connect(("127.0.0.1", line.server.port))
+        with pytest.raises((ConnectionResetError, BrokenPipeError)):
+            while True:
+                greedy.sendall(ask)
+                time.sleep(0.001)
+    assert line.read(SPEED) >= 0.0
+
+
+def test_who_is_connected_and_silent_makes_room(line: Line) -> None:
+    address = ("127.0.0.1", line.server.port)
+    silent = [socket.create_connection(address, timeout=20) for _ in range(MOST_CLIENTS)]
+    time.sleep(2 * PATIENCE)
+    with ModbusTcpClient(*address[:1], port=address[1], timeout=20) as another:
+        assert not another.read_coils(0).isError()
+    for one in silent:
+        one.close()
 
 
 @pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed: apt-get install mbpoll")
