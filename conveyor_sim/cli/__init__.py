@@ -14,6 +14,7 @@ with while_importing():
     import click
 
     from conveyor_sim.cli.accuracy import accuracy
+    from conveyor_sim.cli.attach import attach
     from conveyor_sim.cli.recordings import events, plot, recover, replay, report
     from conveyor_sim.cli.run import run
     from conveyor_sim.cli.scenes import check, explain, tags
@@ -55,5 +56,7 @@ def main(context: click.Context) -> None:
     context.with_resource(HandledOnce([signal.SIGINT], signal.default_int_handler))
 
 
-for command in (check, tags, explain, run, serve, user, accuracy, recover, replay, events, report, plot, view):
+for command in (
+    check, tags, explain, run, serve, attach, user, accuracy, recover, replay, events, report, plot, view,
+):  # fmt: skip
     main.add_command(command)

@@ -97,11 +97,11 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             source = stack.enter_context(_bag(Path(what), console, given["real_time_factor"], given["loop"]))
         else:
             _require_not_given(what, OF_BAG)
-            source = stack.enter_context(_scene(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
+            source = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
         with Serving(source, chosen, settings) as serving:
             for sentence in serving.greeting:
                 console.print(sentence)
-            _watch(serving, console)
+            watch(serving, console)
             summary = serving.summary()
     bags = getattr(source, "recordings", [])
     click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
@@ -122,7 +122,7 @@ def _require_not_given(what: str, names: Sequence[str]) -> None:
 
 
 @contextmanager
-def _scene(
+def scene_source(
     what: str,
     console: Console,
     out: Path | None,
@@ -131,8 +131,9 @@ def _scene(
     real_time_factor: float,
     threads: int | None,
     outside_tables: bool,
+    playing: bool = True,
 ) -> Iterator[SceneSource]:
-    """A scene, once its tags are known."""
+    """A scene, once its tags are known. playing: whether it runs at once."""
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.scada.scene_process import Task
@@ -145,7 +146,7 @@ def _scene(
     if not no_record:
         folder = click.get_current_context().with_resource(run_folder(out))
         require_recordable(folder)
-    with SceneSource(Task(scene, folder, 0, real_time_factor, threads), console.print) as source:
+    with SceneSource(Task(scene, folder, 0, real_time_factor, threads, playing), console.print) as source:
         source.wait_for_line()
         yield source
 
@@ -173,7 +174,7 @@ def _node(namespace: str, console: Console) -> Iterator[NodeSource]:
         yield source
 
 
-def _watch(serving: Serving, console: Console) -> None:
+def watch(serving: Serving, console: Console) -> None:
     """Tell how it goes until a signal comes."""
     from conveyor_sim.support.stop_request import StopRequest
 

@@ -59,6 +59,8 @@ class Task:
     """Of the first run, by which its folder is named, as those after resets are."""
     real_time_factor: float
     threads: int | None
+    playing: bool = True
+    """Whether it runs at once, and does not wait to be resumed."""
 
 
 class Give(NamedTuple):
@@ -229,7 +231,7 @@ class _Process:
         return Stepper(
             open_session,
             real_time_factor=task.real_time_factor,
-            playing=True,
+            playing=task.playing,
             lockstep_max_ticks=1,
             beat=lambda stamp_ns, now: self._beat(),
             died=self._fail,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -9,10 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from testing.plc_servers import ALARM, KINDS, program, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
 
+from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
+from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.scada.attach.free_running import PlcFace
 from conveyor_sim.scada.attach.link import LinkError
@@ -93,6 +100,36 @@ def test_a_plc_that_is_not_there_is_said(plc: Plc) -> None:
     url = f"{plc.url.rpartition(':')[0]}:1"
     with Scenario(LINE) as plant, pytest.raises(LinkError, match=f"^{url}: "):
         plant.attach_plc(url, plc.tags)
+
+
+def test_the_command_attach_records_what_a_plc_commands(plc: Plc, tmp_path: Path) -> None:
+    """In real time; what it did there is on record."""
+    command = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "attach", LINE, plc.url]
+    command += ["--tags", str(plc.tags), "--real-time-factor", "10", "--duration", "5", "--out", str(tmp_path / "bag")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        end = time.monotonic() + 120.0
+        while plc.made.scans < 20:
+            assert process.poll() is None and time.monotonic() < end
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, told = process.communicate(timeout=120.0)
+    finally:
+        process.kill()
+    assert process.returncode == 0 and f"{plc.url} commands the line" in told
+    assert re.search(r"served up to .* s; plc \d+ written, 0 refused; recorded to", out)
+    assert replay(tmp_path / "bag").difference is None
+    with open_bag(tmp_path / "bag") as bag:
+        assert any(SETPOINT in frame.data.names for frame in bag.outcomes())
+
+
+def test_attach_says_that_there_is_no_plc(tmp_path: Path) -> None:
+    pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+    tags = write_map(tmp_path / "tags.csv", {SETPOINT: "holding register 0 float32"})
+    asked = ["attach", LINE, "modbus://127.0.0.1:1", "--tags", str(tags), "--no-record"]
+    refused = CliRunner().invoke(main, asked)
+    assert refused.exit_code == 1
+    assert "modbus://127.0.0.1:1: can't be reached, expected the Modbus server of a PLC" in refused.output
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,15 @@ import asyncio
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
 from conveyor_sim.control.scan import ALARMS, AlarmChanges
 from conveyor_sim.line.inputs import SET, Input
 from conveyor_sim.scada.attach.link import Link, LinkError
-from conveyor_sim.scada.attach.tag_map import TagMap
-from conveyor_sim.scada.face import Status
+from conveyor_sim.scada.attach.links import all_of, link
+from conveyor_sim.scada.attach.tag_map import TagMap, read_tag_map
+from conveyor_sim.scada.face import Face, Settings, Status
+from conveyor_sim.scada.faces import Kind
 from conveyor_sim.scada.source import PLC, Shown, TagSource
 
 AGAIN = 1.0
@@ -123,3 +126,14 @@ class PlcFace:
         if link is not None:
             with suppress(LinkError):
                 await link.close()
+
+
+def of_plc(url: str, tags: Path, user: str, password: str, period: float, say: Callable[[str], object]) -> Kind:
+    """What serves a source to a PLC, as one of the faces. url, user, password: as `link`. tags: the map."""
+
+    def make(source: TagSource, _: int, __: Settings) -> Face:
+        mapped = read_tag_map(tags, source.about.tags)
+        return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say)
+
+    library = "pymodbus" if url.startswith("modbus") else "asyncua"
+    return Kind(PLC, 0, library, make, lambda _: "command it")

@@ -1,0 +1,53 @@
+"""The command attach."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from conveyor_sim.cli.output import OUTSIDE_TABLES
+from conveyor_sim.cli.serve import scene_source, watch
+from conveyor_sim.support.garbage import collected_later
+
+
+@click.command()
+@click.argument("scene")
+@click.argument("url")
+@click.option("--tags", required=True, type=click.Path(path_type=Path), help="CSV file: our tags, and theirs.")
+@click.option("--user", default="", help="Of OPC UA (default: anonymous); the password is asked for.")
+@click.option("--period", type=click.FloatRange(0.001, 10.0), default=0.01, help="s from scan to scan (default: 0.01).")
+@click.option("--real-time-factor", type=click.FloatRange(0.001, 1e6), default=1.0, help="Of the simulation.")
+@click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
+@click.option(
+    "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
+)
+@click.option("--no-record", is_flag=True, help="Nothing is written.")
+@click.option("--threads", type=click.IntRange(1), help="Threads to step with.")
+@click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
+def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scene: Any) -> None:
+    """Have the PLC at URL control SCENE in real time.
+
+    URL is that of the PLC's server: opc.tcp://host:port or modbus://host:port. The line writes its signals there, and
+    reads what the PLC commands. The PLC is not waited for: the lag is told. Ctrl-C ends it.
+    """
+    with collected_later():
+        from conveyor_sim.scada.attach.free_running import of_plc
+        from conveyor_sim.scada.face import Settings
+        from conveyor_sim.scada.serving import Serving
+
+    console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
+    password = click.prompt("password", hide_input=True, err=True) if user else ""
+    with ExitStack() as stack:
+        source = stack.enter_context(scene_source(scene, console, playing=False, **of_scene))
+        kind = of_plc(url, tags, user, password, period, console.print)
+        with Serving(source, [(kind, 0)], Settings()) as serving:
+            console.print(f"{url} commands the line, and reads its signals")
+            source.control("resume", 0.0, "attach")
+            watch(serving, console)
+            summary = serving.summary()
+    bags = source.recordings
+    click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
