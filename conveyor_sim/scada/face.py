@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -37,6 +38,8 @@ class Settings:
     """Whether clients that give no name may read."""
     opcua_certificates: Path | None = None
     """Folder of the server's certificate and key; None: that of this user."""
+    opcua_history: Sequence[str] = ()
+    """Patterns of the tags whose last values it keeps."""
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,7 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
         anonymous=settings.opcua_anonymous,
         stamps=settings.stamps,
         certificates=settings.opcua_certificates,
+        history=settings.opcua_history,
         host=settings.host,
         port=port,
     )

@@ -1,4 +1,4 @@
-"""The pytest plugin: fixtures (`line`, `warm_start`, `modbus`, `opcua`), and what a test leaves that fails or is killed.
+"""The pytest plugin: fixtures (`line`, `warm_start`, `modbus`, `opcua`), and what tests leave that fail or are killed.
 
 pytest loads it in every run by the entry point pytest11, so nothing of the simulation is imported until a test asks
 for a fixture. setup.py names it there by its module, so that `-p` of the same name does not load it twice.

@@ -14,8 +14,8 @@ from conveyor_sim.line.alarms.alarm import WAITING
 from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
-from conveyor_sim.scada.opcua.nodes import LINE, Nodes, node_id
-from conveyor_sim.scada.opcua.requests import Codes, Requests, name_of
+from conveyor_sim.scada.opcua.nodes import LINE, Nodes, name_of, node_id
+from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.source import Control, TagSource
 
 ALARM_STATES = "alarm_states"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime, timezone
-from typing import Any
+from typing import Any, Protocol
 
 from asyncua import ua
 from asyncua.server.internal_server import InternalServer
@@ -21,8 +21,10 @@ LINE = "line"
 NEVER = datetime(1601, 1, 1, tzinfo=timezone.utc)
 """How OPC UA writes no date (OPC 10000-6, 5.2.2.5)."""
 
-READ, READ_AND_WRITE = 1, 3
-"""AccessLevel."""
+READ, WRITE, READ_HISTORY = 1, 2, 4
+"""Bits of AccessLevel."""
+
+READ_AND_WRITE = READ | WRITE
 
 
 def node_id(name: str) -> ua.NodeId:
@@ -30,12 +32,27 @@ def node_id(name: str) -> ua.NodeId:
     return ua.NodeId(name, INDEX, ua.NodeIdType.String)
 
 
+def name_of(node: ua.NodeId) -> str:
+    """What a node's id names; empty if it is not of a line."""
+    return node.Identifier if node.NamespaceIndex == INDEX and isinstance(node.Identifier, str) else ""
+
+
+class Noted(Protocol):
+    """What wants to know all values that variables get."""
+
+    def __contains__(self, name: str) -> bool:
+        """Whether it keeps those of a variable."""
+
+    def note(self, name: str, value: ua.DataValue) -> None:
+        """Called with each."""
+
+
 class Nodes:
     """The address space, to be added to."""
 
-    def __init__(self, server: InternalServer) -> None:
-        """Of a server that has the standard's nodes."""
-        self._server = server
+    def __init__(self, server: InternalServer, history: Noted) -> None:
+        """Of a server that has the standard's nodes. history: of what has one."""
+        self._server, self._history = server, history
 
     def __contains__(self, name: str) -> bool:
         """Whether there is a node of this name."""
@@ -67,6 +84,9 @@ class Nodes:
     ) -> ua.NodeId:
         """A variable with the first value that it has."""
         attributes = _variable(shown, description, value, ua.NodeId(value.VariantType.value), access)
+        if name in self._history:
+            attributes.Historizing = True
+            attributes.AccessLevel = attributes.UserAccessLevel = access | READ_HISTORY
         return self._add(name, shown, parent, ua.ObjectIds.HasComponent, ua.NodeClass.Variable, type_id, attributes)
 
     def property(
@@ -133,8 +153,9 @@ class Nodes:
 
     async def write(self, name: str, value: ua.Variant, stamp: datetime, status: int = ua.StatusCodes.Good) -> None:
         """Give a variable a value. stamp: its SourceTimestamp."""
-        code, now = ua.StatusCode(status), datetime.now(timezone.utc)
-        await self._server.write_attribute_value(node_id(name), ua.DataValue(value, code, stamp, now))
+        given = ua.DataValue(value, ua.StatusCode(status), stamp, datetime.now(timezone.utc))
+        self._history.note(name, given)
+        await self._server.write_attribute_value(node_id(name), given)
 
     def _add(
         self,

@@ -18,7 +18,7 @@ from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.scada.hands import objection
 from conveyor_sim.scada.handshake import TARGET
-from conveyor_sim.scada.opcua.nodes import INDEX
+from conveyor_sim.scada.opcua.nodes import name_of
 from conveyor_sim.scada.opcua.values import type_of
 from conveyor_sim.scada.source import OPCUA, Control, TagSource
 
@@ -180,11 +180,6 @@ class Requests:
             return Codes.BadInvalidState
         given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
         return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
-
-
-def name_of(node: ua.NodeId) -> str:
-    """What a node's id names; empty if it is not of a line."""
-    return node.Identifier if node.NamespaceIndex == INDEX and isinstance(node.Identifier, str) else ""
 
 
 def _kind(client: User) -> WriterKind | None:

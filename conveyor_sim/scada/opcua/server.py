@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status
 from conveyor_sim.scada.opcua.certificates import default_folder, identity
 from conveyor_sim.scada.opcua.conditions import AlarmStates
 from conveyor_sim.scada.opcua.emitter import Emitter
+from conveyor_sim.scada.opcua.history import History
 from conveyor_sim.scada.opcua.line_events import LineEvents
 from conveyor_sim.scada.opcua.methods import Methods, add_methods
 from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
@@ -51,15 +52,16 @@ class OpcUaServer:
         anonymous: bool = True,
         stamps: Stamps = "wall",
         certificates: Path | None = None,
+        history: Sequence[str] = (),
         host: str = HERE,
         port: int = 0,
     ) -> None:
         """users: who may do more than read, by name. anonymous: whether those who give no name may read.
         stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
-        port: 0 for any that is free.
+        history: patterns of the tags whose last values are kept. port: 0 for any that is free.
         """
         self._source, self._users, self._anonymous, self._stamps = source, dict(users or {}), anonymous, stamps
-        self._certificates = certificates
+        self._certificates, self._history = certificates, history
         self._at = host, port
         self._requests = Requests(source)
         self._server: BoundedServer | None = None
@@ -113,7 +115,9 @@ class OpcUaServer:
             internal.certificate_validator = _Trusted(own.trusted)
         if await server.register_namespace(NAMESPACE) != INDEX:
             raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
-        nodes = Nodes(internal)
+        history = History(self._history, self._source.about.tags)
+        internal.history_manager.set_storage(history)
+        nodes = Nodes(internal, history)
         add_line(nodes, self._source.about)
         add_methods(nodes, self._source)
         emitter, clock = Emitter(internal), Clock(self._source.about, self._stamps)

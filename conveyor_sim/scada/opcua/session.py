@@ -21,7 +21,7 @@ from asyncua.server.internal_session import InternalSession
 
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.scada.opcua.methods import Methods
-from conveyor_sim.scada.opcua.nodes import READ, READ_AND_WRITE
+from conveyor_sim.scada.opcua.nodes import WRITE, name_of
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.transport import channel
 
@@ -127,8 +127,9 @@ class Session(InternalSession):
         if requests is not None and not requests.may(self.user, SET):
             for place, asked in enumerate(params.NodesToRead):
                 value = results[place].Value
-                if asked.AttributeId == ua.AttributeIds.UserAccessLevel and value and value.Value == READ_AND_WRITE:
-                    results[place] = replace(results[place], Value=ua.Variant(READ, ua.VariantType.Byte))
+                if asked.AttributeId == ua.AttributeIds.UserAccessLevel and value and isinstance(value.Value, int):
+                    level = ua.Variant(value.Value & ~WRITE, ua.VariantType.Byte)
+                    results[place] = replace(results[place], Value=level)
         return results
 
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
@@ -150,6 +151,17 @@ class Session(InternalSession):
         if there + len(params.ItemsToCreate or []) > MOST_ITEMS:
             raise ServiceError(Codes.BadTooManyMonitoredItems)
         return await super().create_monitored_items(params)
+
+    async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
+        """Raw values, of tags that have a history."""
+        raw = isinstance(params.HistoryReadDetails, ua.ReadRawModifiedDetails)
+        if not raw or params.HistoryReadDetails.IsReadModified:
+            raise ServiceError(Codes.BadHistoryOperationUnsupported)
+        results = await super().history_read(params)
+        for asked, result in zip(params.NodesToRead, results, strict=True):
+            if name_of(asked.NodeId) not in self.iserver.history_manager.storage:
+                result.StatusCode = ua.StatusCode(Codes.BadHistoryOperationUnsupported)
+        return results
 
     async def history_update(self, params: ua.HistoryUpdateParameters) -> list[ua.HistoryUpdateResult]:
         """Refused."""
