@@ -78,7 +78,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     its port. Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.scada.face import Settings
+        from conveyor_sim.scada.face import Settings, require_free
         from conveyor_sim.scada.faces import FACES
         from conveyor_sim.scada.serving import Serving
 
@@ -87,6 +87,8 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     chosen = chosen or [(kind, kind.port) for kind in FACES if kind.installed]
     for kind, _ in chosen or [(FACES[0], 0)]:
         kind.require()
+    for kind, port in chosen:
+        require_free(kind.name, bind, port)  # not only once everything has been compiled
     of_faces = ("modbus_role", "modbus_map", "opcua_users", "opcua_anonymous", "opcua_certificates", "opcua_history")
     settings = Settings(bind, stamps, **{name: given[name] for name in of_faces})
     with ExitStack() as stack:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,3 +75,15 @@ class Face(Protocol):
 
     def status(self) -> Status:
         """What it is doing."""
+
+
+def require_free(face: str, host: str, port: int) -> None:
+    """Raises FaceError, with the reason, which libraries don't tell, if a face of that name can't listen there."""
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FaceError(f"{face}: {host}:{port} can't be listened on ({reason}), expected a free port") from error

@@ -26,7 +26,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.tag import COMMANDS
-from conveyor_sim.scada.face import HERE, FaceError, Status
+from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.hands import objection
 from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.scada.holding import Holding
@@ -104,7 +104,7 @@ class ModbusServer:
         """Listen. Raises FaceError if that is not possible."""
         logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
-        _require_free(host, port)
+        require_free(MODBUS, host, port)
         # The library wants a device of its own; the image takes its place.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
         server.context = self._image  # type: ignore[assignment]
@@ -293,15 +293,3 @@ class _Image:
         if target is None:
             return None
         return ExcCodes.ILLEGAL_VALUE if self._source.control("target", target, writer) else None
-
-
-def _require_free(host: str, port: int) -> None:
-    """The library only says that it could not listen, not why."""
-    try:
-        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        with socket.socket(family, socket.SOCK_STREAM) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((host, port))
-    except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FaceError(f"modbus: {host}:{port} can't be listened on ({reason}), expected a free port") from error

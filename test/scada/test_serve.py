@@ -1,0 +1,199 @@
+"""The command `serve`, as a process of its own: from its first line to its last, and killed in between."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from scada.waiting import PATIENCE, until
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.replay import replay
+from conveyor_sim.errors import BagError
+from conveyor_sim.scada.modbus_map import read_map
+
+pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+
+from pymodbus.client import ModbusTcpClient
+
+SCENE = "scenarios/zoned_line"
+COMMAND = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "serve"]
+
+
+class Served:
+    """One `conveyor-sim serve`."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self._log = folder / "log"
+        with self._log.open("w") as log:
+            self.process = subprocess.Popen(
+                [*COMMAND, *arguments],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+            )
+
+    @property
+    def told(self) -> str:
+        return self._log.read_text()
+
+    @property
+    def port(self) -> int:
+        """Of Modbus, once it listens."""
+        pattern = r"modbus://127\.0\.0\.1:(\d+)"
+        until(lambda: re.search(pattern, self.told) or self.process.poll() is not None, "the server")
+        found = re.search(pattern, self.told)
+        assert found, self.told
+        return int(found.group(1))
+
+    def end(self, number: int = signal.SIGINT) -> str:
+        """What it printed, after a signal."""
+        self.process.send_signal(number)
+        return self.process.communicate(timeout=PATIENCE)[0]
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
+    """Starts it in a folder of its own; what is left of it is ended."""
+    started: list[Served] = []
+
+    def start(*arguments: str) -> Served:
+        started.append(Served(tmp_path, *arguments))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.process.poll() is None:
+            one.process.kill()
+            one.process.wait()
+
+
+def speed_of(client: ModbusTcpClient) -> float | None:
+    """What a client reads of the first belt, which reconnects by itself; None: nothing."""
+    try:
+        answer = client.read_input_registers(0, count=2)
+    except Exception:
+        return None
+    return None if answer.isError() else float(client.convert_from_registers(answer.registers, client.DATATYPE.FLOAT32))
+
+
+def command(client: ModbusTcpClient, value: float) -> None:
+    answer = client.write_registers(0, client.convert_to_registers(value, client.DATATYPE.FLOAT32))
+    assert not answer.isError(), answer
+
+
+def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
+    serve: Callable[..., Served], tmp_path: Path
+) -> None:
+    served = serve(SCENE, "--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--out", "bag")
+    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
+        until(lambda: speed_of(client) == 0.5, "the line")
+        command(client, 0.25)
+        until(lambda: speed_of(client) == 0.25, "the speed")
+    assert "clients can read all, and write as controller" in served.told
+    out = served.end()
+    assert re.fullmatch(r"served up to [\d.]+ s; modbus 1 written, 0 refused; recorded to bag\n", out)
+    assert served.process.returncode == 0
+    assert read_map(tmp_path / "map.csv")[0].table == "coil"
+    report = replay(tmp_path / "bag")
+    assert report.exact and report.difference is None
+    assert report.compared["outcomes"] >= 2
+    with open_bag(tmp_path / "bag") as bag:
+        writers = {frame.data.writer for frame in bag.outcomes() if frame.data.writer_kind == "controller"}
+    assert len(writers) == 1 and next(iter(writers)).startswith("modbus 127.0.0.1:")
+
+
+def test_a_recording_is_served(serve: Callable[..., Served], tmp_path: Path) -> None:
+    first = serve(SCENE, "--modbus", "0", "--out", "bag", "--duration", "2", "--real-time-factor", "0")
+    with ModbusTcpClient("127.0.0.1", port=first.port, timeout=20) as client:
+        until(lambda: speed_of(client) == 0.5, "the line")
+    assert "recorded to bag" in first.end()
+    second = serve("bag", "--modbus", "0", "--loop")
+    with ModbusTcpClient("127.0.0.1", port=second.port, timeout=20) as client:
+        until(lambda: speed_of(client) == 0.5, "the recording")
+        assert client.write_coil(0, True).exception_code == 1
+    assert "recorded" not in second.end(signal.SIGTERM)
+    assert second.process.returncode == 0
+
+
+def test_a_server_that_is_killed_leaves_a_whole_recording_and_its_port(
+    serve: Callable[..., Served], tmp_path: Path
+) -> None:
+    served = serve(SCENE, "--modbus", "0", "--out", "bag")
+    port = served.port
+    with ModbusTcpClient("127.0.0.1", port=port, timeout=2, retries=0) as client:
+        until(lambda: speed_of(client) == 0.5, "the line")
+        served.end(signal.SIGKILL)
+        assert speed_of(client) is None
+
+        def is_whole() -> bool:
+            try:
+                open_bag(tmp_path / "bag").close()
+            except BagError:
+                return False
+            return True
+
+        until(is_whole, "the end of the recording by the process that simulates")
+        serve(SCENE, "--modbus", str(port), "--no-record")
+        until(lambda: speed_of(client) == 0.5, "the other server")
+
+
+def test_the_process_that_simulates_may_die(serve: Callable[..., Served], tmp_path: Path) -> None:
+    served = serve(SCENE, "--modbus", "0", "--out", "bag")
+    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
+        until(lambda: speed_of(client) == 0.5, "the line")
+        tasks = Path(f"/proc/{served.process.pid}/task").glob("*/children")
+        pids = {pid for task in tasks for pid in task.read_text().split()}
+        assert len(pids) == 1
+        os.kill(int(pids.pop()), signal.SIGKILL)
+        until(lambda: speed_of(client) is None, "exception 11")
+        until(lambda: speed_of(client) == 0.5, "another process")
+    assert "was killed by signal 9; the scene begins anew" in served.told
+    assert "recorded to bag, bag_1" in served.end()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "expected one of SCENE, BAG and --node"),
+        ([SCENE, "--node"], "expected one of SCENE, BAG and --node"),
+        ([SCENE, "--loop"], "--loop: given with scenarios/zoned_line, expected it with a bag only"),
+        (["--node", "--no-record"], "--no-record: given with --node, expected it with a scene only"),
+        (
+            [".", "--modbus-role", "operator"],
+            "--modbus-role: given with ., expected none: a recording can't be commanded",
+        ),
+        ([".", "--modbus", "0"], "metadata.yaml is missing"),
+        (["none", "--modbus", "0"], "none"),
+        (
+            [SCENE, "--modbus", "0", "--bind", "no.such.host.invalid"],
+            "modbus: no.such.host.invalid:0 can't be listened on",
+        ),
+    ],
+)
+def test_what_can_not_be_is_one_sentence(serve: Callable[..., Served], arguments: list[str], sentence: str) -> None:
+    served = serve(*arguments)
+    served.process.communicate(timeout=PATIENCE)
+    assert served.process.returncode == 1
+    (error,) = [line for line in served.told.splitlines() if line.startswith("Error: ")]
+    assert sentence in error
+    assert "Traceback" not in served.told
+
+
+def test_a_port_that_is_taken_leaves_nothing_behind(serve: Callable[..., Served], tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        served = serve(SCENE, "--modbus", str(port))
+        served.process.communicate(timeout=PATIENCE)
+    assert served.process.returncode == 1
+    assert f"Error: modbus: 127.0.0.1:{port} can't be listened on" in served.told
+    assert {path.name for path in tmp_path.iterdir()} == {"log"}
