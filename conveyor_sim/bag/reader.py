@@ -156,17 +156,18 @@ class Bag(AbstractContextManager["Bag"]):
 
     def ticks(self, topic: str) -> NDArray[np.int64]:
         """The ticks (n,) of the messages of one topic."""
-        return np.array([self._tick(topic, data) for _, _, data in self.raw({topic})], dtype=np.int64)
+        return np.array([self.tick(topic, data) for _, _, data in self.raw({topic})], dtype=np.int64)
 
     def messages(self, topic: str, ticks: Collection[int] | None = None) -> Iterator[Frame[Any]]:
         """The messages of one topic that carries a tick, as rosbags objects: every one, or those of some ticks."""
         for _, _, data in self.raw({topic}):
-            if ticks is not None and self._tick(topic, data) not in ticks:
+            if ticks is not None and self.tick(topic, data) not in ticks:
                 continue
             message = self.decode(topic, data)
             yield Frame(message.tick, message.tick * self._tick_ns(message) * 1e-9, message)
 
-    def _tick(self, topic: str, data: bytes) -> int:
+    def tick(self, topic: str, data: bytes) -> int:
+        """The tick of a message of a topic that carries one; nothing else of it is decoded."""
         with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded"):
             return self._source.tick(data, self.types[topic])
 

@@ -34,8 +34,7 @@ def write_page(
     Raises BagError, SceneError, and ConveyorError if the file can't be written.
     """
     with open_bag(bag) as opened:
-        end = opened.span_ns[1] * 1e-9
-        recording = Recording(opened, Detail(), None if last is None else end - last)
+        recording = Recording(opened, Detail(), last)
         if watch is not None and watch.end >= 0:
             recording.first, recording.last = watch.first, watch.end
             blocks: Iterable[bytes] = watch.blocks()

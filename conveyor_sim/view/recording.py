@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +23,7 @@ from conveyor_sim.view.block import (
 )
 from conveyor_sim.view.content import DRAWN, Collector
 from conveyor_sim.view.head import head
+from conveyor_sim.view.stamps import Stamps
 from conveyor_sim.view.story import TOPICS_READ, Story, fields
 
 
@@ -45,18 +45,19 @@ class Detail:
 class Recording:
     """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
 
-    def __init__(self, bag: Bag, detail: Detail, start: float | None = None) -> None:
-        """start: s, from which on it is drawn; None: all of it. What happened is listed from the beginning."""
+    def __init__(self, bag: Bag, detail: Detail, shown: float | None = None) -> None:
+        """shown: s at its end that are drawn; None: all of it. What happened is listed from the beginning."""
         self._bag = bag
         self._detail = detail
         self._tick_ns = int(bag.line.tick_ns)
         self._scene = parse_scene(
             bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
         )
+        self._stamps = Stamps(bag, (*DRAWN, *TOPICS_READ))
         self._began = self.first = int(bag.line.tick)
-        self.last = max(self.first, bag.span_ns[1] // self._tick_ns)
-        if start is not None:
-            self.first = min(self.last, max(self.first, round(start * 1e9 / self._tick_ns)))
+        self.last = max(self.first, self._stamps.last)
+        if shown is not None:
+            self.first = min(self.last, max(self.first, self.last - round(shown * 1e9 / self._tick_ns)))
         self._block_ticks = block_ticks(self._tick_ns, detail.block)
 
     @property
@@ -99,7 +100,7 @@ class Recording:
         start = self.first + number * self._block_ticks
         gaps = {name: max(1, round(1e9 / getattr(self._detail, name) / self._tick_ns)) for name in DRAWN}
         collector = Collector(self._bag, start, gaps)
-        for topic, tick, raw in self._messages(DRAWN, start, min(start + self._block_ticks, self.last + 1)):
+        for topic, tick, raw in self._stamps.messages(DRAWN, start, min(start + self._block_ticks, self.last + 1)):
             collector.add(topic, tick, raw)
         return pack(collector.content, start)
 
@@ -111,17 +112,9 @@ class Recording:
             length = round(self._detail.story * 1e9 / self._tick_ns)
             start = self._began + number * length
             stop = start + length
-        for topic, _, raw in self._messages(TOPICS_READ, start, stop):
+        for topic, _, raw in self._stamps.messages(TOPICS_READ, start, stop):
             story.add(topic, raw)
         return text(story.data)
-
-    def _messages(
-        self, topics: tuple[str, ...], start: int | None, stop: int | None
-    ) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, tick and bytes of messages from a tick on, before a tick."""
-        first, last = (None if tick is None else tick * self._tick_ns for tick in (start, stop))
-        for topic, stamp, raw in self._bag.raw(topics, first, last):
-            yield topic, stamp // self._tick_ns, raw
 
 
 def text(value: Any) -> bytes:

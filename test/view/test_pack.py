@@ -7,12 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
 from view.line import record
 
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 from conveyor_sim.view.block import Content, levels, pack
 from conveyor_sim.view.one_file import write_page
+from conveyor_sim.view.recording import Detail, Recording
 from conveyor_sim.view.varints import varints
 
 BOTTLES, SECONDS, RATE = 300, 60.0, 25.0
@@ -88,3 +92,20 @@ def test_a_page_that_cannot_be_written_is_said_in_one_sentence(bag: Path, tmp_pa
 
 def test_a_recording_of_a_moment_opens(tmp_path: Path) -> None:
     assert write_page(record(tmp_path / "bag", 0.02), tmp_path / "page.html").stat().st_size > 0
+
+
+def test_what_stock_rosbag2_recorded_gives_the_same_blocks(bag: Path, tmp_path: Path) -> None:
+    """Another storage, and log times of the wall clock."""
+    store = typestore()
+    folder = tmp_path / "stock"
+    with open_bag(bag) as opened, Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connections = {
+            topic: writer.add_connection(f"/hall/{topic}", kind, typestore=store)
+            for topic, kind in opened.types.items()
+        }
+        for topic, stamp, data in opened.raw():
+            writer.write(connections[topic], 1_700_000_000_000_000_000 + stamp // 2, data)
+    with open_bag(bag) as opened, open_bag(folder) as other:
+        ours, theirs = Recording(opened, Detail(), 15.0), Recording(other, Detail(), 15.0)
+        assert (ours.first, ours.last, ours.story()) == (theirs.first, theirs.last, theirs.story())
+        assert all(ours.block(number) == theirs.block(number) for number in range(ours.blocks))

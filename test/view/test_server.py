@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from view.line import LINE
-from view.test_page import canvas, clock, settled
+from view.test_page import TYPE_COLOURS, canvas, clock, disc, settled, to_pixels
 
 from conveyor_sim.bag import own_source
 from conveyor_sim.bag.messages import Header
@@ -101,19 +101,37 @@ def test_the_page_draws_what_the_one_file_draws(
     assert np.array_equal(*pictures)
 
 
-def written(folder: Path, seconds: float) -> Path:
-    """A recording of 300 bottles at 50 Hz on the small line, not simulated."""
+def written(folder: Path, seconds: float, bottles: int = 300) -> Path:
+    """A recording of many bottles in rows of 60, 0.1 m apart, at 50 Hz on the small line, not simulated."""
     simulation = Simulation(load_scene(LINE))
-    ids, zeros = np.arange(300, dtype=np.uint64), np.zeros(300)
-    kinds, belts = np.zeros(300, np.uint16), np.zeros(300, np.int32)
+    ids, zeros = np.arange(bottles, dtype=np.uint64), np.zeros(bottles)
+    kinds, belts = np.zeros(bottles, np.uint16), np.zeros(bottles, np.int32)
     with Recorder(folder) as recorder:
         Outputs(simulation, [recorder], run_id="run").start()
         for tick in range(2, round(100 * seconds) + 1, 2):
-            x = 0.01 * np.arange(300) + 0.5 * np.sin(0.001 * tick)
-            bottles = BottleColumns(ids, kinds, x, zeros, zeros, zeros, zeros, zeros, belts, zeros, zeros)
+            x, y = 0.1 * (ids % 60) + 0.3 * np.sin(0.001 * tick), 0.1 * (ids // 60) + 0.2
+            columns = BottleColumns(ids, kinds, x, y, zeros, zeros, zeros, zeros, belts, zeros, zeros)
             header = Header(tick, tick * 10_000_000, "world")
-            recorder.write("bottles", TOPICS["bottles"].pack(bottles, header), header.stamp_ns)
+            recorder.write("bottles", TOPICS["bottles"].pack(columns, header), header.stamp_ns)
     return folder
+
+
+def test_thousands_of_bottles_are_drawn_where_they_are_too(browser: Any, tmp_path: Path) -> None:
+    """From 2000 on, another way."""
+    html = write_page(written(tmp_path / "bag", 0.2, 2100), tmp_path / "page.html")
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.goto(html.as_uri())
+    page.wait_for_selector("body[data-ready]", timeout=60_000)
+    page.uncheck("#names")
+    page.click("#plan", position={"x": 20, "y": 20})
+    page.keyboard.press("End")
+    settled(page)
+    pixels = canvas(page)
+    for row, column in ((5, 0), (12, 30), (15, 10)):
+        x, y = to_pixels(page, 0.1 * column + 0.3 * np.sin(0.02), 0.1 * row + 0.2)
+        found = disc(pixels, TYPE_COLOURS[0], x, y, 3.0)
+        assert np.abs(found - [x, y]).max() <= 1.0
+    page.close()
 
 
 def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(

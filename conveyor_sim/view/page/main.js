@@ -20,6 +20,7 @@ import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
 
+const MEASURED = 5000; // forces of a block that its scale is made from
 const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
 
 class View {
@@ -82,7 +83,8 @@ class View {
       if (block.measured) continue;
       block.measured = true;
       for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
-      const forces = block.contacts.flatMap(({ force }) => Array.from(force)).sort((a, b) => a - b);
+      const every = Math.ceil(block.contacts.reduce((sum, { force }) => sum + force.length, 0) / MEASURED);
+      const forces = block.contacts.flatMap(({ force }) => Array.from(force).filter((_, i) => i % every === 0)).sort((a, b) => a - b);
       const strong = forces[Math.floor(0.99 * forces.length)] ?? 0;
       this.strongest = Math.max(this.strongestSeen ?? 1, strong);
       this.strongestSeen = this.strongest;
@@ -125,6 +127,11 @@ class View {
     if (show) this.tabs.show("bottle");
     byId("said").textContent = id === null ? "" : `bottle ${id} chosen`;
     this.touch();
+  }
+
+  nextBottle(by) {
+    const ids = (this.plan.frame?.bottles ?? []).map(({ id }) => id), place = ids.indexOf(this.bottle);
+    if (ids.length) this.selectBottle(ids[(place < 0 ? (by > 0 ? 0 : ids.length - 1) : place + by + ids.length) % ids.length]);
   }
 
   selectDevice(name) {

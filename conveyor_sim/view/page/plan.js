@@ -2,6 +2,7 @@
 
 import { Belts } from "./belts.js";
 import { COLOURINGS, palette } from "./colours.js";
+import { Crowd, MANY } from "./crowd.js";
 import { drawAreas, drawLines, drawMovers } from "./devices.js";
 import { Labels } from "./labels.js";
 
@@ -14,7 +15,9 @@ export class Plan {
     this.view = view;
     this.belts = new Belts(view.recording.head.belts);
     this.labels = view.labels = new Labels();
-    this.sprites = new Map();
+    this.sprites = [];
+    this.crowd = new Crowd();
+    this.look = ""; // what they were made for
     this.last = null; // time of the last picture
     this.frame = null;
   }
@@ -24,7 +27,7 @@ export class Plan {
     this.canvas.width = Math.round(clientWidth * ratio);
     this.canvas.height = Math.round(clientHeight * ratio);
     this.ratio = ratio;
-    this.sprites.clear();
+    this.look = "";
     this.view.camera.resize(clientWidth, clientHeight);
   }
 
@@ -67,6 +70,10 @@ export class Plan {
 
   _bottles(frame, colours) {
     const { context, view } = this, { camera, recording: { head } } = view, colouring = COLOURINGS[view.colouring];
+    const look = `${camera.scale} ${colours.edge}`;
+    if (this.look !== look) [this.look, this.sprites] = [look, head.types.map(() => new Map())];
+    const crowd = frame.bottles.length >= MANY ? this.crowd : null, { ratio } = this;
+    crowd?.begin(this.canvas.width, this.canvas.height);
     for (const bottle of frame.bottles) {
       const x = camera.toX(bottle.x), y = camera.toY(bottle.y), radius = head.types[bottle.type].radius * camera.scale;
       if (x < -radius || y < -radius || x > camera.width + radius || y > camera.height + radius) continue;
@@ -75,11 +82,12 @@ export class Plan {
         context.fillStyle = colour;
         context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);
       } else if (radius < 60) {
-        const sprite = this._sprite(colour, radius, colours.edge);
-        context.drawImage(sprite, x - sprite.reach, y - sprite.reach, 2 * sprite.reach, 2 * sprite.reach);
+        const { image, half } = this._sprite(this.sprites[bottle.type], colour, radius, colours.edge);
+        if (!crowd?.add(image, (x - half) * ratio, (y - half) * ratio)) context.drawImage(image, x - half, y - half, 2 * half, 2 * half);
       } else this._circle(context, x, y, radius, colour, colours.edge);
       if (radius > 16) this.labels.add(`${bottle.id}`, x, y - radius - 4, { importance: 1, reach: -11 });
     }
+    crowd?.draw(context, camera.width, camera.height);
   }
 
   _circle(context, x, y, radius, colour, edge) {
@@ -99,21 +107,16 @@ export class Plan {
     }
   }
 
-  // A bottle as a picture: to copy it takes a fraction of drawing it.
-  _sprite(colour, radius, edge) {
-    const key = `${colour} ${radius} ${edge}`;
-    let sprite = this.sprites.get(key);
-    if (!sprite) {
-      if (this.sprites.size > 400) this.sprites.clear();
-      const reach = Math.ceil(radius) + 1;
-      sprite = document.createElement("canvas");
-      sprite.width = sprite.height = Math.ceil(2 * reach * this.ratio);
-      sprite.reach = sprite.width / 2 / this.ratio;
-      const context = sprite.getContext("2d");
-      context.scale(this.ratio, this.ratio);
-      this._circle(context, sprite.reach, sprite.reach, radius, colour, edge);
-      this.sprites.set(key, sprite);
-    }
+  // A bottle as a picture: to copy it takes a fraction of drawing it. They are kept while the scale stays.
+  _sprite(sprites, colour, radius, edge) {
+    const found = sprites.get(colour);
+    if (found) return found;
+    const reach = Math.ceil(radius) + 1, size = Math.ceil(2 * reach * this.ratio), canvas = new OffscreenCanvas(size, size);
+    const context = canvas.getContext("2d"), half = size / 2 / this.ratio;
+    context.scale(this.ratio, this.ratio);
+    this._circle(context, half, half, radius, colour, edge);
+    const sprite = { image: canvas.transferToImageBitmap(), half };
+    sprites.set(colour, sprite);
     return sprite;
   }
 
@@ -131,8 +134,10 @@ export class Plan {
     }
     context.strokeStyle = colours.force;
     context.lineCap = "round";
+    const radius = Math.max(...view.recording.head.types.map((type) => type.radius)) * camera.scale;
+    const unit = Math.min(2, Math.max(0.25, radius / 8)); // so that lines leave bottles to be seen
     paths.forEach((path, i) => {
-      context.lineWidth = Math.min(12, (0.6 + 1.1 * i) * Math.min(2, Math.max(0.6, camera.scale / 250)));
+      context.lineWidth = (0.6 + 1.1 * i) * unit;
       context.stroke(path);
     });
     context.lineCap = "butt";

@@ -1,0 +1,50 @@
+// Thousands of bottles: their pixels are copied into one picture, which is drawn at once. To draw each takes longer.
+
+export const MANY = 2000; // bottles from which on it pays
+
+export class Crowd {
+  constructor() {
+    this.canvas = document.createElement("canvas");
+    this.stamps = new WeakMap();
+  }
+
+  begin(width, height) {
+    if (this.canvas.width !== width || this.canvas.height !== height || !this.data) {
+      [this.canvas.width, this.canvas.height] = [width, height];
+      this.context = this.canvas.getContext("2d");
+      this.data = this.context.createImageData(width, height);
+      this.pixels = new Uint32Array(this.data.data.buffer);
+    }
+    this.pixels.fill(0);
+  }
+
+  // x, y: px of the picture, of the sprite's corner; false: it does not lie inside, and must be drawn otherwise.
+  add(image, x, y) {
+    const left = Math.round(x), top = Math.round(y), { width, height } = this.canvas;
+    if (left < 0 || top < 0 || left + image.width > width || top + image.height > height) return false;
+    const { places, colours } = this._stamp(image), at = top * width + left, { pixels } = this;
+    for (let i = 0; i < places.length; i++) pixels[at + places[i]] = colours[i];
+    return true;
+  }
+
+  draw(context, width, height) {
+    this.context.putImageData(this.data, 0, 0);
+    context.drawImage(this.canvas, 0, 0, width, height);
+  }
+
+  // The pixels of a sprite that cover, and where they are from its corner on in this picture.
+  _stamp(image) {
+    let stamp = this.stamps.get(image);
+    if (!stamp || stamp.width !== this.canvas.width) {
+      const canvas = new OffscreenCanvas(image.width, image.height), context = canvas.getContext("2d");
+      context.drawImage(image, 0, 0);
+      const all = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer), found = [];
+      all.forEach((pixel, i) => {
+        if (pixel >>> 24 > 127) found.push([Math.floor(i / image.width) * this.canvas.width + (i % image.width), (pixel | 0xff000000) >>> 0]);
+      });
+      stamp = { width: this.canvas.width, places: Int32Array.from(found, ([place]) => place), colours: Uint32Array.from(found, ([, colour]) => colour) };
+      this.stamps.set(image, stamp);
+    }
+    return stamp;
+  }
+}
