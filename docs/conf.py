@@ -42,7 +42,7 @@ STUDIES = sorted(ROOT.glob("docs/accuracy/*/tables.md"))
 NAVIGATION = {
     "README": {
         "First steps": [
-            *("docs/build_a_line", "docs/testing_control_logic", "docs/ros"),
+            *("docs/build_a_line", "docs/testing_control_logic", "docs/structured_text", "docs/ros"),
             *("docs/scada", "docs/opcua", "docs/plc"),
         ],
         "A line": [

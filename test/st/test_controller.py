@@ -242,3 +242,16 @@ def test_a_program_that_stops_says_where(tmp_path: Path) -> None:
     plc = bound(tmp_path, "VAR n : INT; END_VAR", "WHILE TRUE DO\n  n := n + 1;\nEND_WHILE")
     with pytest.raises(StructuredTextError, match=r"program\.st:2:1: watchdog: found more than 100000"):
         scan(plc, 0)
+
+
+def test_a_program_brought_over_from_codesys_runs_the_line(tmp_path: Path) -> None:
+    """docs/structured_text.md, A program carried through: what was refused, and what became of it."""
+    with pytest.raises(StructuredTextError, match=r"codesys\.st:111:17: found GVL, which is not declared"):
+        StructuredText(PROGRAMS / "brought_over" / "codesys.st")
+    plant = Scenario(TABLE)
+    fill(plant, PROGRAMS / "brought_over" / "table.st")
+    plant.always(lambda s: s["belts/table/bottles"] <= 45, for_=5)
+    plant.inject("machines/packer/stop", 0)
+    plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
+    assert plant.signals["plc/plc_prg/fbfeeder/nstops"] == 1
+    assert plant.signals["plc/plc_prg/wstatus"] == 0x0102
