@@ -30,7 +30,12 @@ setup(
     license="Apache-2.0",
     classifiers=["Operating System :: POSIX :: Linux", "Programming Language :: Python :: 3"],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.st": ["grammar.lark"], f"{NAME}.view": ["page/*", "page/lib/*"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.st": ["grammar.lark"],
+        f"{NAME}.view": ["page/*", "page/lib/*"],
+        f"{NAME}.scada.opcua": ["nodesets/*.xml"],
+    },
     # share/ as ROS expects it; conveyor_sim/support/resources.py finds config/ and msg_defs/ there.
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

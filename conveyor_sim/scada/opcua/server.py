@@ -23,6 +23,7 @@ from conveyor_sim.scada.opcua.history import History
 from conveyor_sim.scada.opcua.line_events import LineEvents
 from conveyor_sim.scada.opcua.methods import Methods, add_methods
 from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
+from conveyor_sim.scada.opcua.packml import PackMl
 from conveyor_sim.scada.opcua.requests import Client, Requests, reader
 from conveyor_sim.scada.opcua.session import SafeServer
 from conveyor_sim.scada.opcua.transport import BoundedServer
@@ -124,8 +125,10 @@ class OpcUaServer:
         alarms = AlarmStates(nodes, emitter, clock)
         events = LineEvents(self._source, nodes, emitter, clock)
         internal.requests = self._requests
-        internal.methods = Methods(self._source, self._requests, alarms.is_last_event)
-        updates = Updates(self._source, nodes, clock, alarms.follow, events.follow)
+        packml = PackMl(self._source, self._requests, clock)
+        await packml.add(server, nodes)
+        internal.answers = (Methods(self._source, self._requests, alarms.is_last_event).call, packml.call)
+        updates = Updates(self._source, nodes, clock, packml.follow, alarms.follow, events.follow)
         await updates.bring_present()
         try:
             await server.listen(host, port)

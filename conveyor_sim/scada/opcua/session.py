@@ -7,6 +7,7 @@ the address space. Here no write and no call reaches it, but the two that send c
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from struct import error as StructError
 from struct import unpack_from
@@ -20,7 +21,6 @@ from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
 
 from conveyor_sim.line.inputs import SET
-from conveyor_sim.scada.opcua.methods import Methods
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.transport import channel
@@ -45,13 +45,17 @@ _DECRYPTED = {
 _NOBODY = User(role=UserRole.Anonymous)
 
 
+Answer = Callable[[User, ua.CallMethodRequest], ua.CallMethodResult | None]
+
+
 class SafeServer(InternalServer):
     """The library's server with sessions of this kind."""
 
     def __init__(self, user_manager: Any) -> None:
         super().__init__(user_manager)
         self.requests: Requests | None = None
-        self.methods: Methods | None = None
+        self.answers: Sequence[Answer] = ()
+        """Who may know a method that is called."""
 
     def create_session(self, name: str, user: User = _NOBODY, external: bool = False) -> InternalSession:
         """One a connection: the library would keep those before it for ever."""
@@ -110,11 +114,10 @@ class Session(InternalSession):
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Methods of this package; and those of the library that send conditions again."""
-        if self.iserver.methods is None:
-            raise ServiceError(Codes.BadServerHalted)
         results = []
         for request in params or []:
-            result = self.iserver.methods.call(self.user, request)
+            answers = (answer(self.user, request) for answer in self.iserver.answers)
+            result = next((found for found in answers if found is not None), None)
             if result is None and request.MethodId in REFRESH:
                 (result,) = await super().call([request])
             results.append(result or ua.CallMethodResult(ua.StatusCode(Codes.BadMethodInvalid), [], [], []))
