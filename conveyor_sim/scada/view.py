@@ -229,7 +229,20 @@ def _tag(
     device_class: str,
 ) -> Tag:
     said = {int(number): text for number, text in _TEXT.findall(texts)}
-    return Tag(name, kind, role, description, unit, low, high, initial, nominal or None, said, "", device, device_class)
+    return Tag(
+        name,
+        kind,
+        role,
+        description,
+        unit,
+        low,
+        high,
+        initial,
+        nominal or None,
+        said,
+        device=device,
+        device_class=device_class,
+    )
 
 
 _TEXT = re.compile(r"(-?\d+) (.*?)(?=, -?\d+ |$)")
