@@ -12,7 +12,21 @@ from conveyor_sim.support.interrupt import one_line, while_importing
 with while_importing():
     import click
 
-    from bench import control, dense, growth, lockstep, markdown, memory, node, plant, riding, start, targets, whole
+    from bench import (
+        control,
+        dense,
+        growth,
+        lockstep,
+        markdown,
+        memory,
+        node,
+        plant,
+        riding,
+        scada,
+        start,
+        targets,
+        whole,
+    )
     from bench.measure import Effort, say
     from bench.rows import Row, Rows
     from conveyor_sim.support.machine import PACKAGES, machine
@@ -44,6 +58,7 @@ PARTS: dict[str, Part] = {
     "control": control,
     "riding": riding,
     "lockstep": lockstep,
+    "scada": scada,
     "whole": whole,
 }
 

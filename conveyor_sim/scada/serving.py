@@ -56,6 +56,10 @@ class Serving(AbstractContextManager["Serving"]):
         counts = [f"{name} {_writes(status)}" for name, status in self._statuses()]
         return f"served up to {self._time:g} s; {', '.join(counts)}"
 
+    def latencies(self) -> dict[str, float]:
+        """s of wall time by protocol, the longest since somebody asked."""
+        return {name: status.latency for name, status in self._statuses()}
+
     def close(self) -> None:
         """End all of them."""
         for face in self._faces:
@@ -77,9 +81,12 @@ class Serving(AbstractContextManager["Serving"]):
 
 
 def _told(name: str, status: Status) -> str:
-    subscriptions = f", {status.subscriptions} subscriptions" if status.subscriptions else ""
-    clients = "1 client" if status.clients == 1 else f"{status.clients} clients"
-    return f"{name}: {clients}{subscriptions}, {_writes(status)}, {status.latency * 1e3:.1f} ms"
+    subscriptions = f", {_many(status.subscriptions, 'subscription')}" if status.subscriptions else ""
+    return f"{name}: {_many(status.clients, 'client')}{subscriptions}, {_writes(status)}, {status.latency * 1e3:.1f} ms"
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _writes(status: Status) -> str:
