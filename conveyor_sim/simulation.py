@@ -1,6 +1,5 @@
 """`Simulation`: the one class that the node, the command line and the tests drive."""
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -30,6 +29,7 @@ from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
 from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
 from conveyor_sim.state.state import FIRST_SLOTS, Held, State
+from conveyor_sim.state.state_hash import state_hash
 from conveyor_sim.state.world_arrays import changing_arrays
 from conveyor_sim.stepping.guard import GuardEvent
 from conveyor_sim.stepping.tick import Integration
@@ -97,12 +97,16 @@ class Simulation:
         simulation._restore(checkpoint)
         return simulation
 
-    def save(self, path: str | PathLike[str], folder: Path | None = None) -> None:
+    def save(
+        self, path: str | PathLike[str], folder: Path | None = None, controller: dict[str, Any] | None = None
+    ) -> None:
         """Write a checkpoint: the whole state at this tick, in place of what the file held. The run does not notice.
 
-        folder: as for `load`. Raises CheckpointError if the file can't be written, which leaves what it held.
+        folder: as for `load`. controller: what that remembers, to be kept with it.
+        Raises CheckpointError if the file can't be written, which leaves what it held.
         """
-        write_checkpoint(Path(path), self.scene, self._snapshot(), changing_arrays(self._state.world), folder)
+        arrays = changing_arrays(self._state.world)
+        write_checkpoint(Path(path), self.scene, self._snapshot(), arrays, folder, controller)
 
     @property
     def time(self) -> float:
@@ -335,14 +339,10 @@ class Simulation:
 
     def state_hash(self) -> int:
         """64 bits over tick, bottles, belts and moving rails: equal if and (all but surely) only if the states are."""
-        bottles = self.bottles()
-        digest = hashlib.blake2b(np.int64(self.tick).tobytes(), digest_size=8)
-        for name in ("id", "type", "x", "y", "theta", "vx", "vy", "omega"):
-            digest.update(getattr(bottles, name).tobytes())
-        digest.update(self._line.now.setpoints.tobytes() + self._line.now.speeds.tobytes() + self._state.springs())
-        if (moving := self._state.world.moving) is not None:
-            digest.update(moving.position.tobytes() + moving.speed.tobytes())
-        return int.from_bytes(digest.digest(), "little")
+        bottles, now = self.bottles(), self._line.now
+        names = ("id", "type", "x", "y", "theta", "vx", "vy", "omega")
+        columns = [*(getattr(bottles, name) for name in names), now.setpoints, now.speeds]
+        return state_hash(self.tick, columns, self._state)
 
     def rehearse(self) -> None:
         """Call what the line may call of the engine in a later tick, so that it is compiled before a run begins."""

@@ -47,7 +47,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "st": "control scada | lark",
     "ros": "bag control errors explain line live model observe runs scada scene simulation st support version | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
-    "testing": "bag control engine errors line plot ros scada scene simulation support view | numpy pytest",
+    "testing": "bag control engine errors line plot ros scada scene simulation state support view | numpy pytest",
     "cli": "accuracy bag control errors explain line model ros runs scada scene st support version view | click rich",
 }
 """By room, from the lowest up: the rooms of the project, then the packages of others that it imports."""

@@ -49,9 +49,7 @@ _WHERE = {
 @click.option("--opcua-users", type=click.Path(path_type=Path), help="File of its users, who may do more than read.")
 @click.option("--opcua-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
 @click.option("--opcua-anonymous/--no-opcua-anonymous", default=True, help="Whether all may read (default: they may).")
-@click.option(
-    "--opcua-history", multiple=True, metavar="PATTERN", help="Tags to keep values of: 'belts/*/speed'."
-)
+@click.option("--opcua-history", multiple=True, metavar="PATTERN", help="Tags to keep values of: 'belts/*/speed'.")
 @click.option("--modbus", type=PORT, is_flag=False, flag_value=5020, help="Serve Modbus TCP on this port.")
 @click.option("--modbus-role", type=click.Choice(["controller", "operator"]), help="As what its clients may write.")
 @click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")

@@ -97,6 +97,14 @@ class AlarmChanges:
         self._given = now
         return changes
 
+    def snapshot(self) -> dict[str, float]:
+        """The alarms that were given."""
+        return dict(self._given)
+
+    def restore(self, given: Mapping[str, float]) -> None:
+        """Go on from there."""
+        self._given = {str(name): float(value) for name, value in given.items()}
+
 
 @dataclass(frozen=True)
 class Constant:

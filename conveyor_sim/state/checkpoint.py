@@ -53,6 +53,8 @@ class Checkpoint:
     """What the run remembers beside its arrays, as plain data; not checked."""
     arrays: Arrays
     """Those that change, by name (`world_arrays.py`); not checked."""
+    controller: dict[str, Any] | None = None
+    """What the line's controller remembered, if that was saved; not checked."""
 
 
 class _Source(BaseModel, strict=True, extra="forbid"):
@@ -69,17 +71,24 @@ class _Header(BaseModel, strict=True, extra="forbid"):
     versions: Annotated[list[_Version], Field(max_length=100)]
     scene: _Source
     memory: dict[str, Any]
+    controller: dict[str, Any] | None = None
 
 
 def write_checkpoint(
-    path: Path, scene: Scene, memory: dict[str, Any], arrays: Arrays, folder: Path | None = None
+    path: Path,
+    scene: Scene,
+    memory: dict[str, Any],
+    arrays: Arrays,
+    folder: Path | None = None,
+    controller: dict[str, Any] | None = None,
 ) -> None:
     """Write a file in one go: it is complete, or what was there before is untouched.
 
-    memory: as JSON can hold it. folder: which the path may not leave. Raises CheckpointError.
+    memory: as JSON can hold it, as is what the controller remembers. folder: which the path may not leave. Raises
+    CheckpointError.
     """
     source = {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text}
-    header = {"format": FORMAT, "versions": versions(), "scene": source, "memory": memory}
+    header = {"format": FORMAT, "versions": versions(), "scene": source, "memory": memory, "controller": controller}
     size = sum(array.nbytes for array in arrays.values())
     if size > MOST - MB:
         raise CheckpointError(f"{path}: would have {in_mb(size)}, expected a state of less than {in_mb(MOST - MB)}")
@@ -121,7 +130,7 @@ def read_checkpoint(path: Path, scene: Scene | None = None, folder: Path | None 
             f"{path}: saved from a scene with {field}: {here}, which is {given} in the scene given; "
             "expected the same scene"
         )
-    return Checkpoint(path, saved if scene is None else scene, header.memory, arrays)
+    return Checkpoint(path, saved if scene is None else scene, header.memory, arrays, header.controller)
 
 
 def damaged(path: Path, reason: object) -> CheckpointError:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.line_tags import LineTags, bind
+from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.state.checkpoint import read_checkpoint
 from conveyor_sim.testing.conditions import Present
 
 if TYPE_CHECKING:
@@ -104,6 +106,21 @@ class ScanCycle:
         image = self._simulation.process_image
         self._plc = self._controller = ServedPlc(image, url, tags, user, password, patience)
 
+    def snapshot(self) -> dict[str, Any] | None:
+        """What the controller remembers and has answered last; None without one, or for a node or PLC."""
+        if self._controller is None or self._node is not None or self._plc is not None:
+            return None
+        return {**snapshot(self._controller), "answer": dict(self._answer), "alarms": self._changes.snapshot()}
+
+    def resume(self, start: Path | None) -> None:
+        """Have the controller go on from a checkpoint. Raises ControlError."""
+        kept = None if start is None else read_checkpoint(start).controller
+        if kept is None or self._controller is None:
+            raise ControlError(f"resume: found no controller in {start}, expected a checkpoint of `Scenario.save`")
+        restore(self._controller, kept)
+        self._answer = {str(name): float(value) for name, value in kept["answer"].items()}
+        self._changes.restore(kept["alarms"])
+
     def close(self) -> None:
         """End the node or the PLC, if one is attached."""
         for outsider in (self._node, self._plc):
@@ -149,6 +166,11 @@ class ScanCycle:
         """What became of inputs at a tick."""
         if self._node is not None:
             self._node.note(outcomes)
+
+
+def by_other_hands(outcome: CommandOutcome) -> bool:
+    """Whether a controller was refused what somebody else works."""
+    return outcome.without_control and outcome.input.writer_kind == "controller"
 
 
 class _Behind(Mapping[str, float]):

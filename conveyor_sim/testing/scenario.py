@@ -16,19 +16,19 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, CommandOutcome, Input
+from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.scada.modbus_map import Row
 from conveyor_sim.scada.source import FACES, TickSource
-from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
-from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import plc
 from conveyor_sim.testing.conditions import Assertion, Condition, Present, values
 from conveyor_sim.testing.history import History
 from conveyor_sim.testing.person import Person
-from conveyor_sim.testing.scan_cycle import PATIENCE, ScanCycle
+from conveyor_sim.testing.scan_cycle import PATIENCE, ScanCycle, by_other_hands
+from conveyor_sim.testing.scene_of import scene_of
 
 TEST = "test"
 """Source of commands that the test itself gives."""
@@ -77,7 +77,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._read: dict[str, None] = {}
         self._recorder = None if bag is None else Recorder(bag)
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
-        began = None if start is None else Path(start)
+        began = self._began = None if start is None else Path(start)
         if began is not None:
             forget_past(self.simulation)
             if owner := self.simulation.line.modes.owner:  # of the run before, whose controller is gone
@@ -134,10 +134,24 @@ class Scenario(AbstractContextManager["Scenario"]):
         """Names of the signals that the controller has read."""
         return tuple(self._cycle.read)
 
-    def attach(self, controller: Controller) -> None:
-        """Have a controller scan at this tick and every one to come, in place of the one before."""
+    def attach(self, controller: Controller, *, resume: bool = False) -> None:
+        """Have a controller scan at this tick and every one to come, in place of the one before.
+
+        resume: it goes on from what the one of the checkpoint remembered, which `save` has kept: with the same bits as
+        if the run had never stopped. Raises ControlError if it can't.
+        """
         self._cycle.attach(controller)
-        self._scan()
+        if resume:
+            self._cycle.resume(self._began)
+        else:
+            self._scan()
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a checkpoint of the line and of its controller, which another scenario can start from.
+
+        Raises CheckpointError, and ControlError for a controller that can't be held.
+        """
+        self.simulation.save(path, controller=self._cycle.snapshot())
 
     def attach_node(
         self,
@@ -336,7 +350,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         for outcome in outcomes:
             if outcome.accepted:
                 self.history.take(outcome, outcome.source == TEST)
-            elif (outcome.source not in FACES or self._cycle.answers_for(outcome)) and not _by_other_hands(outcome):
+            elif (outcome.source not in FACES or self._cycle.answers_for(outcome)) and not by_other_hands(outcome):
                 refused.append(outcome.reason)
         self._look()
         for source in self._sources:
@@ -383,17 +397,3 @@ class Scenario(AbstractContextManager["Scenario"]):
         if not (math.isfinite(seconds) and seconds >= 0.0):
             raise ValueError(f"{seconds:g} s given, expected 0 s or more")
         return math.ceil(seconds / self.scene.tick - _ROUNDING)
-
-
-def _by_other_hands(outcome: CommandOutcome) -> bool:
-    """Whether a controller was refused what somebody else works."""
-    return outcome.without_control and outcome.input.writer_kind == "controller"
-
-
-def scene_of(scene: Scene | str | PathLike[str], overrides: Mapping[str, Any] | None) -> Scene:
-    """The scene that a Scenario's arguments mean; raises as that does."""
-    if not isinstance(scene, Scene):
-        return load_scene(scene_path(Path(scene)), overrides)
-    if overrides is not None:
-        raise ValueError("overrides given for a scene that is loaded, expected them where it is loaded")
-    return scene

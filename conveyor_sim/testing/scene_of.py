@@ -1,0 +1,20 @@
+"""The scene that a test names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.support.resources import scene_path
+
+
+def scene_of(scene: Scene | str | PathLike[str], overrides: Mapping[str, Any] | None) -> Scene:
+    """The scene that a Scenario's arguments mean; raises as that does."""
+    if not isinstance(scene, Scene):
+        return load_scene(scene_path(Path(scene)), overrides)
+    if overrides is not None:
+        raise ValueError("overrides given for a scene that is loaded, expected them where it is loaded")
+    return scene
