@@ -9,10 +9,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.bag.topics import TOPICS
 
-TOPICS_READ = ("events", "alarm_states", "readback", "counters", "run_state")
+TOPICS_READ = ("events", "alarm_states", "readback", "counters", "rail_wear", "run_state")
 """Those that it is made of."""
 
 _DECLARED = ("id", "text", "alarm_class", "priority", "tag", "group", "latching")
@@ -22,6 +24,10 @@ _COUNTED = (
     "running", "starved", "blocked", "down", "planned", "idle",
     "rate", "availability", "effectiveness", "quality", "oee", "mtbf", "mttr", "category", "stop_reason",
 )  # fmt: skip
+
+_WORN = ("scuffing_work", "impulse")
+WEAR_EVERY = 5.0
+"""s of simulated time from one entry of what rails have borne to the next, at least."""
 
 
 class Story:
@@ -33,6 +39,7 @@ class Story:
         self._counters_every = counters_every
         self._last: dict[str, dict[Any, Any]] = {"alarms": {}, "commands": {}}
         self._counted = -math.inf
+        self._worn = -math.inf
         self.data: dict[str, Any] = {
             "events": {name: [] for name in ("at", "kind", "name", "bottle", "value", "text")},
             "alarms": {},
@@ -40,6 +47,8 @@ class Story:
             "readback": [],
             "counters": [],
             "runs": [],
+            "bins": None,
+            "wear": [],
         }
 
     def add(self, topic: str, raw: bytes) -> None:
@@ -86,6 +95,16 @@ class Story:
         names, bottleneck = list(message.name), list(message.bottleneck)
         self.data["counters"].append({"at": time, "name": names, "rows": rows, "bottleneck": bottleneck})
 
+    def _rail_wear(self, message: Any, time: float) -> None:
+        if time < self._worn + WEAR_EVERY - 1e-9:
+            return
+        self._worn = time
+        if self.data["bins"] is None:
+            places = {name: np.round(getattr(message, name), 4).tolist() for name in ("x", "y", "length")}
+            self.data["bins"] = {"rail": message.rail.tolist(), **places}
+        scuffing, impulse = ([_short(value) for value in getattr(message, name).tolist()] for name in _WORN)
+        self.data["wear"].append([time, scuffing, impulse])
+
     def _run_state(self, message: Any, time: float) -> None:
         self.data["runs"].append([time, message.text, message.reason])
 
@@ -93,6 +112,11 @@ class Story:
 def fields() -> Mapping[str, tuple[str, ...]]:
     """What rows hold, by list."""
     return {"counters": _COUNTED, "alarm_changes": ("at", "number", *_ALARM)}
+
+
+def _short(value: float) -> float:
+    """With as many digits as a colour shows."""
+    return float(f"{value:.3g}")
 
 
 def _plain(value: Any) -> Any:

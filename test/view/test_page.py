@@ -219,11 +219,34 @@ def test_a_bottle_is_chosen_followed_and_let_go(page: Any, bag: Path) -> None:
     assert "Click a bottle" in page.inner_text("#panel_bottle")
 
 
+def test_bottles_are_chosen_by_keys_one_after_the_other(page: Any) -> None:
+    seek(page, 12.0)
+    press(page, "b")
+    first = int(page.inner_text("#panel_bottle").split("id\n")[1].split("\n")[0])
+    press(page, "b")
+    assert int(page.inner_text("#panel_bottle").split("id\n")[1].split("\n")[0]) > first
+
+
 def test_bottles_are_coloured_as_chosen_by_a_key(page: Any) -> None:
     page.click("#plan", position={"x": 20, "y": 20})
     press(page, "c")
     assert page.input_value("#colour") == "speed"
     assert "m/s" in page.inner_text("#legend")
+
+
+def test_rails_are_coloured_by_what_they_have_borne(page: Any) -> None:
+    page.uncheck("#names")
+    page.uncheck("#forces")
+    press(page, "End")
+    places = [tuple(map(round, to_pixels(page, 2.0, y))) for y in (0.036, -0.036)]  # of the rail that the queue is at
+    hot = []
+    for what in ("", "pressure"):
+        page.select_option("#wear", what)
+        settled(page)
+        red, _, blue = np.moveaxis(canvas(page), 2, 0)
+        hot.append(any(red[y, x] > blue[y, x] + 60 for x, y in places))
+    assert hot == [False, True]
+    assert "N/m" in page.inner_text("#legend")
 
 
 def test_signals_are_put_on_the_trends_and_taken_off(page: Any) -> None:

@@ -10,12 +10,12 @@ export class Camera extends EventTarget {
     this.x = (bounds[0] + bounds[2]) / 2;
     this.y = (bounds[1] + bounds[3]) / 2;
     this.width = this.height = 1;
+    this.fitted = true; // nobody has moved it: it follows the size of the window
   }
 
   resize(width, height) {
-    const first = this.width === 1;
     [this.width, this.height] = [width, height];
-    if (first) this.fit();
+    if (this.fitted) this.fit();
     else this._changed();
   }
 
@@ -25,7 +25,7 @@ export class Camera extends EventTarget {
     this.y = (y0 + y1) / 2;
     const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - 2 * margin) / Math.max(y1 - y0, 0.01));
     this.scale = Math.min(MOST, Math.max(1, fitting));
-    this._changed();
+    this._changed(true);
   }
 
   toX(x) {
@@ -59,7 +59,8 @@ export class Camera extends EventTarget {
     this._changed();
   }
 
-  _changed() {
+  _changed(fitted = false) {
+    this.fitted = fitted;
     this.dispatchEvent(new Event("change"));
   }
 

@@ -5,7 +5,7 @@ import { Bars } from "./bars.js";
 import { Bottle } from "./bottle.js";
 import { Camera } from "./camera.js";
 import { Clock, SPEEDS } from "./clock.js";
-import { COLOURINGS, isDark } from "./colours.js";
+import { COLOURINGS, SCALES, isDark } from "./colours.js";
 import { deviceOf, middle } from "./devices.js";
 import { byId, element, seconds } from "./dom.js";
 import { Events } from "./events.js";
@@ -19,6 +19,7 @@ import { Story } from "./story.js";
 import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
+import { WEARS, Wear } from "./wear.js";
 
 const MEASURED = 5000; // forces of a block that its scale is made from
 const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
@@ -26,11 +27,12 @@ const PANELS_EVERY = 120; // ms between two pictures of the panels while time go
 class View {
   constructor(recording, story) {
     Object.assign(this, { recording, story, bottle: null, following: false, colouring: "type", showForces: true, showNames: true, dirty: true });
-    this.fastest = 1;
-    this.strongest = 10;
+    this.fastest = 0.1;
+    this.strongest = 1;
     this.oldest = Math.max(1, Math.min(60, recording.end - recording.start));
     this.clock = new Clock(recording);
     this.camera = new Camera(boundsOf(recording.head));
+    this.wear = new Wear(this);
     this.plan = new Plan(byId("plan"), this);
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
@@ -53,7 +55,7 @@ class View {
   }
 
   say(text) {
-    byId("notice").textContent = text;
+    byId("notice").textContent = byId("notice").title = text;
   }
 
   badge(name, count) {
@@ -68,7 +70,13 @@ class View {
     this.story.add(part);
     this.events.filter();
     this.bars.named();
+    this.worn();
     this.touch();
+  }
+
+  // The choice of heat maps is there if the recording has any.
+  worn() {
+    byId("worn").hidden = !this.story.data.wear.length;
   }
 
   _loaded() {
@@ -168,18 +176,22 @@ class View {
   }
 
   legend() {
-    const colouring = COLOURINGS[this.colouring], box = byId("legend");
-    if (colouring.ramp) {
-      const [low, high] = colouring.ends(this), bar = element("span", { class: "ramp" });
-      bar.style.background = `linear-gradient(to right, ${colouring.ramp.join(", ")})`;
-      box.replaceChildren(`${low} `, bar, ` ${high}`);
-      return;
+    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear;
+    const ramp = (colours, low, high) => {
+      const bar = element("span", { class: "ramp" });
+      bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
+      return element("span", { class: "entry" }, `${low} `, bar, ` ${high}`);
+    };
+    if (colouring.ramp) entries.push(ramp(colouring.ramp, ...colouring.ends(this)));
+    else {
+      entries.push(...colouring.legend(this).map(([colour, name]) => {
+        const swatch = element("span", { class: "swatch" });
+        swatch.style.background = colour;
+        return element("span", { class: "entry" }, swatch, name);
+      }));
     }
-    box.replaceChildren(...colouring.legend(this).map(([colour, name]) => {
-      const swatch = element("span", { class: "swatch" });
-      swatch.style.background = colour;
-      return element("span", { class: "entry" }, swatch, name);
-    }));
+    if (shown) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
+    byId("legend").replaceChildren(...entries);
   }
 
   clicked(px, py) {
@@ -266,6 +278,9 @@ function wire(view) {
     },
   };
   for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
+  byId("wear").append(...Object.entries(WEARS).map(([name, { label }]) => element("option", { value: name }, label)));
+  byId("wear").addEventListener("change", (event) => { view.wear.shown = event.target.value; view.draw(0); view.legend(); });
+  view.worn();
   for (const [id, field] of [["forces", "showForces"], ["names", "showNames"]]) {
     byId(id).addEventListener("change", (event) => { view[field] = event.target.checked; view.touch(); });
   }
@@ -297,11 +312,11 @@ async function start() {
     if (view.dirty) {
       view.dirty = false;
       view.draw(now);
+      document.body.dataset.ready = "yes";
     }
     requestAnimationFrame(loop);
   };
   requestAnimationFrame(loop);
-  document.body.dataset.ready = "yes";
   // A long recording is gone through while one looks at it already.
   for (let part = 0; parts > 1 && part < parts; part++) {
     view.say(`reading what happened: ${Math.round((100 * part) / parts)} %`);

@@ -46,6 +46,7 @@ export class Plan {
     this.belts.draw(context, camera, colours, speeds);
     drawAreas(context, camera, colours, view);
     this._rails(colours);
+    view.wear.draw(context, camera);
     if (frame) this._bottles(frame, colours);
     if (frame && view.showForces) this._forces(frame, colours);
     drawMovers(context, camera, colours, view);
@@ -135,7 +136,7 @@ export class Plan {
     context.strokeStyle = colours.force;
     context.lineCap = "round";
     const radius = Math.max(...view.recording.head.types.map((type) => type.radius)) * camera.scale;
-    const unit = Math.min(2, Math.max(0.25, radius / 8)); // so that lines leave bottles to be seen
+    const unit = Math.min(2, Math.max(0.25, radius / 14)); // so that lines leave bottles to be seen
     paths.forEach((path, i) => {
       context.lineWidth = (0.6 + 1.1 * i) * unit;
       context.stroke(path);

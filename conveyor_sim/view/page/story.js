@@ -15,7 +15,7 @@ const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
 
 export const stateName = (number) => STATE_NAMES[number] ?? `state ${number}`;
 
-const LISTS = ["alarm_changes", "readback", "counters", "runs"];
+const LISTS = ["alarm_changes", "readback", "counters", "runs", "wear"];
 
 export class Story {
   constructor(head) {
@@ -30,6 +30,7 @@ export class Story {
     for (const [name, column] of Object.entries(data.events)) this.data.events[name] = (this.data.events[name] ?? []).concat(column);
     for (const list of LISTS) this.data[list] = this.data[list].concat(data[list]);
     Object.assign(this.data.alarms, data.alarms);
+    if (data.bins) this.data.bins = data.bins;
     this.build();
   }
 

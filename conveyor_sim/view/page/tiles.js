@@ -3,7 +3,8 @@
 import { CATEGORIES } from "./colours.js";
 import { element } from "./dom.js";
 
-const percent = (share) => (share === null || share === undefined ? "–" : `${(100 * share).toFixed(1)} %`);
+const NOTHING = "–";
+const percent = (share) => (share === null || share === undefined ? NOTHING : `${(100 * share).toFixed(1)} %`);
 
 export class Tiles {
   constructor(view) {
@@ -35,10 +36,10 @@ export class Tiles {
         }));
       return element("article", { class: "tile" },
         element("h3", {}, name.replace("machines/", "")),
-        element("div", { class: "oee" }, element("strong", {}, percent(row.oee)), element("span", {}, "OEE")),
+        row.oee === null ? null : element("div", { class: "oee" }, element("strong", {}, percent(row.oee)), element("span", {}, "OEE")),
         element("dl", {},
           ...[["availability", percent(row.availability)], ["effectiveness", percent(row.effectiveness)], ["quality", percent(row.quality)],
-            ["bottles", `${row.processed}`]].flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
+            ["bottles", `${row.processed}`]].filter(([, value]) => value !== NOTHING).flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
         all ? bar : null,
         row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, `${row.category}: ${row.stop_reason}`) : null);
     }));
