@@ -39,6 +39,8 @@ class ServedPlc(AbstractContextManager["ServedPlc"]):
         self._url, self._patience = url, patience
         self._target = -1
         self._answer: dict[str, float] = {}
+        self.variables: dict[str, float] = {}
+        """Values of the PLC's own (plc/<name>), as they were after its last scan."""
         with ExitStack() as stack:
             self._thread = stack.enter_context(ServerThread())
             self._link = link(url, all_of(self._map), user, password)
@@ -63,9 +65,12 @@ class ServedPlc(AbstractContextManager["ServedPlc"]):
             try:
                 self._thread.run(self._link.write({**signals, TICK: float(inputs.tick)}))
                 self._target = self._wait(inputs)
-                self._answer = self._thread.run(self._link.read([each.tag.name for each in self._map.read]))
+                asked = [each.tag.name for each in (*self._map.read, *self._map.own)]
+                found = self._thread.run(self._link.read(asked))
             except LinkError as error:
                 raise ControlError(f"at {inputs.time:.2f} s no PLC: {error}") from error
+            self.variables = {each.tag.name: found.pop(each.tag.name) for each in self._map.own}
+            self._answer = found
         return self._answer
 
     def _wait(self, inputs: Inputs) -> int:

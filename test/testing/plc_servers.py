@@ -9,6 +9,7 @@ from pathlib import Path
 from testing.soft_plc import BOTTLES, SETPOINT, speed
 
 ALARM = "alarms/second zone full"
+OWN = "plc/next tick"
 Program = Callable[[float], "tuple[float, bool]"]
 
 
@@ -65,12 +66,13 @@ class OpcUaPlc:
 
     async def stop(self) -> None:
         self._task.cancel()
-        await asyncio.gather(self._task, return_exceptions=True)
+        await asyncio.wait({self._task}, timeout=10.0)
         await self._server.stop()
 
     @staticmethod
     def places() -> dict[str, str]:
         names = {BOTTLES: "bottles", SETPOINT: "speed", ALARM: "full", "run/tick": "tick", "run/target_tick": "target"}
+        names[OWN] = "target"
         return {ours: f"ns=2;s=GVL.{theirs}" for ours, theirs in names.items()}
 
 
@@ -115,7 +117,7 @@ class ModbusPlc:
 
     async def stop(self) -> None:
         self._task.cancel()
-        await asyncio.gather(self._task, return_exceptions=True)
+        await asyncio.wait({self._task}, timeout=10.0)
         self._client.close()
         await self._server.shutdown()
 
@@ -127,6 +129,7 @@ class ModbusPlc:
             ALARM: "coil 3 bool",
             "run/tick": "holding register 0 uint32",
             "run/target_tick": "holding register 10 uint32 big",
+            OWN: "holding register 10 uint32",
         }
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from testing.plc_servers import ALARM, KINDS, program, write_map
+from testing.plc_servers import ALARM, KINDS, OWN, program, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
 
 from conveyor_sim.bag.reader import open_bag
@@ -74,6 +74,7 @@ def test_a_served_plc_gives_the_bits_of_its_program(plc: Plc, tmp_path: Path) ->
         for name in (BOTTLES, SETPOINT, ALARM):
             assert np.array_equal(outside.history[name], inside.history[name])
         assert np.ptp(outside.history[SETPOINT]) > 0.0 and np.ptp(outside.history[ALARM]) > 0.0
+        assert outside.signals[OWN] == outside.simulation.tick + 1
         assert plc.made.scans == SECONDS / inside.scene.tick + 1
     assert replay(tmp_path / "bag").difference is None
 

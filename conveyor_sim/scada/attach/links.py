@@ -12,7 +12,7 @@ from conveyor_sim.support.printable import printable
 
 def all_of(tags: TagMap) -> tuple[Mapped, ...]:
     """All that a map names."""
-    return (*tags.written, *tags.read, *(each for each in (tags.tick, tags.target) if each is not None))
+    return (*tags.written, *tags.read, *tags.own, *(each for each in (tags.tick, tags.target) if each is not None))
 
 
 def link(url: str, mapped: Sequence[Mapped], user: str = "", password: str = "") -> Link:

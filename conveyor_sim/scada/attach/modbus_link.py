@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_args
 
@@ -33,7 +34,7 @@ class ModbusLink:
         host, port = self._at
         client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
         self._client = client
-        if not await client.connect():
+        if not await asyncio.wait_for(client.connect(), 2.0 * PATIENCE):
             raise LinkError(f"{self._url}: can't be reached, expected the Modbus server of a PLC")
 
     async def write(self, values: Mapping[str, float]) -> None:
@@ -76,9 +77,9 @@ class ModbusLink:
 
     async def _ask(self, rows: Sequence[Row], request: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
         try:
-            answer = await request(*arguments, **more)
-        except (ModbusException, OSError) as error:
-            raise LinkError(f"{self._url}: does not answer ({printable(error)})") from error
+            answer = await asyncio.wait_for(request(*arguments, **more), 2.0 * PATIENCE)
+        except (ModbusException, OSError, asyncio.TimeoutError) as error:
+            raise LinkError(f"{self._url}: does not answer ({printable(error) or 'in time'})") from error
         if answer.isError():
             row = rows[0]
             code = getattr(answer, "exception_code", "?")

@@ -5,8 +5,11 @@
     belts/zone1/cmd_speed,ns=4;s=GVL.Speed1
     alarms/jam at the outfeed,ns=4;s=GVL.Jam
 
-Signals are written to the PLC; commands, and alarms that the PLC raises, are read from it. `theirs` is a NodeId of OPC
-UA, or a place in Modbus: table, address, type, word order ("holding register 12 float32 big").
+Signals are written to the PLC; commands, and alarms that the PLC raises, are read from it. So are values of its own,
+such as a state or a counter, under names that begin with `plc/`: conditions of a test may ask for them.
+
+`theirs` is a NodeId of OPC UA, or a place in Modbus: table, address, type, word order ("holding register 12 float32
+big").
 """
 
 from __future__ import annotations
@@ -25,6 +28,9 @@ from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 
 COLUMNS = ("tag", "theirs")
+
+OWN = "plc/"
+"""What names begin with that stand for values of the PLC's own."""
 
 
 class TagMapError(ConveyorError):
@@ -47,6 +53,8 @@ class TagMap(NamedTuple):
     """To the PLC: signals."""
     read: tuple[Mapped, ...]
     """From it: commands and alarms."""
+    own: tuple[Mapped, ...]
+    """Values of its own, read too."""
     tick: Mapped | None
     """`run/tick`, written behind all signals; None: it is not in the map."""
     target: Mapped | None
@@ -74,9 +82,9 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
         if len(cells) != len(COLUMNS) or not cells[1]:
             raise TagMapError(f"{where}: {printable(','.join(cells))} given, expected a tag and what it is in the PLC")
         name, theirs = cells
-        tag = known.get(name) or (switch(name, "command", "") if _is_alarm(name) else None)
+        tag = known.get(name) or _of_the_plc(name)
         if tag is None:
-            expected = "expected a signal or command of the line, or alarms/<name>"
+            expected = "expected a signal or command of the line, alarms/<name> or plc/<name>"
             raise TagMapError(f"{where}: {printable(name)} given, {expected} (conveyor-sim tags lists them)")
         if name in found:
             raise TagMapError(f"{where}: {printable(name)} given twice")
@@ -84,12 +92,17 @@ def read_tag_map(path: Path, tags: Sequence[Tag]) -> TagMap:
     if not found:
         raise TagMapError(f"{path}: names no tag, expected one or more")
     tick, target = found.pop(TICK, None), found.pop(TARGET, None)
-    written = tuple(each for each in found.values() if each.tag.role in SIGNALS)
-    return TagMap(written, tuple(each for each in found.values() if each not in written), tick, target)
+    own = tuple(each for name, each in found.items() if name.startswith(OWN))
+    written = tuple(each for each in found.values() if each.tag.role in SIGNALS and each not in own)
+    read = tuple(each for each in found.values() if each not in (*written, *own))
+    return TagMap(written, read, own, tick, target)
 
 
-def _is_alarm(name: str) -> bool:
-    return name.startswith(ALARMS) and name != ALARMS
+def _of_the_plc(name: str) -> Tag | None:
+    """What is the PLC's and not the line's: an alarm, or a value of its own."""
+    if name.startswith(ALARMS) and name != ALARMS:
+        return switch(name, "command", "")
+    return count(name, "status", "") if name.startswith(OWN) and name != OWN else None
 
 
 _HANDSHAKE = {name: count(name, "run", "") for name in (TICK, TARGET)}
