@@ -44,6 +44,7 @@ setup(
         (f"share/{NAME}/config/scenarios", glob("config/scenarios/*.yaml")),
         (f"share/{NAME}/config/ros", glob("config/ros/*")),
         (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+        (f"share/{NAME}/include", ["include/conveyor_sim_plc.h"]),
         (f"share/{NAME}/msg_defs", ["msg_defs/package.xml", "msg_defs/CMakeLists.txt"]),
         (f"share/{NAME}/msg_defs/msg", glob("msg_defs/msg/*.msg")),
         (f"share/{NAME}/msg_defs/srv", glob("msg_defs/srv/*.srv")),

@@ -133,7 +133,17 @@ def test_colcon_lists_both_packages() -> None:
 
 
 def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
-    project = ("conveyor_sim", "config", "launch", "msg_defs", "requirements", "resource", "README.md", "package.xml")
+    project = (
+        "conveyor_sim",
+        "config",
+        "include",
+        "launch",
+        "msg_defs",
+        "requirements",
+        "resource",
+        "README.md",
+        "package.xml",
+    )
     copy_project(tmp_path, *project, "setup.py", "setup.cfg", "pyproject.toml", "LICENSE")
     built = run(COLCON, "build", "--base-paths", ".", "--packages-select", "conveyor_sim", cwd=tmp_path)
     assert built.returncode == 0, built.stdout + built.stderr

@@ -3,7 +3,8 @@
 A text goes one way: `parse.py` (with `grammar.lark`) makes the tree of `tree.py`; `declarations.py` its types
 (`types.py`) and names (`scope.py`); `expressions.py`, `calls.py` and `statements.py` check what is done and write it as
 Python, and `compile.py` puts that together. `functions.py`, `conversions.py` and `blocks.py` are the standard library,
-`operations.py` what code needs at run time. `program.py` runs it. What the standard leaves open is decided in
+`operations.py` what code needs at run time. `program.py` runs it. `library.py` has a program run that another compiler
+has made a shared library of. What the standard leaves open is decided in
 docs/structured_text.md.
 """
 
@@ -13,14 +14,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from conveyor_sim.st.controller import StructuredText
+    from conveyor_sim.st.library import CompiledProgram
 
-__all__ = ["StructuredText"]
+__all__ = ["CompiledProgram", "StructuredText"]
 
 
 def __getattr__(name: str) -> Any:
-    """Imports `StructuredText` when it is first asked for: `load.py` is there without lark."""
+    """Imports what is first asked for: `load.py` and `CompiledProgram` are there without lark."""
     if name == "StructuredText":
         from conveyor_sim.st.controller import StructuredText
 
         return StructuredText
+    if name == "CompiledProgram":
+        from conveyor_sim.st.library import CompiledProgram
+
+        return CompiledProgram
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

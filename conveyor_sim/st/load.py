@@ -1,4 +1,4 @@
-"""A controller by what names it: a program in Structured Text, or one in Python."""
+"""A controller by what names it: a program in Structured Text, one that is compiled, or one in Python."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from importlib.util import find_spec
 from conveyor_sim.control import load as python
 from conveyor_sim.control.scan import ControlError, Controller
 
-SUFFIX = ".st"
+SUFFIX, LIBRARY = ".st", ".so"
 
 
 def load(reference: str, parameters: Mapping[str, object] | None = None) -> Controller:
-    """`program.st`, or as `conveyor_sim.control.load` has it. parameters: of the factory; of a program `tags` (tags by
-    variable) and `modbus_map` (a file). Raises ControlError, and MapError for such a file.
+    """`program.st`, `library.so`, or as `conveyor_sim.control.load` has it. parameters: of the factory; of a program
+    `tags` (tags by variable) and, in Structured Text, `modbus_map` (a file). Raises ControlError, and MapError for such
+    a file.
     """
+    if reference.lower().endswith(LIBRARY):
+        return _compiled(reference, dict(parameters or {}))
     if not reference.lower().endswith(SUFFIX):
         return python(reference, parameters)
     if find_spec("lark") is None:
@@ -29,3 +32,14 @@ def load(reference: str, parameters: Mapping[str, object] | None = None) -> Cont
             "modbus_map (a file)"
         )
     return StructuredText(reference, {str(name): str(tag) for name, tag in tags.items()}, modbus_map=modbus_map)
+
+
+def _compiled(reference: str, parameters: dict[str, object]) -> Controller:
+    from conveyor_sim.st.library import CompiledProgram
+
+    tags = parameters.pop("tags", {})
+    if parameters or not isinstance(tags, dict):
+        raise ControlError(
+            f"controller {reference!r}: parameters {parameters} given, expected tags, a mapping of names"
+        )
+    return CompiledProgram(reference, {str(name): str(tag) for name, tag in tags.items()})

@@ -61,8 +61,9 @@ def test_parameters_of_a_program_are_tags_and_a_map(tmp_path: Path) -> None:
     load(str(program), {"tags": {"p/x": "zones/z/bottles"}})
     with pytest.raises(ControlError, match="expected none, tags"):
         load(str(program), {"speed": 1})
-    with pytest.raises(ControlError, match="no such file"):
-        load("nowhere.st")
+    for nowhere in ("nowhere.st", "nowhere.so"):
+        with pytest.raises(ControlError, match="no such file"):
+            load(nowhere)
 
 
 def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached() -> None:

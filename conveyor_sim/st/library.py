@@ -1,0 +1,121 @@
+"""`CompiledProgram`: a shared library that any compiler has made of a PLC program, as a controller."""
+
+from __future__ import annotations
+
+import json
+import select
+import signal
+import subprocess
+import sys
+import weakref
+from collections.abc import Mapping
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
+
+PATIENCE = 60.0
+"""s of wall time that a call may take, beyond which the watchdog ends it."""
+
+_NS = 1e9
+
+
+class CompiledProgram:
+    """A library with the functions of include/conveyor_sim_plc.h, in a process of its own: a crash is an error here.
+
+    Two share nothing, whatever variables the library keeps outside of its instances.
+    """
+
+    def __init__(self, path: str | PathLike[str], tags: Mapping[str, str], *, patience: float = PATIENCE) -> None:
+        """path: of the library. tags: by variable, as the library names it. patience: s of wall time for a scan.
+
+        Raises ControlError for a library that can't be loaded.
+        """
+        self._path, self._tags, self._patience = Path(path), dict(tags), patience
+        if not self._path.is_file():
+            raise ControlError(f"{path}: no such file, expected a shared library")
+        if not self._tags:
+            raise ControlError(f"{path}: found no tags, expected a tag for each variable that is to have one")
+        self._ins: list[str] = []
+        self._outs: list[str] = []
+        self._shown: dict[str, float] = {}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "conveyor_sim.st.library_host", str(self._path.resolve())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        self.close = weakref.finalize(self, _end, self._process)
+        """Ends the process; so does the end of this object."""
+        self._call("bind", [])
+
+    def bind(self, tags: LineTags) -> None:
+        """Tie variables to their tags: signals in, commands and alarms out. Raises ControlError."""
+        if self._ins or self._outs:
+            raise ControlError(f"{self._path}: found a second line, expected a new CompiledProgram for each")
+        variables = []
+        for name, tag in self._tags.items():
+            out = tag in tags.commands or tag.startswith(ALARMS)
+            if not (out or tag in tags.signals):
+                raise ControlError(f"{self._path}: {name}: found {tag}, expected a tag of this line")
+            (self._outs if out else self._ins).append(tag)
+            variables.append((name, int(out)))
+        self._call("bind", variables)
+        self._names = {tag: f"plc/{name}" for name, tag in self._tags.items()}
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """Commands and alarms. Raises ControlError if the program stops, crashes, or does not end its scan."""
+        values = [inputs[tag] for tag in self._ins]
+        found = self._call("scan", round(inputs.time * _NS), values)
+        answer = dict(zip(self._outs, found, strict=True))
+        self._shown = {
+            self._names[tag]: value for tag, value in (*zip(self._ins, values, strict=True), *answer.items())
+        }
+        return answer
+
+    @property
+    def variables(self) -> Mapping[str, float]:
+        """Those that have tags, as plc/<name>, of the last scan."""
+        return self._shown
+
+    def snapshot(self) -> dict[str, Any]:
+        """The program's state, as plain data."""
+        return {"state": self._call("snapshot")}
+
+    def restore(self, data: Mapping[str, Any]) -> None:
+        """Go on from there. Raises ControlError for what the program does not take."""
+        self._call("restore", data["state"])
+
+    def _call(self, do: str, *given: Any) -> Any:
+        process = self._process
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            process.stdin.write(json.dumps({"do": do, "with": given}).encode() + b"\n")
+            process.stdin.flush()
+        except OSError:
+            raise ControlError(f"{self._path}: {self._ended()} before {do}, expected a program that goes on") from None
+        if not select.select([process.stdout], [], [], self._patience)[0]:
+            self.close()
+            raise ControlError(f"{self._path}: watchdog: {do} took more than {self._patience:g} s, expected less")
+        line = process.stdout.readline()
+        if not line.endswith(b"\n"):
+            raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise ControlError(f"{self._path}: {answer['error']}")
+        return answer["answer"]
+
+    def _ended(self) -> str:
+        code = self._process.wait()
+        return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            with suppress(BrokenPipeError):
+                stream.close()
+    process.wait()
