@@ -1,7 +1,8 @@
 """SCADA faces under load: 500 tags, 50 of which change at 10 Hz, to five clients of each protocol.
 
-The clients are a process of their own (bench/scada_clients.py). Changes are whole numbers that go up by one, so each
-client knows how many it has missed. What servers cost the ticks is measured on a scene, with clients and without.
+The clients of a protocol are a process of their own (bench/scada_clients.py). Changes are whole numbers that go up by
+one, so each client knows how many it has missed. What servers cost the ticks is measured on a scene, with clients and
+without.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from conveyor_sim.line.tag import Tag, count
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scada.face import Settings
 from conveyor_sim.scada.faces import FACES
-from conveyor_sim.scada.scene_process import Task
+from conveyor_sim.scada.scene_messages import Task
 from conveyor_sim.scada.scene_source import SceneSource
 from conveyor_sim.scada.serving import Serving
 from conveyor_sim.scada.source import About, Control, Listeners, Shown
@@ -111,14 +112,14 @@ def _faces(seconds: float) -> list[Row]:
     source = Changing()
     try:
         with Serving(source, [(kind, 0) for kind in FACES], Settings()) as serving:  # type: ignore[arg-type]
-            with _clients([face.address for face in serving.faces], seconds + SETTLE) as clients:
+            with _clients(serving, seconds + SETTLE) as clients:
                 time.sleep(SETTLE)
                 serving.latencies()  # from now on
                 memory, cpu, began = _memory(), time.process_time(), time.monotonic()
                 time.sleep(seconds)
                 cores = (time.process_time() - cpu) / (time.monotonic() - began)
                 grown = _memory() - memory
-                told = json.loads(clients.communicate(timeout=600)[0])
+                told = clients()
             latencies = serving.latencies()
     finally:
         source.close()
@@ -147,23 +148,33 @@ def _ticks(effort: Effort) -> list[Row]:
 def _cores_served(source: SceneSource, seconds: float) -> float:
     with (
         Serving(source, [(kind, 0) for kind in FACES], Settings()) as serving,
-        _clients([face.address for face in serving.faces], seconds + SETTLE) as clients,
+        _clients(serving, seconds + SETTLE) as clients,
     ):
         time.sleep(SETTLE)
         cores = _cores_of(source.pid, seconds)
-        clients.communicate(timeout=600)
+        clients()
     return cores
 
 
 @contextmanager
-def _clients(addresses: Sequence[str], seconds: float) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, "-m", "bench.scada_clients", str(seconds), *addresses]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
+def _clients(serving: Serving, seconds: float) -> Iterator[Callable[[], dict[str, list[tuple[int, int]]]]]:
+    """Those of each protocol, in a process of their own; what is yielded waits for what they have seen and lost."""
+    command = [sys.executable, "-m", "bench.scada_clients", str(seconds)]
+    with ExitStack() as stack:
+        processes = []
+        for face in serving.faces:
+            process = subprocess.Popen([*command, face.address], stdout=subprocess.PIPE, text=True)
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            processes.append(process)
+
+        def told() -> dict[str, list[tuple[int, int]]]:
+            found: dict[str, list[tuple[int, int]]] = {}
+            for process in processes:
+                found |= json.loads(process.communicate(timeout=600)[0])
+            return found
+
+        yield told
 
 
 def _cores_of(pid: int, seconds: float) -> float:

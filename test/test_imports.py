@@ -126,7 +126,9 @@ def test_no_files_import_each_other_in_a_circle() -> None:
         pytest.fail(f"these import each other: {' -> '.join(error.args[1])}")
 
 
-@pytest.mark.parametrize("module", ["bag.recorder", "bag.reader", "plot.aside", "ros.controller_node"])
+@pytest.mark.parametrize(
+    "module", ["bag.recorder", "bag.reader", "plot.aside", "ros.controller_node", "scada.scene_source", "scada.serving"]
+)
 def test_what_reads_draws_or_controls_does_without_the_compiler(module: str) -> None:
     """Numba takes half a second to import, in processes that never step anything."""
     name = f"conveyor_sim.{module}"

@@ -42,6 +42,13 @@ def make_folder(path: Path) -> list[Path]:
     return made
 
 
+def bag_folder(record: Path | None, runs: int) -> Path | None:
+    """Where the run after so many others is recorded: `<record>`, then `<record>_1`, `<record>_2`, ..."""
+    if record is None or runs == 0:
+        return record
+    return record.with_name(f"{record.name}_{runs}")
+
+
 def remove_folders(folders: Iterable[Path]) -> None:
     """Removes those that are empty, in this order."""
     for folder in folders:

@@ -45,9 +45,8 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
         source = stack.enter_context(scene_source(scene, console, playing=False, **of_scene))
         kind = of_plc(url, tags, user, password, period, console.print)
         with Serving(source, [(kind, 0)], Settings()) as serving:
-            console.print(f"{url} commands the line, and reads its signals")
             source.control("resume", 0.0, "attach")
-            watch(serving, console)
+            watch(serving, console, [f"{url} commands the line, and reads its signals"])
             summary = serving.summary()
     bags = source.recordings
     click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))

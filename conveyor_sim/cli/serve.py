@@ -102,9 +102,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             _require_not_given(what, OF_BAG)
             source = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
         with Serving(source, chosen, settings) as serving:
-            for sentence in serving.greeting:
-                console.print(sentence)
-            watch(serving, console)
+            watch(serving, console, serving.greeting)
             summary = serving.summary()
     bags = getattr(source, "recordings", [])
     click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
@@ -139,7 +137,7 @@ def scene_source(
     """A scene, once its tags are known. playing: whether it runs at once."""
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.scada.scene_process import Task
+    from conveyor_sim.scada.scene_messages import Task
     from conveyor_sim.scada.scene_source import SceneSource
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
@@ -177,11 +175,13 @@ def _node(namespace: str, console: Console) -> Iterator[NodeSource]:
         yield source
 
 
-def watch(serving: Serving, console: Console) -> None:
-    """Tell how it goes until a signal comes."""
+def watch(serving: Serving, console: Console, greeting: Sequence[str]) -> None:
+    """Tell how it goes, after a greeting, until a signal comes; from the greeting on it ends in order."""
     from conveyor_sim.support.stop_request import StopRequest
 
     with StopRequest() as stop:
+        for sentence in greeting:
+            console.print(sentence)
         if not console.is_terminal:
             while not stop.wait(PLAIN_LOOK):
                 console.print(serving.progress())

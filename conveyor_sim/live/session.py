@@ -96,10 +96,3 @@ class Session:
             # Outcomes of commands that come too late are still published.
             self.outputs = Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
             recorder.close()
-
-
-def bag_folder(record: Path | None, runs: int) -> Path | None:
-    """Where the run after so many others is recorded: `<record>`, then `<record>_1`, `<record>_2`, ..."""
-    if record is None or runs == 0:
-        return record
-    return record.with_name(f"{record.name}_{runs}")

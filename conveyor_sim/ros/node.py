@@ -12,12 +12,12 @@ from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
-from conveyor_sim.bag.folder import require_recordable
+from conveyor_sim.bag.folder import bag_folder, require_recordable
 from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.explain.choices import setting_line
 from conveyor_sim.live.pacing import RateCap
-from conveyor_sim.live.session import Session, bag_folder
+from conveyor_sim.live.session import Session
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices

@@ -11,26 +11,25 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.line.inputs import SET
 from conveyor_sim.live.inbox import size_of
-from conveyor_sim.live.session import Session, bag_folder
+from conveyor_sim.live.session import Session
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.runs.compilation import Cancelled, Compilation
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Note, Task
 from conveyor_sim.scada.source import MOST_EVENTS, Control
 from conveyor_sim.scada.view import HEARD
-from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.stop_request import StopRequest
 
@@ -42,64 +41,7 @@ LIFE_SIGN = 0.5
 
 MOST_NOTES = 100
 
-PATIENCE = 20.0
-"""s of wall time for an orderly end once nobody is there any more."""
-
 FRAME = "world"
-
-
-@dataclass(frozen=True)
-class Task:
-    """What the process is to do, the first thing that it is sent."""
-
-    scene: Scene
-    record: Path | None
-    """Folder; None: not recorded."""
-    number: int
-    """Of the first run, by which its folder is named, as those after resets are."""
-    real_time_factor: float
-    threads: int | None
-    playing: bool = True
-    """Whether it runs at once, and does not wait to be resumed."""
-
-
-class Give(NamedTuple):
-    """Sent to the process: an input for the next tick."""
-
-    given: Input
-
-
-class Ask(NamedTuple):
-    """Sent to the process: something to do with the run."""
-
-    what: Control
-    value: float
-    by: str
-
-
-class Copy(NamedTuple):
-    """Sent by the process: serialized messages, and how far it is with inputs."""
-
-    states: Mapping[str, bytes]
-    """By topic, the newest."""
-    events: Sequence[bytes]
-    handed: int
-    """Inputs that have reached the stepper so far."""
-    waiting: int
-    """Of these, those that no tick has taken yet."""
-
-
-class Note(NamedTuple):
-    """Sent by the process: a sentence for people."""
-
-    text: str
-    bad: bool = False
-
-
-class Failed(NamedTuple):
-    """Sent by the process, the last thing: why it can't go on."""
-
-    reason: str
 
 
 class Copies:

@@ -15,14 +15,14 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
-from conveyor_sim.live.session import bag_folder
-from conveyor_sim.scada.scene_process import PATIENCE, Ask, Copy, Failed, Give, Note, Task
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Note, Task
 from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import HEARD, View
 

@@ -18,7 +18,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, PAUSED, RUNNING, STOPPED
-from conveyor_sim.scada.scene_process import Task
+from conveyor_sim.scada.scene_messages import Task
 from conveyor_sim.scada.scene_source import SceneSource
 from conveyor_sim.scada.source import MOST_WAITING
 from conveyor_sim.scene import Scene, load_scene
