@@ -75,6 +75,7 @@ class AlarmStates:
         add_alarm_methods(nodes)
         self._template: Any = None
         self._rows: dict[str, _Row] = {}
+        self._objects = 0
         self._columns: AlarmColumns | None = None
         self._status = int(ua.StatusCodes.Good)
         self._event_ids: dict[str, bytes] = {}
@@ -111,8 +112,9 @@ class AlarmStates:
         name = f"{ALARM_STATES}/{id}"
         if name in self._nodes:
             return True
-        if len(self._rows) > MOST_OBJECTS:
+        if self._objects >= MOST_OBJECTS:
             return False
+        self._objects += 1
         made = self._nodes.object(name, id, node_id(ALARM_STATES), f"The alarm {id}.")
         for field, (kind, what) in _VARIABLES.items():
             is_state = field == "state"

@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from asyncua import ua
-from asyncua.common.utils import ServiceError
-from asyncua.crypto import uacrypto
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
 from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status
@@ -66,7 +64,8 @@ class OpcUaServer:
         self._at = host, port
         self._requests = Requests(source)
         self._server: BoundedServer | None = None
-        self._updates: asyncio.Task[None] | None = None
+        self._updates: Updates | None = None
+        self._following: asyncio.Task[None] | None = None
         self._stopping: asyncio.Future[None] | None = None
 
     @property
@@ -88,6 +87,8 @@ class OpcUaServer:
         if server is None or server.bserver is None:
             return Status(0, 0, requests.writes, requests.refused, 0.0)
         longest, server.longest[0] = server.longest[0], 0.0
+        if self._updates is not None:
+            longest, self._updates.longest = max(longest, self._updates.longest), 0.0
         subscriptions = server.iserver.subscription_service.subscriptions.values()
         items = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
         return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest)
@@ -98,7 +99,7 @@ class OpcUaServer:
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
         own = identity(self._certificates or default_folder())
-        internal = SafeServer(self)
+        internal = SafeServer(self, own.trusted)
         server = BoundedServer(internal)
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
         server._application_uri = own.application_uri
@@ -112,8 +113,6 @@ class OpcUaServer:
         server.set_security_policy(POLICIES, SimpleRoleRuleset())
         tokens = [ua.UserNameIdentityToken, *([ua.AnonymousIdentityToken] if self._anonymous else [])]
         server.set_identity_tokens(tokens)
-        if own.trusted:
-            internal.certificate_validator = _Trusted(own.trusted)
         if await server.register_namespace(NAMESPACE) != INDEX:
             raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
         history = History(self._history, self._source.about.tags)
@@ -136,24 +135,25 @@ class OpcUaServer:
             reason = getattr(error, "strerror", None) or error
             raise FaceError(f"opcua: {host}:{port} can't be listened on ({reason}), expected a free port") from error
         self._server = server
-        self._updates = asyncio.create_task(updates.run())
-        self._updates.add_done_callback(self._ended)
+        self._updates = updates
+        self._following = asyncio.create_task(updates.run())
+        self._following.add_done_callback(self._ended)
 
     async def stop(self) -> None:
         """End all sessions and connections."""
         server, self._server = self._server, None
-        updates, self._updates = self._updates, None
-        if updates is not None:
-            updates.cancel()
-            await asyncio.gather(updates, return_exceptions=True)
+        following, self._following = self._following, None
+        if following is not None:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
         if server is not None:
             await server.stop()
 
-    def _ended(self, updates: asyncio.Task[None]) -> None:
+    def _ended(self, following: asyncio.Task[None]) -> None:
         """Rather no server than one that shows what is stale."""
-        if not updates.cancelled() and (error := updates.exception()) is not None:
+        if not following.cancelled() and (error := following.exception()) is not None:
             logging.getLogger(__name__).error("opcua: the server ends: %s", error, exc_info=error)
-            self._updates = None
+            self._following = None
             self._stopping = asyncio.ensure_future(self.stop())
 
     def get_user(
@@ -176,14 +176,3 @@ def _without_collection() -> Iterator[None]:
     finally:
         if was:
             gc.enable()
-
-
-class _Trusted:
-    """Lets certificates in that are in the folder."""
-
-    def __init__(self, known: frozenset[bytes]) -> None:
-        self._known = known
-
-    async def __call__(self, certificate: Any, _: ua.ApplicationDescription) -> None:
-        if uacrypto.der_from_x509(certificate) not in self._known:
-            raise ServiceError(ua.StatusCodes.BadCertificateUntrusted)

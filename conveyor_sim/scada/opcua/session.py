@@ -7,7 +7,8 @@ the address space. Here no write and no call reaches it, but the two that send c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from struct import error as StructError
 from struct import unpack_from
@@ -23,7 +24,7 @@ from asyncua.server.internal_session import InternalSession
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
 from conveyor_sim.scada.opcua.requests import Codes, Requests
-from conveyor_sim.scada.opcua.transport import channel
+from conveyor_sim.scada.opcua.transport import Connection, channel
 
 MOST_ITEMS = 20_000
 """Monitored items of all sessions; more are refused."""
@@ -51,8 +52,10 @@ Answer = Callable[[User, ua.CallMethodRequest], ua.CallMethodResult | None]
 class SafeServer(InternalServer):
     """The library's server with sessions of this kind."""
 
-    def __init__(self, user_manager: Any) -> None:
+    def __init__(self, user_manager: Any, trusted: Collection[bytes]) -> None:
+        """trusted: certificates of clients that are let in; empty: all are."""
         super().__init__(user_manager)
+        self._trusted = trusted
         self.requests: Requests | None = None
         self.answers: Sequence[Answer] = ()
         """Who may know a method that is called."""
@@ -64,7 +67,17 @@ class SafeServer(InternalServer):
         connection = channel.get()
         if connection is not None and connection.has_session:
             raise ServiceError(Codes.BadTooManySessions)
-        return Session(self, self.aspace, self.subscription_service, name, user=user, external=external)
+        peer = None if connection is None else connection.peer
+        if self._trusted and peer not in self._trusted:
+            raise ServiceError(Codes.BadSecurityModeInsufficient if peer is None else Codes.BadCertificateUntrusted)
+        return Session(self, self.aspace, self.subscription_service, name, user, peer)
+
+    def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
+        """For a client that comes back by another connection: who had another certificate is another client."""
+        found, connection = super().lookup_external_session(auth_token), channel.get()
+        if not isinstance(found, Session) or connection is None or found.peer != connection.peer:
+            return None
+        return found
 
     def register_server(self, *_: Any) -> None:
         """This is no discovery server; the library asks nobody who they are for this."""
@@ -105,6 +118,37 @@ class Session(InternalSession):
     """Of one client."""
 
     iserver: SafeServer
+
+    def __init__(
+        self, server: SafeServer, aspace: Any, subscriptions: Any, name: str, user: User, peer: bytes | None
+    ) -> None:
+        """peer: certificate of the client; None: it has shown none.
+
+        The token that stands for the session is random; the library's are counted, and whoever guesses one acts as
+        its user, even without a password.
+        """
+        super().__init__(server, aspace, subscriptions, name, user=user, external=True)
+        self.peer = peer
+        self._connection: Connection | None = None
+        server.unregister_external_session(self)
+        self.auth_token = ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString)
+        server.register_external_session(self)
+
+    def activate_session(
+        self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
+    ) -> ua.ActivateSessionResult:
+        """Whoever does not prove who they are has nothing more to do with it."""
+        connection = channel.get()
+        try:
+            result = super().activate_session(params, peer_certificate)
+        except BaseException:
+            if connection is not None and connection is not self._connection:
+                connection.leave()
+            raise
+        if self._connection is not None and connection is not self._connection:
+            self._connection.leave()
+        self._connection = connection
+        return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """Commands, as `Requests.write` has it."""

@@ -54,6 +54,17 @@ class Connection(OPCUAProtocol):
         policy = self.processor._connection.security_policy if self.processor else None
         return policy is not None and policy.Mode == ua.MessageSecurityMode.SignAndEncrypt
 
+    @property
+    def peer(self) -> bytes | None:
+        """Certificate of the client, which has proved that it is its own; None: the channel is not secured."""
+        policy = self.processor._connection.security_policy if self.processor else None
+        return policy.peer_certificate if policy is not None and policy.Mode != ua.MessageSecurityMode.None_ else None
+
+    def leave(self) -> None:
+        """Have nothing more to do with the session."""
+        if self.processor is not None:
+            self.processor.session = None
+
     def data_received(self, data: bytes) -> None:
         """What has come so far of a message is kept by the library, whatever its length."""
         if self.transport is None or self.transport.is_closing():

@@ -41,6 +41,8 @@ class Updates:
         self._loop = asyncio.get_running_loop()
         self._last: Shown | None = None
         self._read_back: ReadBackColumns | None = None
+        self.longest = 0.0
+        """s of wall time from a change of the source to its being in the nodes, the longest since this was set to 0."""
         self._written: dict[str, tuple[int, str]] = {}
 
     async def bring_present(self) -> None:
@@ -57,7 +59,9 @@ class Updates:
                 self._wake.clear()
                 self._told = False
                 while self._waiting:
-                    await self._bring(*self._waiting.popleft())
+                    shown, heard = self._waiting.popleft()
+                    await self._bring(shown, heard)
+                    self.longest = max(self.longest, (datetime.now(timezone.utc) - heard).total_seconds())
                     await asyncio.sleep(0)  # clients, too
         finally:
             end()

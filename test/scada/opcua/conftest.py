@@ -38,6 +38,7 @@ class Line:
     simulation: Simulation
     source: Any
     server: OpcUaServer
+    thread: ServerThread
     open: list[Client] = field(default_factory=list)
 
     def advance(self, ticks: int = 1) -> None:
@@ -123,7 +124,7 @@ def serving(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
             shown = source(TickSource(simulation))
             options = {"users": users, "certificates": certificates, "stamps": stamps, **options}
             server = OpcUaServer(shown, options.pop("users"), **options)
-            lines.append(line := Line(simulation, shown, server))
+            lines.append(line := Line(simulation, shown, server, thread))
             thread.run(server.start())
             return line
 

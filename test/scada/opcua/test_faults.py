@@ -181,3 +181,14 @@ def test_a_port_that_is_taken_is_said(still: Line, certificates: Path) -> None:
     other = OpcUaServer(still.source, certificates=certificates, port=port)
     with ServerThread() as thread, pytest.raises(FaceError, match=f"opcua: 127.0.0.1:{port} can't be listened on"):
         thread.run(other.start())
+
+
+def test_a_server_that_is_started_again_is_found_where_it_was(line: Line, certificates: Path) -> None:
+    port = line.server.port
+    line.client().disconnect()
+    line.open.clear()
+    line.thread.run(line.server.stop())
+    line.server = OpcUaServer(line.source, certificates=certificates, port=port)
+    line.thread.run(line.server.start())
+    line.advance()
+    assert line.server.port == port and line.read(SETPOINT) == line.source.shown.values[SETPOINT]

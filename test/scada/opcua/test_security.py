@@ -6,6 +6,7 @@ import asyncio
 import stat
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -239,3 +240,48 @@ def test_a_user_is_added_and_changed_by_a_command(tmp_path: Path) -> None:
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     wrong = subprocess.run([*command, "a:b", "--password", "x"], capture_output=True, text=True, check=False)
     assert wrong.returncode == 1 and "name: a:b given, expected 1 to 40 letters" in wrong.stderr
+
+
+async def _steal(address: str, tokens: Sequence[ua.NodeId]) -> None:
+    """Begin with the session of somebody else, by the token that stands for it, and write in their name."""
+    setpoint = ua.WriteValue(ua.NodeId(SETPOINT, 2), ua.AttributeIds.Value, None, ua.DataValue(ua.Variant(0.5)))
+    for token in tokens:
+        thief = AsyncClient(address, timeout=PATIENCE)
+        await thief.connect_socket()
+        try:
+            await thief.send_hello()
+            await thief.open_secure_channel()
+            thief.uaclient.session.restore_authentication_token(token)
+            wrong = ua.ActivateSessionParameters()
+            wrong.UserIdentityToken = ua.UserNameIdentityToken("username", "controller", b"guessed", None)
+            with pytest.raises(ua.UaStatusCodeError):
+                await thief.uaclient.session.activate_session(wrong)
+            with pytest.raises(ua.UaStatusCodeError):
+                await thief.uaclient.session.write(ua.WriteParameters([setpoint]))
+        finally:
+            thief.disconnect_socket()
+
+
+def test_a_session_can_not_be_taken_over(line: Line, client_files: str) -> None:
+    """By a token that was guessed, or that was overheard."""
+    controller = line.client("controller", security=f"Basic256Sha256,Sign,{client_files}")
+    plain = line.client("controller")
+    known = [each.aio_obj.uaclient.session.authentication_token for each in (controller, plain)]
+    guessed = [ua.NodeId(1000 + number) for number in range(0, 60, 5)]
+    asyncio.run(_steal(line.server.address, [*known, *guessed]))
+    line.advance()
+    assert line.outcomes() == []
+    controller.get_node(f"ns=2;s={SETPOINT}").write_value(0.25)  # it is still theirs
+    line.advance()
+    assert [row[3] for row in line.outcomes()] == [(0.25,)]
+    assert all(token.NodeIdType is ua.NodeIdType.ByteString for token in known)
+
+
+def test_trusted_certificates_are_asked_for_on_every_channel(serve: Serve, tmp_path: Path) -> None:
+    folder = tmp_path / "own"
+    identity(folder)
+    own_certificate(tmp_path, name="known")
+    (folder / TRUSTED / "known.der").write_bytes((tmp_path / "known.der").read_bytes())
+    line = serve(certificates=folder)
+    with refused(Codes.BadSecurityModeInsufficient):
+        line.client()
