@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from conveyor_sim.control.alarm import Alarm
 from conveyor_sim.control.line_tags import LineTags, bind
@@ -133,7 +133,7 @@ class _Together:
     @property
     def variables(self) -> Mapping[str, float]:
         """Those of all of them."""
-        return ChainMap(*(dict(getattr(controller, "variables", {})) for controller in self.controllers))
+        return _variables(self.controllers)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
@@ -168,7 +168,7 @@ class _Priority:
     @property
     def variables(self) -> Mapping[str, float]:
         """Those of all of them."""
-        return ChainMap(*(dict(getattr(controller, "variables", {})) for controller in self.controllers))
+        return _variables(self.controllers)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
@@ -176,6 +176,11 @@ class _Priority:
             for name, value in answer.items():
                 merged.setdefault(name, value)
         return merged
+
+
+def _variables(controllers: Iterable[Controller]) -> Mapping[str, float]:
+    shown: Any = [getattr(controller, "variables", {}) for controller in controllers]
+    return ChainMap(*shown)  # read only, and read when it is asked for
 
 
 def together(*controllers: Controller) -> Controller:

@@ -79,9 +79,7 @@ def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Co
         return _compile(text, file, trace)
     except SourceError as error:
         raise StructuredTextError(f"{file}:{error.at.line}:{error.at.column}: {error}") from None
-    except (RecursionError, MemoryError, SyntaxError) as error:
-        if isinstance(error, SyntaxError) and "nested" not in str(error) and "indent" not in str(error):
-            raise
+    except (RecursionError, MemoryError, SyntaxError):  # Python's compiler has limits of its own
         raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
 
 

@@ -7,6 +7,7 @@ of milliseconds, as in CODESYS and TwinCAT: the standard does not say.
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from typing import Any
@@ -23,6 +24,7 @@ from conveyor_sim.st.types import (
     Enumeration,
     String,
     Type,
+    single,
 )
 from conveyor_sim.st.values import NAMESPACE, Value, converted, described, folded
 
@@ -107,9 +109,9 @@ def _from_real(source: Type, code: str, target: Type) -> str | None:
 def _to_text(source: Type, code: str) -> str | None:
     if isinstance(source, Enumeration):
         return f"dict({ {value: name for name, value in source.values}!r}).get({code}, '')"
-    names = {"bool": "_bool_text", "int": "str", "bits": "str", "time": "time_text", "real": "_real_text"}
-    name = names.get(source.kind)
-    return f"{'_time_text' if source == TIME else name}({code})" if name else None
+    names = {"bool": "_bool_text", "int": "str", "bits": "str", "time": "_time_text", "real": "repr"}
+    name = "_single_text" if source == REAL else names.get(source.kind)
+    return f"{name}({code})" if name else None
 
 
 def time_text(value: int) -> str:
@@ -125,10 +127,10 @@ def _bool_text(value: bool) -> str:
     return "TRUE" if value else "FALSE"
 
 
-def _real_text(value: float) -> str:
-    """The shortest that reads as the same number; of 7 digits where that is a REAL."""
-    short = f"{value:.7g}"
-    return repr(float(short)) if struct.pack("<d", value)[:3] == b"\0\0\0" else repr(value)
+def _single_text(value: float) -> str:
+    """The shortest that reads as the same REAL."""
+    texts = (f"{value:.{digits}g}" for digits in range(1, 10))
+    return repr(float(next((text for text in texts if single(float(text)) == value), repr(value))))
 
 
 def _parsed(text: str, name: str) -> Any:
@@ -138,8 +140,9 @@ def _parsed(text: str, name: str) -> Any:
         if target.kind == "bool":
             return {"TRUE": True, "FALSE": False, "1": True, "0": False}[given.upper()]
         if target.kind == "real":
-            number = float(given)
-            return NAMESPACE["_single"](number) if target == REAL else number
+            number = single(float(given)) if target == REAL else float(given)
+            if math.isfinite(number):
+                return number
         if target.kind in ("int", "bits"):
             base, hash_, digits = given.partition("#")
             whole = int(digits, int(base)) if hash_ else int(given)
@@ -157,7 +160,7 @@ def _bits(packed: str, unpacked: str) -> Any:
 NAMESPACE.update(
     _parsed=_parsed,
     _bool_text=_bool_text,
-    _real_text=_real_text,
+    _single_text=_single_text,
     _time_text=time_text,
     _from_dword=_bits("<I", "<f"),
     _from_lword=_bits("<Q", "<d"),

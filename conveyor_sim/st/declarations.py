@@ -219,6 +219,10 @@ class Declarations:
         key = declared.name.lower()
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        outer = kind is self.names.globals or kind.python.startswith("_P_")
+        if (declared.tag or declared.address) and not outer:
+            written = declared.address or f"{{tag: {declared.tag}}}"
+            raise SourceError(declared.at, f"found {written}, expected it in a PROGRAM or VAR_GLOBAL only")
         found = self._type(declared.type, known)
         if isinstance(found, BlockType) and (found.function or found.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {found.name}, expected a type or a function block")

@@ -38,6 +38,7 @@ from conveyor_sim.st.values import (
 
 _COMPARED = {"=": "==", "<>": "!=", "<": "<", ">": ">", "<=": "<=", ">=": ">="}
 _LOGIC = {"AND": "&", "OR": "|", "XOR": "^"}
+_ARITHMETIC = {"+", "-", "*", "/", "**", "MOD"}
 _SHORT = {"AND_THEN": "and", "OR_ELSE": "or"}
 _EXACT: dict[str, Callable[[Any, Any], Any]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 
@@ -248,7 +249,7 @@ class Expressions:
         nodes = [node]
         while isinstance(nodes[-1].left, tree.Binary):
             nodes.append(nodes[-1].left)
-        arithmetic = all(one.operator in "+-*/**MOD" for one in nodes)
+        arithmetic = all(one.operator in _ARITHMETIC for one in nodes)
         wanted = hint if arithmetic else None
         value = self.value(nodes[-1].left, wanted)
         for one in reversed(nodes):

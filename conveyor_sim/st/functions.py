@@ -114,7 +114,7 @@ def _pick(python: str, ordered: bool, before: int = 0) -> Build:
         if kind.kind == "string":
             kind = STRING if not call.values else max((one.type for one in values), key=lambda one: one.high)
         if python == "SEL":
-            code = f"({codes[1]} if {converted(choice[0], BOOL, 'G of SEL')} else {codes[0]})"
+            code = f"_sel({converted(choice[0], BOOL, 'G of SEL')}, {', '.join(codes)})"
         else:
             code = f"{python}({', '.join([*(call.whole(one) for one in choice), *codes])})"
         return call.given(code, kind)

@@ -225,6 +225,11 @@ def limit(low: Any, value: Any, high: Any) -> Any:
     return min(max(value, low), high)
 
 
+def sel(second: bool, in0: Any, in1: Any) -> Any:
+    """SEL: both are computed, as arguments of any function."""
+    return in1 if second else in0
+
+
 def mux(index: int, *values: Any) -> Any:
     """MUX"""
     if not 0 <= index < len(values):
@@ -279,6 +284,7 @@ NAMES: dict[str, Any] = {
     "_find": find,
     "_limit": limit,
     "_mux": mux,
+    "_sel": sel,
     "_shift": shift,
     "_chain": chain,
     "_gt": operator.gt,
