@@ -115,6 +115,8 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         if what == "speed" and not 0.0 <= value <= 1e6:
             return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
         with self._lock:
+            if self._requests.qsize() >= MOST_WAITING:
+                return f"{MOST_WAITING} requests wait already"
             self._requests.put(Ask(what, value, by))
         return ""
 
@@ -138,14 +140,26 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         except subprocess.TimeoutExpired:
             process.kill()
 
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+
     # The thread that hears
 
     def _supervise(self) -> None:
         while not self._closing:
-            reason = self._simulate()
+            try:
+                reason = self._simulate()
+            except Exception as error:  # whatever it is, nothing may go on looking as if it were there
+                reason = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
+                self._begun = False
+                self._kill()
             self.lose(reason)
             if self._closing or not self._begun:
                 self._failure = reason
+                if self._about is not None and not self._closing:  # else `wait_for_line` says so
+                    self._say(f"{reason}; it is not begun anew again")
                 return
             self._say(f"{reason}; the scene begins anew")
 
@@ -159,6 +173,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                     return ENDED_HERE
                 self._given = self._handed = self._waiting = 0
                 self._requests = SimpleQueue()
+                self._requests.put(replace(self._task, number=len(self.recordings)))
                 # A session of its own: Ctrl-C at the terminal is this process's affair.
                 self._process = process = subprocess.Popen(
                     [sys.executable, "-c", CODE.format(path=sys.path), str(there.fileno())],
@@ -168,7 +183,6 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                     pass_fds=[there.fileno()],
                 )
             there.close()
-            self._requests.put(replace(self._task, number=len(self.recordings)))
             threading.Thread(target=_pass_on, args=(self._requests, here), name="requests", daemon=True).start()
             with suppress(EOFError, OSError):
                 failure = self._hear(here)
