@@ -25,6 +25,7 @@ with while_importing():
         scada,
         start,
         targets,
+        view,
         whole,
     )
     from bench.measure import Effort, say
@@ -59,6 +60,7 @@ PARTS: dict[str, Part] = {
     "riding": riding,
     "lockstep": lockstep,
     "scada": scada,
+    "view": view,
     "whole": whole,
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import control, dense, growth, lockstep, node, plant, start, whole
+from bench import control, dense, growth, lockstep, node, plant, start, view, whole
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
@@ -66,6 +66,10 @@ def _evidence(rows: Rows) -> float | None:
 
 def _whole(command: str) -> Callable[[Rows], float | None]:
     return lambda rows: _middle(rows.spread(whole.CASE, 0, command, whole.WALL))
+
+
+def _view(case: str, n: float, contestant: str, quantity: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(case, n, contestant, quantity))
 
 
 def _middle(spread: Spread | None) -> float | None:
@@ -140,6 +144,12 @@ TARGETS = (
         for command, most in ((whole.RUN, 4.0), (whole.MAKE_RUN, 7.0))
     ),
     Target("what evidence adds to it", "control", MOST, 0.2, _evidence),
+    *(
+        Target(f"ms of CPU a frame of the page, N = {n}", "view", MOST, v, _view(view.FRAME, n, "page", view.CPU))
+        for n, v in ((1_000, 1e3 / 60.0), (10_000, 1e3 / 20.0))
+    ),
+    Target("s to open an hour on the page", "view", MOST, 2.0, _view(view.LONG, view.HOUR, "server", view.OPEN)),
+    Target("ms to go to a time of it", "view", MOST, 100.0, _view(view.LONG, view.HOUR, "server", view.SEEK)),
 )
 
 
