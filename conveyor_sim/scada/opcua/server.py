@@ -98,46 +98,53 @@ class OpcUaServer:
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
-        own = identity(self._certificates or default_folder())
-        internal = SafeServer(self, own.trusted)
-        server = BoundedServer(internal)
-        server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
-        server._application_uri = own.application_uri
-        server.application_type = ua.ApplicationType.Server
-        internal.bind_condition_methods = 1
-        with _without_collection():
-            await server.init()
-        await server.load_certificate(own.certificate, "der")
-        await server.load_private_key(own.key, format="pem")
-        server.set_endpoint(f"opc.tcp://{host}:{port}")
-        server.set_security_policy(POLICIES, SimpleRoleRuleset())
-        tokens = [ua.UserNameIdentityToken, *([ua.AnonymousIdentityToken] if self._anonymous else [])]
-        server.set_identity_tokens(tokens)
-        if await server.register_namespace(NAMESPACE) != INDEX:
-            raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
-        history = History(self._history, self._source.about.tags)
-        internal.history_manager.set_storage(history)
-        nodes = Nodes(internal, history)
-        add_line(nodes, self._source.about)
-        add_methods(nodes, self._source)
-        emitter, clock = Emitter(internal), Clock(self._source.about, self._stamps)
-        alarms = AlarmStates(nodes, emitter, clock)
-        events = LineEvents(self._source, nodes, emitter, clock)
-        internal.requests = self._requests
-        packml = PackMl(self._source, self._requests, clock)
-        await packml.add(server, nodes)
-        internal.answers = (Methods(self._source, self._requests, alarms.is_last_event).call, packml.call)
-        updates = Updates(self._source, nodes, clock, packml.follow, alarms.follow, events.follow)
+        server = await self._empty()
+        updates = await self._fill(server)
         await updates.bring_present()
         try:
             await server.listen(host, port)
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
             raise FaceError(f"opcua: {host}:{port} can't be listened on ({reason}), expected a free port") from error
-        self._server = server
-        self._updates = updates
+        self._server, self._updates = server, updates
         self._following = asyncio.create_task(updates.run())
         self._following.add_done_callback(self._ended)
+
+    async def _empty(self) -> BoundedServer:
+        """A server with the standard's nodes, and who may come in."""
+        host, port = self._at
+        own = identity(self._certificates or default_folder())
+        internal = SafeServer(self, own.trusted)
+        internal.bind_condition_methods = 1
+        server = BoundedServer(internal)
+        server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
+        server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
+        with _without_collection():
+            await server.init()
+        await server.load_certificate(own.certificate, "der")
+        await server.load_private_key(own.key, format="pem")
+        server.set_endpoint(f"opc.tcp://{host}:{port}")
+        server.set_security_policy(POLICIES, SimpleRoleRuleset())
+        anonymous = [ua.AnonymousIdentityToken] if self._anonymous else []
+        server.set_identity_tokens([ua.UserNameIdentityToken, *anonymous])
+        return server
+
+    async def _fill(self, server: BoundedServer) -> Updates:
+        """Add the nodes of the line; what keeps them as the source is."""
+        internal, source, requests = server.iserver, self._source, self._requests
+        if await server.register_namespace(NAMESPACE) != INDEX:
+            raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
+        history = History(self._history, source.about.tags)
+        internal.history_manager.set_storage(history)
+        nodes, emitter, clock = Nodes(internal, history), Emitter(internal), Clock(source.about, self._stamps)
+        add_line(nodes, source.about)
+        add_methods(nodes, source)
+        alarms, events = AlarmStates(nodes, emitter, clock), LineEvents(source, nodes, emitter, clock)
+        packml = PackMl(source, requests, clock)
+        await packml.add(server, nodes)
+        internal.requests = requests
+        internal.answers = (Methods(source, requests, alarms.is_last_event).call, packml.call)
+        return Updates(source, nodes, clock, packml.follow, alarms.follow, events.follow)
 
     async def stop(self) -> None:
         """End all sessions and connections."""

@@ -29,6 +29,11 @@ from conveyor_sim.scada.opcua.transport import Connection, channel
 MOST_ITEMS = 20_000
 """Monitored items of all sessions; more are refused."""
 
+LONGEST_QUEUE, EVENTS_QUEUED, MOST_QUEUED = 1000, 100, 300_000
+"""Values that wait for a client: of one item, of one with events at least, of all items of all clients. Where they are
+used up, queues have room for one.
+"""
+
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""
 
@@ -192,12 +197,33 @@ class Session(InternalSession):
     async def create_monitored_items(
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
-        """A bounded number of them."""
-        subscriptions = self.subscription_service.subscriptions.values()
-        there = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
-        if there + len(params.ItemsToCreate or []) > MOST_ITEMS:
+        """A bounded number of them, and of what waits for those who do not fetch it."""
+        asked = params.ItemsToCreate or []
+        if len(self._items()) + len(asked) > MOST_ITEMS:
             raise ServiceError(Codes.BadTooManyMonitoredItems)
+        self._bound_queues(asked)
         return await super().create_monitored_items(params)
+
+    async def modify_monitored_items(
+        self, params: ua.ModifyMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemModifyResult]:
+        """As when they were created."""
+        self._bound_queues(params.ItemsToModify or [])
+        return await super().modify_monitored_items(params)
+
+    def _items(self) -> list[Any]:
+        """Monitored items of all sessions."""
+        subscriptions = self.subscription_service.subscriptions.values()
+        return [item for each in subscriptions for item in each.monitored_item_srv._monitored_items.values()]
+
+    def _bound_queues(self, asked: Sequence[Any]) -> None:
+        """The library takes 0 for as long a queue as there may be, or for one without end."""
+        left = MOST_QUEUED - sum(item.queue_size for item in self._items())
+        for item in asked:
+            given = item.RequestedParameters
+            least = EVENTS_QUEUED if isinstance(given.Filter, ua.EventFilter) else 1
+            given.QueueSize = max(1, min(max(given.QueueSize, least), LONGEST_QUEUE, left))
+            left -= given.QueueSize
 
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
         """Raw values, of tags that have a history."""

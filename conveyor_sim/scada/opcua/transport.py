@@ -22,7 +22,8 @@ CHUNK, MESSAGE = 65_535, 4_000_000
 ACTIVATION = 30.0
 """s that a connection has for beginning a session, and may stay without one."""
 
-_QUEUE, _ITEMS = 1000, 200
+_WAITING = 200
+"""Messages of a connection that wait to be answered."""
 
 
 def limits() -> TransportLimits:
@@ -125,9 +126,8 @@ class BoundedServer(Server):
         self.limits = limits()
         self.iserver.max_connections = MOST_CLIENTS
         self.iserver.max_pending_activation_seconds = ACTIVATION
-        self.iserver.max_pending_messages_per_connection = _ITEMS
+        self.iserver.max_pending_messages_per_connection = _WAITING
         self.iserver.max_subscriptions = 4 * MOST_CLIENTS
-        self.iserver.max_monitored_item_queue_size = _QUEUE
         self.iserver.max_unacked_messages_per_subscription = 20
         self.iserver.max_lifetime_count, self.iserver.max_keep_alive_count = 1200, 400
 

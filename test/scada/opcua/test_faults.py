@@ -5,15 +5,16 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from asyncua import Client as AsyncClient
 from asyncua import ua
 
 from conveyor_sim.scada.face import FaceError
-from conveyor_sim.scada.opcua import transport
+from conveyor_sim.scada.opcua import session, transport
 from conveyor_sim.scada.opcua.server import OpcUaServer
+from conveyor_sim.scada.opcua.session import LONGEST_QUEUE
 from conveyor_sim.scada.opcua.transport import CHUNK, MOST_CLIENTS
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING
@@ -192,3 +193,32 @@ def test_a_server_that_is_started_again_is_found_where_it_was(line: Line, certif
     line.thread.run(line.server.start())
     line.advance()
     assert line.server.port == port and line.read(SETPOINT) == line.source.shown.values[SETPOINT]
+
+
+def test_what_waits_for_a_client_is_bounded(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library takes a queue of 0 for one without end."""
+    subscription = line.client().create_subscription(60_000, None)
+    node = line.node("run/tick")
+
+    def found() -> list[Any]:
+        service = line.server._server.iserver.subscription_service  # type: ignore[union-attr]
+        (only,) = service.subscriptions.values()
+        return list(only.monitored_item_srv._monitored_items.values())
+
+    def sizes() -> list[int]:
+        return [item.queue_size for item in found()]
+
+    first = subscription.subscribe_data_change(node, queuesize=10**6)
+    subscription.subscribe_data_change(node, queuesize=0)
+    assert sizes() == [LONGEST_QUEUE, 1]
+    subscription.tloop.post(subscription.aio_obj.modify_monitored_item(first, 100.0, 0))
+    assert sizes() == [1, 1]
+    monkeypatch.setattr(session, "MOST_QUEUED", 50)
+    for expected in (40, 8, 1):
+        subscription.subscribe_data_change(node, queuesize=40)
+        assert sizes()[-1] == expected
+    for _ in range(30):
+        line.advance()
+    service = line.server._server.iserver.subscription_service  # type: ignore[union-attr]
+    (only,) = service.subscriptions.values()
+    assert sum(map(len, only._triggered_datachanges.values())) <= 51
