@@ -37,6 +37,8 @@ class Calls:
         if function is None:
             if is_standard(target.name):
                 return self._standard(expressions, node, target.name, hint)
+            if target.name.lower() in scope.names.types:
+                raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
             raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
         self._note(expressions, function, node)
         codes = []
@@ -154,6 +156,6 @@ class Calls:
         code = f"_o.{member.slot}"
         if argument.negated:
             if member.type != BOOL:
-                raise SourceError(argument.at, f"found NOT of a {member.type.name}, expected a BOOL")
+                raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
             code = f"(not {code})"
         return place.write(converted(Value(argument.at, member.type, code), place.type))

@@ -150,7 +150,7 @@ def _parsed(text: str, name: str) -> Any:
                 return whole
     except (ValueError, KeyError):
         pass
-    raise Fault(f"STRING_TO_{name}: found {text[:40]!r}, expected a {name}")
+    raise Fault(f"STRING_TO_{name}: found {text[:40]!r}, expected {name}")
 
 
 def _bits(packed: str, unpacked: str) -> Any:

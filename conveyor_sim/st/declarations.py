@@ -239,7 +239,7 @@ class Declarations:
         if section == "VAR_EXTERNAL":
             shared = self.names.globals.members.get(key)
             if shared is None or shared.type != found:
-                there = "none of that name" if shared is None else f"a {shared.type.name}"
+                there = "none of that name" if shared is None else shared.type.name
                 raise SourceError(declared.at, f"found {declared.name} : {found.name}, {there} in VAR_GLOBAL")
         kind.members[key] = Member(
             declared.name,
@@ -268,7 +268,7 @@ class Declarations:
 
     def _initial_array(self, node: tree.InitialArray, kind: Type, known: Expressions) -> str:
         if not isinstance(kind, Array):
-            raise SourceError(node.at, f"found a list, expected a {kind.name}")
+            raise SourceError(node.at, f"found a list, expected {kind.name}")
         (low, high), *rest = kind.ranges
         # The values of further dimensions follow each other, as in memory.
         size, inner, nested = high - low + 1, kind.element, isinstance(kind.element, Array)
@@ -280,7 +280,7 @@ class Declarations:
                 raise SourceError(node.at, f"found more than {size} values, expected at most {size}")
             deeper = nested or not isinstance(element, tree.InitialArray)
             if element is not None and not deeper:
-                raise SourceError(element.at, f"found a list, expected a {inner.name}")
+                raise SourceError(element.at, f"found a list, expected {inner.name}")
             codes += [inner.initial if element is None else self._initial(element, inner, known)] * count
         codes += [inner.initial] * (size - len(codes))
         for one, other in reversed(rest):
@@ -290,7 +290,7 @@ class Declarations:
 
     def _initial_structure(self, node: tree.InitialStructure, kind: Type, known: Expressions) -> str:
         if not isinstance(kind, Structure):
-            raise SourceError(node.at, f"found a list of fields, expected a {kind.name}")
+            raise SourceError(node.at, f"found a list of fields, expected {kind.name}")
         given = []
         for at, name, value in node.fields:
             member = kind.members.get(name.lower())

@@ -150,9 +150,7 @@ class Expressions:
         base = self.place(node.base)
         kind = base.type
         if not isinstance(kind, Structure):
-            raise SourceError(
-                node.at, f"found .{node.name} of a {kind.name}, expected a structure or a block before it"
-            )
+            raise SourceError(node.at, f"found .{node.name} of {kind.name}, expected a structure or a block before it")
         member = kind.members.get(node.name.lower())
         if member is None or member.section in ("VAR_TEMP", "VAR_EXTERNAL", "VAR_IN_OUT"):
             listed = ", ".join(one.name for one in kind.members.values()) or "none"
@@ -176,7 +174,7 @@ class Expressions:
         base = self.place(node.base)
         kind = base.type
         if not isinstance(kind, Array):
-            raise SourceError(node.at, f"found an index of a {kind.name}, expected an array before it")
+            raise SourceError(node.at, f"found an index of {kind.name}, expected an array before it")
         if len(node.indices) != len(kind.ranges):
             raise SourceError(node.at, f"found {len(node.indices)} indices, expected {len(kind.ranges)}")
         code, index = base.code, ""
@@ -212,7 +210,7 @@ class Expressions:
         base = self.place(node.base)
         if base.type.kind != "bits":
             raise SourceError(
-                node.at, f"found a bit of a {base.type.name}, expected BYTE, WORD, DWORD or LWORD before it"
+                node.at, f"found a bit of {base.type.name}, expected BYTE, WORD, DWORD or LWORD before it"
             )
         if node.number >= base.type.width:
             raise SourceError(node.at, f"found bit {node.number}, expected 0 to {base.type.width - 1}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -29,6 +30,7 @@ SUSPECT: Mapping[str, str] = {
 
 _WORDS = {
     "NAME": "a name",
+    "PREFIX": "a value with its type",
     "INTEGER": "a whole number",
     "SEMICOLON": "';'",
     "COLON": "':'",
@@ -45,6 +47,8 @@ _WORDS = {
     "__ANON_1": "'..'",
     "__ANON_2": "'=>'",
 }
+_WORD = re.compile(r"\w+")
+_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
 _OPERATORS = {
     *("OR", "OR_ELSE", "XOR", "AND", "AMPERSAND", "AND_THEN", "MOD", "EQUALS", "DIFFERS", "LESS", "GREATER"),
     *("AT_MOST", "AT_LEAST", "PLUS", "MINUS", "TIMES", "OVER", "POWER"),
@@ -60,6 +64,11 @@ def at_of(token: Token) -> Position:
     return Position(token.line or 1, token.column or 1)
 
 
+def place_of(text: str, index: int) -> Position:
+    """Line and column of a character."""
+    return Position(text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index))
+
+
 def not_refused(token: Token) -> Token:
     """A name. Raises SourceError for a word of what is not supported."""
     if what := REFUSED.get(token.value.upper()):
@@ -67,16 +76,23 @@ def not_refused(token: Token) -> Token:
     return token
 
 
-def unexpected(error: Any) -> SourceError:
-    """What is said of lark's UnexpectedToken."""
+def unexpected(error: Any, text: str) -> SourceError:
+    """What is said of lark's UnexpectedToken in a text."""
     token = error.token
-    before = error.token_history[-1] if error.token_history else token
-    for suspect in (before, token):
-        if what := SUSPECT.get(str(suspect).upper()):
-            return SourceError(at_of(suspect), f"found {suspect}, expected a program without {what}")
+    place = len(text) if token.type == "$END" else error.pos_in_stream
+    for match in (*list(_WORD.finditer(text, 0, place))[-1:], *_WORD.finditer(text, place, place + len(token.value))):
+        if what := SUSPECT.get(match.group().upper()):
+            return SourceError(
+                place_of(text, match.start()), f"found {match.group()}, expected a program without {what}"
+            )
+    if text.startswith("(*", place):
+        return SourceError(at_of(token), "found a comment that does not end, expected *)")
     found = "the end of the file" if token.type == "$END" else f"'{token.value}'"
     expected = set(error.accepts or error.expected)
     words = []
+    if expected >= _STATEMENTS:
+        expected -= _STATEMENTS | {"NAME", "PREFIX", "SEMICOLON"}
+        words.append("a statement")
     if expected >= _VALUES:
         expected -= _VALUES
         words.append("a value")

@@ -27,7 +27,7 @@ def parse(text: str) -> tree.Source:
     try:
         source = _Tree().transform(_parser().parse(text))
     except UnexpectedToken as error:
-        raise unexpected(error) from None
+        raise unexpected(error, text) from None
     except UnexpectedCharacters as error:
         char = text[error.pos_in_stream]
         hint = "; pointers are not supported" if char == "^" else ""

@@ -104,7 +104,7 @@ def described(value: Value) -> str:
     """What it is, in words."""
     if value.literal:
         return f"the number {value.constant}"
-    return f"a {value.type.name}" if value.constant is None else f"the {value.type.name} {value.constant}"
+    return value.type.name if value.constant is None else f"{value.type.name} {value.constant}"
 
 
 def converts(value: Value, target: Type) -> bool:
@@ -136,8 +136,20 @@ def converted(value: Value, target: Type, what: str = "") -> str:
     if isinstance(target, BlockType):
         raise SourceError(value.at, f"found a block, {target.name}, expected a value: blocks are not copied")
     if isinstance(target, (Array, Structure)):
+        if _has_blocks(target):
+            raise SourceError(
+                value.at, f"found {target.name} with blocks in it, expected a value: blocks are not copied"
+            )
         return f"_copied({value.code})"
     return value.code
+
+
+def _has_blocks(kind: Type) -> bool:
+    if isinstance(kind, Array):
+        return _has_blocks(kind.element)
+    if isinstance(kind, BlockType):
+        return True
+    return isinstance(kind, Structure) and any(_has_blocks(one.type) for one in kind.members.values())
 
 
 def _advice(value: Value, target: Type) -> str:

@@ -40,7 +40,7 @@ def test_run_says_what_is_wrong_with_a_controller(tmp_path: Path) -> None:
     program.write_text("PROGRAM p VAR x : INT; END_VAR\nx := TRUE;\nEND_PROGRAM\n")
     code, output = command("run", TABLE, "--no-record", "--controller", program)
     assert code == 1
-    assert "wrong.st:2:6: found the BOOL True, expected INT; BOOL_TO_INT converts" in output
+    assert "wrong.st:2:6: found BOOL True, expected INT; BOOL_TO_INT converts" in output
     code, output = command("run", "two_bottles", "--no-record", "--controller", PROGRAMS / "table.st")
     assert code == 1
     assert "found photo_eyes/high/blocked, expected a tag of this line" in output
