@@ -22,6 +22,8 @@ def view(bag: Path, html: Path | None, last: float | None, port: int | None) -> 
     if html is not None:
         if port is not None:
             raise ConveyorError("--port: given with --html, expected one of them")
+        if last is not None and not 0.0 < last < float("inf"):
+            raise ConveyorError(f"--last: {last:g} given, expected a number above 0")
         from conveyor_sim.view.one_file import write_page
 
         click.echo(write_page(bag, html, last))

@@ -83,7 +83,10 @@ def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch) -> Path:
 
     Raises BagError, and ConveyorError if the file can't be written.
     """
-    return write_page(bag, path, failures=[Failure(scenario.time, scenario.failure or "the test failed")], watch=watch)
+    failure = Failure(scenario.time, scenario.failure or "the test failed")
+    known = scenario.simulation.process_image.signal_names
+    trends = [name for name in traced(scenario) if name in known]
+    return write_page(bag, path, failures=[failure], watch=watch, trends=trends)
 
 
 def traced(scenario: Scenario) -> list[str]:

@@ -25,12 +25,17 @@ class Failure:
 
 
 def write_page(
-    bag: Path, file: Path, last: float | None = None, failures: Sequence[Failure] = (), watch: Watch | None = None
+    bag: Path,
+    file: Path,
+    last: float | None = None,
+    failures: Sequence[Failure] = (),
+    watch: Watch | None = None,
+    trends: Sequence[str] = (),
 ) -> Path:
     """Write a recording as one HTML file, and return it.
 
     last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning. watch: what
-    is drawn instead, of the same run.
+    is drawn instead, of the same run. trends: signals that are shown at first; none: what there is most to see of.
     Raises BagError, SceneError, and ConveyorError if the file can't be written.
     """
     with open_bag(bag) as opened:
@@ -40,7 +45,7 @@ def write_page(
             blocks: Iterable[bytes] = watch.blocks()
         else:
             blocks = (_deflated(recording.block(number)) for number in range(recording.blocks))
-        head = {**recording.head(), "failures": [vars(failure) for failure in failures]}
+        head = {**recording.head(), "failures": [vars(failure) for failure in failures], "trends": list(trends)}
         parts = {"head": _deflated(text(head)), "story/0": _deflated(recording.story())}
         parts.update((f"block/{number}", block) for number, block in enumerate(blocks))
         page = one_file(parts, recording.name)

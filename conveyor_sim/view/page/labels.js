@@ -27,7 +27,8 @@ export class Labels {
       context.font = `${label.bold ? "600 " : ""}12px system-ui, sans-serif`;
       const width = context.measureText(label.text).width + 6, height = 16;
       for (const [dx, dy] of PLACES) {
-        const x = label.x + dx * (label.reach + GAP + width / 2), y = label.y + dy * (label.reach + GAP + height / 2);
+        const beside = label.x + dx * (label.reach + GAP + width / 2);
+        const x = dy ? Math.min(camera.width - width / 2, Math.max(width / 2, beside)) : beside, y = label.y + dy * (label.reach + GAP + height / 2);
         const box = [x - width / 2, y - height / 2, x + width / 2, y + height / 2];
         const outside = box[0] < 0 || box[1] < 0 || box[2] > camera.width || box[3] > camera.height;
         if (outside || taken.some((other) => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;

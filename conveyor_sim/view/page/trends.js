@@ -25,9 +25,10 @@ export class Trends {
     for (const name of this._first()) this.add(name);
   }
 
-  // What there is to see at first: machines and eyes say most, belts are everywhere.
+  // What there is to see at first: what a test has read; else machines and eyes say most, belts are everywhere.
   _first() {
-    const { signals } = this.view.recording.head, found = [];
+    const { signals, trends } = this.view.recording.head, found = [];
+    if (trends?.length) return trends.slice(0, MOST);
     for (const pattern of [/^belts\/.*\/speed$/, /^photo_eyes\/.*\/blocked$/, /^zones\/.*\/bottles$/, /^gates\/.*\/position$/, /\/rate$/]) {
       found.push(...signals.filter((name) => pattern.test(name)).slice(0, 2));
     }
@@ -110,10 +111,12 @@ export class Trends {
       context.setLineDash([]);
       if (!text || x < free) return;
       context.fillStyle = colours.muted;
-      context.textAlign = "left";
       context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-      context.fillText(text, x + 3, bbox.top + 12 * devicePixelRatio);
-      free = x + 8 + context.measureText(text).width;
+      const long = context.measureText(text).width, fits = x + 3 + long < bbox.left + bbox.width;
+      if (!fits && x - 3 - long < free) return;
+      context.textAlign = fits ? "left" : "right";
+      context.fillText(text, fits ? x + 3 : x - 3, bbox.top + 12 * devicePixelRatio);
+      free = fits ? x + 8 + long : x;
     };
     context.save();
     const { recording } = this.view;

@@ -1,0 +1,51 @@
+"""The command view: one file, or a server until Ctrl-C."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.request import urlopen
+
+import pytest
+from click.testing import CliRunner
+
+from conveyor_sim.cli import main
+
+
+def test_one_file_is_written_and_named(bag: Path, tmp_path: Path) -> None:
+    file = tmp_path / "new" / "page.html"
+    done = CliRunner().invoke(main, ["view", str(bag), "--html", str(file), "--last", "5"])
+    assert (done.exit_code, done.output) == (0, f"{file}\n")
+    assert file.read_text().startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--last", "5"], "--last: given without --html, expected both or neither"),
+        (["--html", "page.html", "--port", "0"], "--port: given with --html, expected one of them"),
+        (["--html", "page.html", "--last", "nan"], "--last: nan given, expected a number above 0"),
+        (["--html", "page.html", "--last", "-1"], "--last: -1 given, expected a number above 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["view", str(bag), *options])
+    assert done.exit_code == 1 and said in done.output
+    assert not Path("page.html").exists()
+
+
+def test_a_recording_is_served_until_ctrl_c(bag: Path) -> None:
+    command = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "view", str(bag)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        said = process.stdout.readline()
+        url = said.removeprefix(f"{bag}: ").split()[0]
+        with urlopen(url, timeout=60) as answer:
+            assert b"<canvas" in answer.read()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
