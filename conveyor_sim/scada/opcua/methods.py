@@ -38,6 +38,8 @@ class Parameter(NamedTuple):
     kind: ua.VariantType
     what: str
     array: bool = False
+    optional: bool = False
+    """Whether it may be empty."""
 
     @property
     def as_argument(self) -> ua.Argument:
@@ -58,7 +60,7 @@ class Method:
 
 
 _ALARM = Parameter("alarm", _TEXT, "Id of the alarm.")
-_ALARM_OR_ALL = Parameter("alarm", _TEXT, "Id of the alarm; empty: all that this can be done to.")
+_ALARM_OR_ALL = Parameter("alarm", _TEXT, "Id of the alarm; empty: all that this can be done to.", optional=True)
 _SIGNAL = Parameter("signal", _TEXT, "Name of the signal.")
 _SECONDS = Parameter("seconds", _NUMBER, "For how long, simulated time; 0: until its condition ends next.")
 
@@ -79,7 +81,9 @@ LINE_METHODS: dict[str, Method] = {
         (_SIGNAL, Parameter("value", _NUMBER, "What they read.")),
         FORCE,
     ),
-    "unforce": Method("Ends that.", (Parameter("signal", _TEXT, "Name of the signal; empty: all."),), UNFORCE),
+    "unforce": Method(
+        "Ends that.", (Parameter("signal", _TEXT, "Name of the signal; empty: all.", optional=True),), UNFORCE
+    ),
     "inject": Method(
         "Has a fault begin, or end.",
         (Parameter("fault", _TEXT, "Name of the fault."), Parameter("value", _NUMBER, "0: it ends.")),
@@ -87,7 +91,7 @@ LINE_METHODS: dict[str, Method] = {
     ),
     "reset_counters": Method(
         "Counters and times of a device, or of all, begin anew.",
-        (Parameter("device", _TEXT, "Name of the device; empty: all."),),
+        (Parameter("device", _TEXT, "Name of the device; empty: all.", optional=True),),
         "reset_counters",
     ),
     "write": Method(
@@ -230,10 +234,12 @@ class Methods:
             return Codes.Good if parameter.array and given.Value is None else Codes.BadTypeMismatch
         if len(values) > _MOST or any(isinstance(value, str) and len(value) > _LONGEST for value in values):
             return Codes.BadOutOfRange
-        if any(value is None or (isinstance(value, float) and not math.isfinite(value)) for value in values):
+        if any(value is None and not parameter.optional for value in values):
+            return Codes.BadOutOfRange
+        if any(isinstance(value, float) and not math.isfinite(value) for value in values):
             return Codes.BadOutOfRange
         known = self._known.get(parameter.name)
-        if known is not None and not all(known(value) or (not value and "empty" in parameter.what) for value in values):
+        if known is not None and not all(known(value) or (parameter.optional and not value) for value in values):
             return Codes.BadNodeIdUnknown
         return Codes.Good
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 import stat
 import subprocess
 import sys
@@ -185,6 +186,7 @@ def test_certificate_and_key_are_made_once_and_are_nobody_elses(tmp_path: Path) 
         identity(folder)
 
 
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed: apt-get install openssl")
 def test_the_certificate_is_one_that_openssl_takes(certificates: Path) -> None:
     identity(certificates)
     command = ["openssl", "x509", "-inform", "DER", "-noout", "-text", "-in", str(certificates / CERTIFICATE)]
