@@ -16,6 +16,8 @@ from conveyor_sim.st import literals, tree
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.mistakes import at_of, not_refused, unexpected
 
+_CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
+
 _N = TypeVar("_N", bound=tree.Node)
 
 DEEPEST = 60
@@ -269,7 +271,13 @@ class _Tree(Transformer_NonRecursive):
     def binary(self, meta: Meta, items: list[Any]) -> tree.Expression:
         left, operator, right = items
         word = {"&": "AND"}.get(operator, operator.upper())
-        return self._deep(tree.Binary(at_of(operator), word, left, right), left, right)
+        node = tree.Binary(at_of(operator), word, left, right)
+        if isinstance(left, tree.Binary) and any(word in chain and left.operator in chain for chain in _CHAINS):
+            # No deeper than what it goes on from: both are checked, and written, in one go.
+            depth = max(self._depths[id(part)][1] for part in (left, right) if id(part) in self._depths)
+            self._depths[id(node)] = node, depth
+            return node
+        return self._deep(node, left, right)
 
     def unary(self, meta: Meta, items: list[Any]) -> tree.Expression:
         return self._deep(tree.Unary(_of(meta), items[0].upper(), items[1]), items[1])
