@@ -115,7 +115,9 @@ def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
     assert "; predicted error: " in setting
     assert re.fullmatch(r"speed: 0\.10 s simulated in .* x real time; \d+ % in the kernels, .*", speed)
     assert peak.startswith("peak force ")
-    assert bound.startswith("bound: 100 steps a tick are given in the scene; contact friction needs ")
+    # On a busy machine the few steps of 0.1 s may take less time than what comes with each tick.
+    steps = "bound: 100 steps a tick are given in the scene; contact friction needs "
+    assert bound.startswith((steps, "bound: devices and the guard, which act once a tick"))
     assert change.startswith("change: ")
     assert list(tmp_path.iterdir()) == []
 
