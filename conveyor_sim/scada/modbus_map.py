@@ -44,6 +44,9 @@ MOST_ADDRESSES = 65536
 HANDSHAKE = MOST_ADDRESSES - 2
 """Address of the two tags of the handshake, behind all others."""
 
+SET_MODE = "/set_mode"
+"""End of the name of the row by which a device is put into a mode; it has no tag of its own."""
+
 GONE = "gone"
 """What stands in place of the description of a tag that the line no longer has: its address is not given to another."""
 
@@ -113,23 +116,22 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
             raise MapError(f"{printable(row.name)}: address {row.address} given, expected one below {HANDSHAKE}")
     ends = {table: max((row.addresses.stop for row in kept if row.table == table), default=0) for table in _TABLES}
     found: dict[str, Row] = {}
-    for tag in tags:
-        if tag.role not in (*SIGNALS, *COMMANDS):
-            continue
-        new = _row(tag, word_order)
-        if (old := placed.get(tag.name)) is None:
+    known = [tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)]
+    modes = [_mode_row(tag, word_order) for tag in known if tag.device and tag.name == f"{tag.device}/mode"]
+    for new in [*(_row(tag, word_order) for tag in known), *modes]:
+        if (old := placed.get(new.name)) is None:
             new = replace(new, address=ends[new.table])
             ends[new.table] += new.words
             if ends[new.table] > HANDSHAKE:
-                raise MapError(f"{tag.name}: no address left, expected at most {HANDSHAKE} in a table")
+                raise MapError(f"{new.name}: no address left, expected at most {HANDSHAKE} in a table")
         elif (old.table, old.type) != (new.table, new.type):
             raise MapError(
-                f"{tag.name}: a {new.type} among the {new.table}s now, expected a {old.type} among the {old.table}s, "
+                f"{new.name}: a {new.type} among the {new.table}s now, expected a {old.type} among the {old.table}s, "
                 "as the map that was kept has it; a new map is needed"
             )
         else:
             new = replace(new, address=old.address, word_order=old.word_order)
-        found[tag.name] = new
+        found[new.name] = new
     gone = {row.name: replace(row, description=GONE, access="read") for row in kept if row.name not in found}
     rows = [*found.values(), *gone.values(), *handshake]
     return sorted(rows, key=lambda row: (_TABLES.index(row.table), row.address))
@@ -193,6 +195,11 @@ def _row(tag: Tag, word_order: WordOrder) -> Row:
     else:
         table, kind = "holding register" if writes else "input register", _type(tag)
     return Row(tag.name, table, 0, kind, word_order, tag.unit, access, tag.low, tag.high, tag.description)
+
+
+def _mode_row(tag: Tag, word_order: WordOrder) -> Row:
+    name, what = f"{tag.device}{SET_MODE}", "Puts it into a mode; reads as the present one."
+    return Row(name, "holding register", 0, "uint16", word_order, tag.unit, "read and write", tag.low, tag.high, what)
 
 
 def _type(tag: Tag) -> Type:

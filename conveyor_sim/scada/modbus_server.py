@@ -23,14 +23,15 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from conveyor_sim.line.authority import MAY, MODES
 from conveyor_sim.line.commands import refusal
-from conveyor_sim.line.inputs import SET, Input, WriterKind
+from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.hands import objection
 from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.scada.holding import Holding
-from conveyor_sim.scada.modbus_map import Row, Table, decode, encode
+from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
 
 MOST_CLIENTS = 64
@@ -244,7 +245,7 @@ class _Image:
             row = self._rows.get((table, at))
             if row is None:
                 return ExcCodes.ILLEGAL_ADDRESS
-            value = float(shown.tick) if row.name in (TICK, TARGET) else shown.values.get(row.name, 0.0)
+            value = float(shown.tick) if row.name in (TICK, TARGET) else shown.values.get(_shown_as(row), 0.0)
             words = encode(row, value)  # 0 for one that is gone
             values += words[at - row.address :]
         values = values[:count]
@@ -270,6 +271,8 @@ class _Image:
             names.append(row.name)
             numbers.append(decode(row, words[: row.words]))
             words, address = words[row.words :], address + row.words
+        if any(name.endswith(SET_MODE) for name in names):
+            return self._put_into_mode(names, numbers)
         # It has the last address, so it is the last that one request writes.
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
         if names and refusal(self._commands, "command", names, numbers):
@@ -293,3 +296,20 @@ class _Image:
         if target is None:
             return None
         return ExcCodes.ILLEGAL_VALUE if self._source.control("target", target, writer) else None
+
+    def _put_into_mode(self, names: list[str], modes: list[float]) -> ExcCodes | None:
+        """Devices, all by one request, which holds nothing else."""
+        if self._role is None or self._role not in MAY[MODE].writers:
+            return ExcCodes.ILLEGAL_FUNCTION
+        if not all(name.endswith(SET_MODE) for name in names):
+            return ExcCodes.ILLEGAL_ADDRESS
+        if not all(mode in MODES for mode in modes):
+            return ExcCodes.ILLEGAL_VALUE
+        devices = tuple(name.removesuffix(SET_MODE) for name in names)
+        given = Input(MODBUS, _writer.get(), self._role, MODE, devices, tuple(modes))
+        return ExcCodes.DEVICE_BUSY if self._source.give(given) else None
+
+
+def _shown_as(row: Row) -> str:
+    """Name of the tag that a row reads as."""
+    return f"{row.name.removesuffix(SET_MODE)}/mode" if row.name.endswith(SET_MODE) else row.name

@@ -16,7 +16,7 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 
 from pymodbus.client import ModbusTcpClient
 
-BUSY = 6
+FUNCTION, VALUE, BUSY = 1, 3, 6
 SETPOINT, SPEED = "belts/zone1/cmd_speed", "belts/zone1/speed"
 
 
@@ -43,12 +43,17 @@ def test_an_operator_takes_a_belt_in_hand_by_modbus(modbus: Any, tmp_path: Path)
         with ModbusTcpClient("127.0.0.1", port=modbus(line, role="operator").port, timeout=20) as client:
             line.run_for(0.5)
             assert write(client, rows[SETPOINT], 0.1).exception_code == BUSY  # the controller has it
-            line.operator.mode("belts/zone1", "manual")
+            mode = rows["belts/zone1/set_mode"]
+            assert client.write_register(mode.address, 4).exception_code == VALUE
+            assert not client.write_register(mode.address, 3).isError()
             line.run_for(0.1)
+            assert client.read_holding_registers(mode.address).registers == [3]
             assert not write(client, rows[SETPOINT], 0.125).isError()
             line.eventually(lambda s: s[SPEED] == 0.125, within=2.0)
             read = client.read_input_registers(rows[SPEED].address, count=2).registers
             assert client.convert_from_registers(read, client.DATATYPE.FLOAT32) == 0.125
+        with ModbusTcpClient("127.0.0.1", port=modbus(line, role="controller").port, timeout=20) as client:
+            assert client.write_register(mode.address, 1).exception_code == FUNCTION
     report = replay(tmp_path / "bag")
     assert report.exact and report.difference is None
     assert report.compared["readback"] >= 2
