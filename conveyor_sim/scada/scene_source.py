@@ -115,7 +115,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         if what == "speed" and not 0.0 <= value <= 1e6:
             return f"speed: {value:g} given, expected times real time from 0, for as fast as it goes, to 1e6"
         with self._lock:
-            if self._requests.qsize() >= MOST_WAITING:
+            if self._requests.qsize() >= 2 * MOST_WAITING:  # beside inputs, which may wait as long as it is paused
                 return f"{MOST_WAITING} requests wait already"
             self._requests.put(Ask(what, value, by))
         return ""

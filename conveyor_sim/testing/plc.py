@@ -39,13 +39,13 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
     def __init__(
         self,
         simulation: Simulation,
-        make: Callable[[TagSource], Face],
+        make: Callable[[TagSource, Path], Face],
         command: Sequence[str],
         environment: Mapping[str, str],
         patience: float,
     ) -> None:
-        """make: the server, not started. command: starts the PLC; empty: others do. environment: of it, besides.
-        patience: s of wall time that it has for each scan.
+        """make: the server, not started, which may keep files in a folder. command: starts the PLC; empty: others do.
+        environment: of it, besides. patience: s of wall time that it has for each scan.
 
         Raises FaceError if the server can't be, OSError if the command can't be run.
         """
@@ -61,7 +61,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
         with ExitStack() as stack:
             logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_")))
             thread = stack.enter_context(ServerThread())
-            face = make(self._tags)
+            face = make(self._tags, logs)
             thread.run(face.start())
             stack.callback(lambda: thread.run(face.stop()))
             self.address = face.address
@@ -112,19 +112,19 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
             raise ControlError(text)
 
 
-def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource], Face]:
+def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path], Face]:
     """What makes the server of a Modbus client. Raises ImportError without pymodbus."""
     from conveyor_sim.scada.modbus_server import ModbusServer
 
-    return lambda source: ModbusServer(
+    return lambda source, _: ModbusServer(
         source, modbus_map(source.about.tags) if rows is None else rows, "controller", port=port
     )
 
 
-def opcua(password: str, port: int) -> Callable[[TagSource], Face]:
+def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
     """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
     from conveyor_sim.scada.opcua.server import OpcUaServer
     from conveyor_sim.scada.opcua.users import new_user
 
     users = {USER: new_user("controller", password)}
-    return lambda source: OpcUaServer(source, users, port=port)
+    return lambda source, folder: OpcUaServer(source, users, port=port, certificates=folder / "certificates")

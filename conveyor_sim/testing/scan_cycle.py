@@ -87,7 +87,7 @@ class ScanCycle:
 
     def attach_plc(
         self,
-        make: Callable[[TagSource], Face],
+        make: Callable[[TagSource, Path], Face],
         command: Sequence[str],
         environment: Mapping[str, str],
         patience: float,
