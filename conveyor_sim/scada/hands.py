@@ -10,6 +10,11 @@ from conveyor_sim.line.tag import Tag
 from conveyor_sim.scada.source import TagSource
 
 
+def is_mode(tag: Tag) -> bool:
+    """Whether a tag is the mode of a device that takes commands: who may, puts it into another by writing this."""
+    return bool(tag.device) and tag.name == f"{tag.device}/mode"
+
+
 def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
     """Why a command is not taken of a writer, as the line was last; "" if it is."""
     shown, device = source.shown, command.device

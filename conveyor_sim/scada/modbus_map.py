@@ -20,6 +20,7 @@ import numpy as np
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.scada.hands import is_mode
 from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.printable import printable
@@ -117,7 +118,7 @@ def modbus_map(tags: Iterable[Tag], kept: Sequence[Row] = (), word_order: WordOr
     ends = {table: max((row.addresses.stop for row in kept if row.table == table), default=0) for table in _TABLES}
     found: dict[str, Row] = {}
     known = [tag for tag in tags if tag.role in (*SIGNALS, *COMMANDS)]
-    modes = [_mode_row(tag, word_order) for tag in known if tag.device and tag.name == f"{tag.device}/mode"]
+    modes = [_mode_row(tag, word_order) for tag in known if is_mode(tag)]
     for new in [*(_row(tag, word_order) for tag in known), *modes]:
         if (old := placed.get(new.name)) is None:
             new = replace(new, address=ends[new.table])

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from asyncua import ua
 from asyncua.crypto.permission_rules import User, UserRole
 
-from conveyor_sim.line.authority import MAY
+from conveyor_sim.line.authority import MAY, MODES
 from conveyor_sim.line.commands import refusal
-from conveyor_sim.line.inputs import SET, Input, WriterKind
+from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.scada.hands import objection
+from conveyor_sim.scada.hands import is_mode, objection
 from conveyor_sim.scada.handshake import TARGET
 from conveyor_sim.scada.opcua.nodes import name_of
 from conveyor_sim.scada.opcua.values import type_of
@@ -58,6 +58,7 @@ class Requests:
     def __init__(self, source: TagSource) -> None:
         self._source = source
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
         self.writes = self.refused = 0
         """Requests that were passed on to the line, and those that were not."""
 
@@ -68,9 +69,9 @@ class Requests:
         places: list[int] = []
         for place, value in enumerate(values):
             name = name_of(value.NodeId)
-            if name == TARGET:
+            if name == TARGET or name in self._modes:
                 self._flush(client, together, places, codes)
-                codes.append(self._go_on(client, value))
+                codes.append(self._go_on(client, value) if name == TARGET else self._set_mode(client, value))
                 continue
             code, number = self._judge(client, value)
             if name in together:
@@ -130,6 +131,8 @@ class Requests:
         """Have a line in lockstep go on up to a tick."""
         if _kind(client) not in MAY_GO_ON:
             return int(Codes.BadUserAccessDenied)
+        if value.AttributeId != ua.AttributeIds.Value:
+            return int(Codes.BadNotWritable)
         variant = value.Value.Value
         if variant is None or variant.VariantType is not ua.VariantType.Int64 or isinstance(variant.Value, list):
             return int(Codes.BadTypeMismatch)
@@ -137,6 +140,19 @@ class Requests:
             return int(Codes.BadInvalidState)
         refused = self._source.control("target", variant.Value, _writer(client))
         return int(Codes.BadOutOfRange if refused else Codes.GoodCompletesAsynchronously)
+
+    def _set_mode(self, client: User, value: ua.WriteValue) -> int:
+        """Put a device into a mode, for clients that can only write."""
+        if not self.may(client, MODE):
+            return int(Codes.BadUserAccessDenied)
+        tag, variant = self._modes[name_of(value.NodeId)], value.Value.Value
+        if value.AttributeId != ua.AttributeIds.Value:
+            return int(Codes.BadNotWritable)
+        if variant is None or variant.VariantType is not type_of(tag) or isinstance(variant.Value, list):
+            return int(Codes.BadTypeMismatch)
+        if variant.Value not in MODES:
+            return int(Codes.BadOutOfRange)
+        return self._give(client, MODE, (tag.device,), (float(variant.Value),), ())
 
     def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
         """Whether a value can be given, and as what number."""

@@ -6,6 +6,7 @@ from asyncua import ua
 
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.scada.hands import is_mode
 from conveyor_sim.scada.handshake import TARGET
 from conveyor_sim.scada.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id, nothing
 from conveyor_sim.scada.opcua.values import as_variant, range_of, unit_of
@@ -70,7 +71,7 @@ def _add_tag(nodes: Nodes, tag: Tag) -> None:
         as_variant(tag, tag.initial),
         tag.description,
         _type_id(tag),
-        READ_AND_WRITE if writes else READ,
+        READ_AND_WRITE if writes or is_mode(tag) else READ,
     )
     extension, texts = ua.VariantType.ExtensionObject, ua.VariantType.LocalizedText
     if tag.kind in ("number", "count"):

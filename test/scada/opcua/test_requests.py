@@ -93,6 +93,30 @@ def test_the_mode_says_who_writes(line: Line) -> None:
                     line.node(SETPOINT, client).write_value(0.1)
 
 
+def test_a_device_is_put_into_a_mode_by_writing_that(line: Line) -> None:
+    operator, mode = line.client("operator"), "belts/zone1/mode"
+    kind = ua.VariantType.UInt32
+    line.node(mode, operator).write_value(ua.Variant(3, kind))
+    line.advance()
+    assert line.read(mode) == 3
+    line.node(SETPOINT, operator).write_value(0.1)
+    line.advance()
+    assert [row[:4] for row in line.outcomes()] == [
+        ("opcua operator", "mode", ("belts/zone1",), (3.0,)),
+        ("opcua operator", "set", (SETPOINT,), (0.1,)),
+    ]
+    for role, value, code in (
+        ("controller", ua.Variant(1, kind), Codes.BadUserAccessDenied),
+        ("viewer", ua.Variant(1, kind), Codes.BadUserAccessDenied),
+        ("operator", ua.Variant(4, kind), Codes.BadOutOfRange),
+        ("operator", ua.Variant(1.0, ua.VariantType.Double), Codes.BadTypeMismatch),
+    ):
+        with refused(code):
+            line.node(mode, line.client(role)).write_value(value)
+    line.advance()
+    assert line.read(mode) == 3
+
+
 def test_the_owner_of_the_line_shuts_other_controllers_out(line: Line) -> None:
     controller = line.client("controller")
     line.simulation.give(_own("plc", ("belts/zone2",)))
