@@ -29,6 +29,7 @@ from conveyor_sim.scada.opcua.tree import add_line
 from conveyor_sim.scada.opcua.updates import Updates
 from conveyor_sim.scada.opcua.users import User, authenticate
 from conveyor_sim.scada.opcua.values import Clock
+from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
 from conveyor_sim.scada.source import TagSource
 
 POLICIES = [
@@ -142,9 +143,10 @@ class OpcUaServer:
         alarms, events = AlarmStates(nodes, emitter, clock), LineEvents(source, nodes, emitter, clock)
         packml = PackMl(source, requests, clock)
         await packml.add(server, nodes)
+        weihenstephan = Weihenstephan(source, nodes, clock)
         internal.requests = requests
         internal.answers = (Methods(source, requests, alarms.is_last_event).call, packml.call)
-        return Updates(source, nodes, clock, packml.follow, alarms.follow, events.follow)
+        return Updates(source, nodes, clock, packml.follow, weihenstephan.follow, alarms.follow, events.follow)
 
     async def stop(self) -> None:
         """End all sessions and connections."""
