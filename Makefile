@@ -14,8 +14,8 @@ DISTRO ?= jazzy
 SCENE ?= config/paper_plant.yaml
 VENV := $(if $(filter jazzy,$(DISTRO)),.venv,.venv-$(DISTRO))
 PYTHON := $(VENV)/bin/python
-# Two processes of tests; a module stays in one, for its tests share nodes and what was compiled.
-SIDE_BY_SIDE := --numprocesses=2 --dist=loadfile
+# Three processes of tests on two cores: many wait for others. A module stays in one, for its tests share nodes and what was compiled.
+SIDE_BY_SIDE := --numprocesses=3 --dist=loadfile
 
 # The environment is private: nothing of a sourced ROS, nor of another environment of ROS wheels, may reach it.
 ifneq ($(AMENT_PREFIX_PATH)$(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)

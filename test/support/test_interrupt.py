@@ -81,7 +81,13 @@ def test_a_run_whose_pictures_are_being_drawn_ends_with_one_line_and_nothing_hal
     status, said = interrupted(arguments, words="summary: ")
     assert (status, said.splitlines()[-1]) == (130, "interrupted")
     assert "Traceback" not in said
-    assert {path.name for path in folder.iterdir()} <= {"run_0.mcap", "metadata.yaml", "summary.json", "pictures"}
+    assert {path.name for path in folder.iterdir()} <= {
+        "run_0.mcap",
+        "metadata.yaml",
+        "page.html",
+        "summary.json",
+        "pictures",
+    }
     assert not any(path.name.startswith(".") for path in folder.rglob("*"))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
@@ -23,6 +25,8 @@ from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import TickSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
+
+T = TypeVar("T")
 
 PATIENCE = 60.0
 """s"""
@@ -155,3 +159,9 @@ def refused(code: int) -> Iterator[None]:
     with pytest.raises(ua.UaStatusCodeError) as caught:
         yield
     assert caught.value.code == code, caught.value
+
+
+def alone(coroutine: Coroutine[Any, Any, T]) -> T:
+    """What a coroutine comes to, in a thread of its own: browsers of other tests may keep a loop in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, coroutine).result()

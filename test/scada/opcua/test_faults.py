@@ -18,7 +18,7 @@ from conveyor_sim.scada.opcua.session import LONGEST_QUEUE
 from conveyor_sim.scada.opcua.transport import CHUNK, MOST_CLIENTS
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING
-from test.scada.opcua.conftest import PASSWORD, PATIENCE
+from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -116,7 +116,7 @@ def test_one_connection_begins_one_session(still: Line) -> None:
         found: dict[object, object] = still.server._server.iserver._external_sessions  # type: ignore[union-attr]
         return found
 
-    assert asyncio.run(come()) == 0
+    assert alone(come()) == 0
 
 
 def test_long_strings_are_refused(line: Line) -> None:
@@ -130,7 +130,7 @@ def test_long_strings_are_refused(line: Line) -> None:
 
     for length in (100_000, 10_000_000):
         with pytest.raises((ua.UaError, ConnectionError)):
-            asyncio.run(write(length))
+            alone(write(length))
     line.client()
     line.advance()
     assert line.outcomes() == []
@@ -162,7 +162,7 @@ def test_three_clients_that_write_as_fast_as_they_can(line: Line) -> None:
             await client.disconnect()
         return [code for each in codes for code in each]
 
-    codes = asyncio.run(flood())
+    codes = alone(flood())
     assert codes.count(ua.StatusCodes.GoodCompletesAsynchronously) == MOST_WAITING
     assert codes.count(ua.StatusCodes.BadTooManyOperations) == 3 * 500 - MOST_WAITING
     line.advance()

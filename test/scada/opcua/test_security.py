@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import shutil
 import stat
 import subprocess
@@ -20,7 +19,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 
 from conveyor_sim.scada.opcua.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
 from conveyor_sim.scada.opcua.users import UsersError, authenticate, line_of, new_user, read_users
-from test.scada.opcua.conftest import PASSWORD, PATIENCE, refused
+from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone, refused
 
 if TYPE_CHECKING:
     from test.scada.opcua.conftest import Line, Serve
@@ -95,7 +94,7 @@ def test_who_is_not_known_is_not_let_in(line: Line) -> None:
 
     for name, password in STRANGERS:
         with pytest.raises(ua.UaStatusCodeError) as caught:
-            asyncio.run(come(name, password))
+            alone(come(name, password))
         # An empty password is not encrypted by this client.
         expected = Codes.BadUserAccessDenied if password else Codes.BadSecurityModeInsufficient
         assert caught.value.code == expected, name
@@ -138,13 +137,13 @@ async def _come(kind: type[AsyncClient], address: str) -> None:
 
 def test_a_password_is_not_taken_in_the_clear(line: Line) -> None:
     with refused(Codes.BadSecurityModeInsufficient):
-        asyncio.run(_come(_Plain, line.server.address))
+        alone(_come(_Plain, line.server.address))
 
 
 def test_a_password_that_was_heard_is_of_no_use(line: Line) -> None:
-    asyncio.run(_come(_Again, line.server.address))
+    alone(_come(_Again, line.server.address))
     with refused(Codes.BadIdentityTokenInvalid):
-        asyncio.run(_come(_Again, line.server.address))
+        alone(_come(_Again, line.server.address))
 
 
 def test_a_secured_channel_carries_all(line: Line, client_files: str) -> None:
@@ -270,7 +269,7 @@ def test_a_session_can_not_be_taken_over(line: Line, client_files: str) -> None:
     plain = line.client("controller")
     known = [each.aio_obj.uaclient.session.authentication_token for each in (controller, plain)]
     guessed = [ua.NodeId(1000 + number) for number in range(0, 60, 5)]
-    asyncio.run(_steal(line.server.address, [*known, *guessed]))
+    alone(_steal(line.server.address, [*known, *guessed]))
     line.advance()
     assert line.outcomes() == []
     controller.get_node(f"ns=2;s={SETPOINT}").write_value(0.25)  # it is still theirs
