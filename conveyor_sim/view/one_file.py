@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.view.bundle import one_file
@@ -36,8 +36,11 @@ def write_page(
 
     last: only so many seconds at its end are drawn; None: all. What happened is listed from the beginning. watch: what
     is drawn instead, of the same run. trends: signals that are shown at first; none: what there is most to see of.
-    Raises BagError, SceneError, and ConveyorError if the file can't be written.
+    Raises BagError, SceneError, and ConveyorError if the file can't be written, or is one of the recording's.
     """
+    recorded = [part for part in (*mcap_files(bag), bag / "metadata.yaml") if part.exists()]
+    if file.exists() and any(map(file.samefile, recorded)):
+        raise ConveyorError(f"--html: {file} given, which is a file of the recording, expected another one")
     with open_bag(bag) as opened:
         recording = Recording(opened, Detail(), last)
         if watch is not None and watch.end >= 0:

@@ -39,6 +39,14 @@ def test_what_makes_no_sense_is_refused(
     assert not Path("page.html").exists()
 
 
+def test_a_recording_is_not_overwritten_by_its_page(bag: Path) -> None:
+    for part in [file for file in bag.iterdir() if file.suffix in (".mcap", ".yaml")]:
+        content = part.read_bytes()
+        done = CliRunner().invoke(main, ["view", str(bag), "--html", str(part)])
+        assert done.exit_code == 1 and "which is a file of the recording, expected another one" in done.output
+        assert part.read_bytes() == content
+
+
 def test_a_recording_is_served_until_ctrl_c(bag: Path) -> None:
     command = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "view", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
