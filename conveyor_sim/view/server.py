@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import zlib
 from collections.abc import Callable
@@ -61,7 +62,7 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         if name == "head":
             return self._deflated(self._shown, lambda: text(self._shown.head()))
         counts = {"story": self._shown.stories, "block": self._shown.blocks}
-        if kind not in counts or not number.isdecimal() or int(number) >= counts[kind]:
+        if kind not in counts or not (number.isdecimal() and len(number) < 10) or int(number) >= counts[kind]:
             raise KeyError(name)
         recording = self._shown if kind == "block" else self._read_on
         return self._deflated(recording, lambda: getattr(recording, kind)(int(number)))
@@ -80,6 +81,11 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     answer: Callable[[str], bytes]
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that leaves while it is answered is nothing to tell of."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

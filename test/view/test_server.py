@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import socket
+import struct
+import threading
 import zlib
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -53,7 +56,16 @@ def test_parts_of_a_recording_are_answered_by_name(server: RecordingServer, bag:
 
 
 @pytest.mark.parametrize(
-    "path", ["/data/block/99", "/data/block/-1", "/data/block/x", "/data/", "/../setup.py", "/x.py"]
+    "path",
+    [
+        "/data/block/99",
+        "/data/block/-1",
+        f"/data/block/{'9' * 5000}",
+        "/data/block/x",
+        "/data/",
+        "/../setup.py",
+        "/x.py",
+    ],
 )
 def test_what_there_is_not_is_not_found(server: RecordingServer, path: str) -> None:
     assert get(server, path)[0] == 404
@@ -157,3 +169,18 @@ def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(
     assert index is not None
     assert len(index._index.chunks) > 20, "there were others to be read"
     index.close()
+
+
+def test_a_browser_that_leaves_while_it_is_answered_is_not_told_of(
+    server: RecordingServer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    address = urlsplit(server.url)
+    for _ in range(20):
+        with socket.create_connection((address.hostname, address.port), timeout=60) as leaving:
+            leaving.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # closes by a reset
+            leaving.sendall(b"GET /data/block/0 HTTP/1.1\r\nHost: 127.0.0.1:1\r\n")
+    for thread in threading.enumerate():
+        if "process_request_thread" in thread.name:
+            thread.join(60)
+    assert get(server, "/")[0] == 200
+    assert "Traceback" not in capfd.readouterr().err
