@@ -15,11 +15,12 @@ from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
 from conveyor_sim.st.types import TIME, BlockType, Member
+from conveyor_sim.support.files import MB, FileError, read_file
 
 LOWEST = 2**31
 """The priority of a program without a task: it comes after all others."""
 
-MOST_BYTES = 4_000_000
+MOST_BYTES = 4 * MB
 """Of a file."""
 
 
@@ -59,15 +60,9 @@ class Compiled:
 def compile_file(path: Path, trace: bool = False) -> Compiled:
     """The program of a file. Raises StructuredTextError for one that can't be read, or can't be."""
     try:
-        content = path.read_bytes() if path.is_file() else None
-    except OSError as error:
-        raise StructuredTextError(f"{path}: can't be read ({error.strerror})") from error
-    if content is None:
-        raise StructuredTextError(f"{path}: no such file, expected a program in Structured Text")
-    if len(content) > MOST_BYTES:
-        raise StructuredTextError(f"{path}: has {len(content)} bytes, expected at most {MOST_BYTES}")
-    try:
-        text = content.decode("utf-8-sig")
+        text = read_file(path, MOST_BYTES).decode("utf-8-sig")
+    except FileError as error:
+        raise StructuredTextError(f"{path}: {error}, expected a program in Structured Text") from error
     except UnicodeDecodeError as error:
         raise StructuredTextError(f"{path}: is not UTF-8 ({error.reason} at byte {error.start})") from error
     return compile_text(text, str(path), trace)

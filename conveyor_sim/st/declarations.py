@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 MOST_ELEMENTS = 1_000_000
-"""Of an array."""
+"""Of an array, a structure or a block, with all that is in it."""
 
 _SECTIONS = {
     "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
@@ -48,6 +49,7 @@ class Declarations:
         self._pending: dict[str, tree.TypeDeclaration | tree.Unit] = {}
         self._functions: dict[str, tree.Unit] = {}
         self._open: list[str] = []
+        self._elements: dict[str, int] = {}
         everything: list[tree.TypeDeclaration | tree.Unit] = [*source.types, *source.units]
         for declared in everything:
             where: dict[str, Any] = self._pending
@@ -122,6 +124,7 @@ class Declarations:
         kind = Structure(written, "structure", python=f"_S_{written.lower()}")
         for field in spec.fields:
             self._add(kind, field, "VAR", (), known)
+        self._bound(kind, spec.at)
         self.structures.append(kind)
         return kind
 
@@ -143,15 +146,21 @@ class Declarations:
             elements *= high - low + 1
             ranges.append((low, high))
         element = self._type(spec.element, known)
-        inner: Type = element
-        while isinstance(inner, Array):
-            for low, high in inner.ranges:
-                elements *= high - low + 1
-            inner = inner.element
-        if elements > MOST_ELEMENTS:
-            raise SourceError(spec.at, f"found {elements} elements, expected at most {MOST_ELEMENTS}")
+        _require_few(elements * self._elements_of(element), spec.at)
         shown = ", ".join(f"{low}..{high}" for low, high in ranges)
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
+
+    def _bound(self, kind: Structure, at: Position) -> None:
+        """Keep how many elements it has, once its members are known."""
+        own = (one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL"))
+        self._elements[kind.python] = max(1, sum(map(self._elements_of, own)))
+        _require_few(self._elements[kind.python], at)
+
+    def _elements_of(self, kind: Type) -> int:
+        """Elementary variables in one of a type; a block of the library counts as one."""
+        if isinstance(kind, Array):
+            return math.prod(high - low + 1 for low, high in kind.ranges) * self._elements_of(kind.element)
+        return self._elements.get(kind.python, 1) if isinstance(kind, Structure) else 1
 
     def _enumeration(self, spec: tree.EnumType, known: Expressions, name: str) -> Type:
         base = self.named(spec.at, spec.base) if spec.base else ELEMENTARY["INT"]
@@ -194,6 +203,7 @@ class Declarations:
             if kind.function and isinstance(member.type, BlockType) and member.section != "VAR_IN_OUT":
                 at = Position(*member.at)
                 raise SourceError(at, f"found {member.name}, a block, in a function, expected it in a block or program")
+        self._bound(kind, unit.at)
         return kind
 
     def _members(self, kind: BlockType, sections: Iterable[tree.Variables], allowed: tuple[str, ...]) -> None:
@@ -300,3 +310,8 @@ class Declarations:
                 )
             given.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(given)})"
+
+
+def _require_few(elements: int, at: Position) -> None:
+    if elements > MOST_ELEMENTS:
+        raise SourceError(at, f"found {elements} elements, expected at most {MOST_ELEMENTS}")

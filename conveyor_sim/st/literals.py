@@ -10,11 +10,14 @@ _UNITS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, 
 _UNITS |= {"ms": 1_000_000, "us": 1_000, "ns": 1}
 _ORDER = tuple(_UNITS)
 _PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
+_LONGEST = 1000
+"""Characters of a number: more than any type holds, and fewer than Python takes."""
 _ESCAPES = {"$": "$", "'": "'", '"': '"', "l": "\n", "n": "\n", "p": "\f", "r": "\r", "t": "\t"}
 
 
-def integer(text: str) -> int:
+def integer(at: Position, text: str) -> int:
     """1_000"""
+    _require_short(at, text)
     return int(text.replace("_", ""))
 
 
@@ -34,6 +37,7 @@ def real(text: str) -> float:
 
 def duration(at: Position, text: str) -> int:
     """T#1h30m, TIME#-2.5s or T#1d_4h in ns. Each unit once, from the largest down; only the last has decimals."""
+    _require_short(at, text)
     written = text.partition("#")[2].lower().replace("_", "")
     sign, digits = (-1, written[1:]) if written.startswith("-") else (1, written.removeprefix("+"))
     parts = _PART.findall(digits)
@@ -46,7 +50,14 @@ def duration(at: Position, text: str) -> int:
         before, _, after = number.partition(".")
         total += int(before) * _UNITS[unit]
         total += int(after or "0") * _UNITS[unit] // 10 ** len(after)
+    if not -(2**63) <= sign * total < 2**63:
+        raise SourceError(at, f"found {text}, expected a duration of at most 64 bits of ns, which is 292 years")
     return sign * total
+
+
+def _require_short(at: Position, text: str) -> None:
+    if len(text) > _LONGEST:
+        raise SourceError(at, f"found a number of {len(text)} characters, expected at most {_LONGEST}")
 
 
 def characters(at: Position, text: str, wide: bool) -> str:

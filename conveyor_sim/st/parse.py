@@ -157,7 +157,7 @@ class _Tree(Transformer_NonRecursive):
         ]
 
     def repeated(self, meta: Meta, items: list[Any]) -> Any:
-        return literals.integer(items[0]), items[1]
+        return literals.integer(at_of(items[0]), items[0]), items[1]
 
     def initial_array(self, meta: Meta, items: list[Any]) -> tree.Expression:
         elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items)
@@ -218,7 +218,7 @@ class _Tree(Transformer_NonRecursive):
         return found
 
     def negative_label(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return tree.Literal(_of(meta), f"-{items[1]}", "int", -literals.integer(items[1]))
+        return tree.Literal(_of(meta), f"-{items[1]}", "int", -literals.integer(_of(meta), items[1]))
 
     def label_range(self, meta: Meta, items: list[Any]) -> Any:
         return items[0], items[1]
@@ -324,7 +324,7 @@ for _rule in ("exit", "continue", "return"):
 def _literal(at: Position, token: Token) -> tree.Literal:
     text = str(token)
     if token.type == "INTEGER":
-        return tree.Literal(at, text, "int", literals.integer(text))
+        return tree.Literal(at, text, "int", literals.integer(at, text))
     if token.type == "BASED":
         return tree.Literal(at, text, "int", literals.based(at, text))
     if token.type == "DECIMAL":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -242,6 +243,22 @@ def test_a_program_that_stops_says_where(tmp_path: Path) -> None:
     plc = bound(tmp_path, "VAR n : INT; END_VAR", "WHILE TRUE DO\n  n := n + 1;\nEND_WHILE")
     with pytest.raises(StructuredTextError, match=r"program\.st:2:1: watchdog: found more than 100000"):
         scan(plc, 0)
+
+
+@pytest.mark.parametrize("number", ["9" * 5000, "T#" + "9" * 5000 + "s", "-" + "9" * 5000])
+def test_a_number_that_goes_on_for_ever_is_refused(tmp_path: Path, number: str) -> None:
+    with pytest.raises(StructuredTextError, match=r"program\.st:2:\d+: found a number of \d+ characters, expected"):
+        controller(tmp_path, "VAR n : LINT; END_VAR", f"n := {number};")
+
+
+def test_what_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
+    (tmp_path / "folder.st").mkdir()
+    os.mkfifo(tmp_path / "pipe.st")
+    with open(tmp_path / "large.st", "wb") as large:
+        large.truncate(10**12)
+    for name, said in (("folder", "is a folder"), ("pipe", "is a named pipe"), ("large", "has 1000000 MB, more than")):
+        with pytest.raises(StructuredTextError, match=rf"{name}\.st: {said}.*expected a program in Structured Text"):
+            StructuredText(tmp_path / f"{name}.st")
 
 
 def test_a_program_brought_over_from_codesys_runs_the_line(tmp_path: Path) -> None:
