@@ -185,6 +185,19 @@ def test_certificate_and_key_are_made_once_and_are_nobody_elses(tmp_path: Path) 
         identity(folder)
 
 
+def test_a_full_disk_leaves_no_part_of_a_certificate(tmp_path: Path) -> None:
+    """By a limit of the size of files, which the system keeps as it does that of the disk."""
+    code = (
+        "import resource, signal, sys; from pathlib import Path; "
+        "from conveyor_sim.scada.opcua.certificates import identity; "
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)); "
+        "identity(Path(sys.argv[1]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True)
+    assert done.returncode != 0 and "CertificateError" in done.stderr
+    assert not [file for file in tmp_path.iterdir() if file.is_file()]
+
+
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed: apt-get install openssl")
 def test_the_certificate_is_one_that_openssl_takes(certificates: Path) -> None:
     identity(certificates)
