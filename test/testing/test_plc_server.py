@@ -124,13 +124,14 @@ def test_the_command_attach_records_what_a_plc_commands(plc: Plc, tmp_path: Path
         assert any(SETPOINT in frame.data.names for frame in bag.outcomes())
 
 
-def test_attach_says_that_there_is_no_plc(tmp_path: Path) -> None:
+def test_attach_says_that_there_is_no_plc(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
     tags = write_map(tmp_path / "tags.csv", {SETPOINT: "holding register 0 float32"})
     asked = ["attach", LINE, "modbus://127.0.0.1:1", "--tags", str(tags), "--no-record"]
     refused = CliRunner().invoke(main, asked)
     assert refused.exit_code == 1
     assert "modbus://127.0.0.1:1: can't be reached, expected the Modbus server of a PLC" in refused.output
+    assert not [record for record in caplog.records if record.name.startswith("pymodbus")]
 
 
 @pytest.mark.parametrize(

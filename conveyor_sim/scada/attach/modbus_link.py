@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_args
 
@@ -31,6 +32,7 @@ class ModbusLink:
 
     async def connect(self) -> None:
         """Reach it."""
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs what LinkError says
         host, port = self._at
         client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
         self._client = client
