@@ -37,6 +37,9 @@ used up, queues have room for one.
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""
 
+UNFETCHED = 30.0
+"""s for which a subscription is kept that nobody fetches anything of, or three of its intervals, if that is longer."""
+
 REFRESH = {
     ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
     ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh2),
@@ -185,8 +188,16 @@ class Session(InternalSession):
         return results
 
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
-        """The library would publish as often as it is asked to, and do nothing else."""
-        params.RequestedPublishingInterval = _interval(params.RequestedPublishingInterval)
+        """The library would publish as often as it is asked to, and do nothing else; and keep what nobody fetches.
+
+        A lifetime is at least three times the time after which a client hears that there is nothing new (OPC 10000-4,
+        5.14.2.2).
+        """
+        interval = params.RequestedPublishingInterval = _interval(params.RequestedPublishingInterval)
+        kept = max(3, math.ceil(UNFETCHED * 1000.0 / interval))
+        params.RequestedLifetimeCount = min(params.RequestedLifetimeCount or kept, kept)
+        most = max(1, params.RequestedLifetimeCount // 3)
+        params.RequestedMaxKeepAliveCount = min(params.RequestedMaxKeepAliveCount or most, most)
         return await super().create_subscription(params, *others, **named)
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:

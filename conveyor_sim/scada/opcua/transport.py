@@ -129,7 +129,6 @@ class BoundedServer(Server):
         self.iserver.max_pending_messages_per_connection = _WAITING
         self.iserver.max_subscriptions = 4 * MOST_CLIENTS
         self.iserver.max_unacked_messages_per_subscription = 20
-        self.iserver.max_lifetime_count, self.iserver.max_keep_alive_count = 1200, 400
 
     async def listen(self, host: str, port: int) -> int:
         """Serve from now on; the port. Raises OSError."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -134,6 +135,31 @@ def test_long_strings_are_refused(line: Line) -> None:
     line.client()
     line.advance()
     assert line.outcomes() == []
+
+
+def test_subscriptions_of_a_client_that_is_gone_are_not_kept(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether the line changes or not, and one that is there keeps its own."""
+    monkeypatch.setattr(session, "UNFETCHED", 1.0)
+
+    async def come_and_vanish() -> None:
+        client = AsyncClient(line.server.address, timeout=PATIENCE)
+        await client.connect()
+        subscription = await client.create_subscription(100, _Deaf())
+        await subscription.subscribe_data_change(client.get_node(f"ns=2;s={SETPOINT}"))
+        client.uaclient.protocol.transport.abort()
+
+    there = line.client().create_subscription(100, _Deaf())
+    there.subscribe_data_change(line.node(SETPOINT))
+    alone(come_and_vanish())
+    line.until(lambda: line.server.status().subscriptions == 1)
+    line.advance(3)
+    time.sleep(3.0)  # three lifetimes
+    assert line.server.status().subscriptions == 1
+
+
+class _Deaf:
+    def datachange_notification(self, *_: Any) -> None:
+        """Whatever comes."""
 
 
 def test_three_clients_that_write_as_fast_as_they_can(line: Line) -> None:
