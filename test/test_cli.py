@@ -168,6 +168,20 @@ def test_replay_over_ros_says_what_it_lacks() -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("serve", "two_bottles", "--modbus", "0", "--real-time-factor", "nan"),
+        ("attach", "two_bottles", "modbus://127.0.0.1:1", "--tags", "tags.csv", "--period", "NaN"),
+    ],
+)
+def test_what_is_no_number_is_in_no_range(command: Command, arguments: tuple[str, ...]) -> None:
+    refused = command(*arguments)
+    assert refused.exit_code == 2
+    words = rf"Invalid value for '{arguments[-2]}': {arguments[-1]} is not in the range .*<=x<="
+    assert re.search(words, refused.output)
+
+
 def test_plot_draws_into_a_folder(command: Command, tmp_path: Path) -> None:
     command("run", SMALL_LINE, "--out", "bag", "--duration", "0.4")
     result = command("plot", "bag", "--out", "drawn", "--time", "0.2", "--bottle", "0")

@@ -9,7 +9,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES
+from conveyor_sim.cli.output import OUTSIDE_TABLES, Number
 from conveyor_sim.cli.serve import scene_source, watch
 from conveyor_sim.support.garbage import collected_later
 
@@ -19,8 +19,8 @@ from conveyor_sim.support.garbage import collected_later
 @click.argument("url")
 @click.option("--tags", required=True, type=click.Path(path_type=Path), help="CSV file: our tags, and theirs.")
 @click.option("--user", default="", help="Of OPC UA (default: anonymous); the password is asked for.")
-@click.option("--period", type=click.FloatRange(0.001, 10.0), default=0.01, help="s from scan to scan (default: 0.01).")
-@click.option("--real-time-factor", type=click.FloatRange(0.001, 1e6), default=1.0, help="Of the simulation.")
+@click.option("--period", type=Number(0.001, 10.0), default=0.01, help="s from scan to scan (default: 0.01).")
+@click.option("--real-time-factor", type=Number(0.001, 1e6), default=1.0, help="Of the simulation.")
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
 @click.option(
     "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."

@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import click
 from rich.console import Console, RenderableType
 
 OUTSIDE_TABLES = "Let SCENE name tables (CSV files) that lie outside its own folder."
+
+
+class Number(click.FloatRange):
+    """A number in a range, and never NaN, which no comparison finds outside."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number: float = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
+        return number
 
 
 def say(sentence: str) -> None:

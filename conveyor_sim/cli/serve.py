@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.console import Console
 
-from conveyor_sim.cli.output import OUTSIDE_TABLES
+from conveyor_sim.cli.output import OUTSIDE_TABLES, Number
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
@@ -55,7 +55,7 @@ _WHERE = {
 @click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")
 @click.option("--bind", default="127.0.0.1", help="Address to listen on, for other machines (default: this one only).")
 @click.option("--stamps", type=click.Choice(["wall", "simulated"]), default="wall", help="What times of values are.")
-@click.option("--real-time-factor", type=click.FloatRange(0.0, 1e6), default=1.0, help="0: as fast as possible.")
+@click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
 @click.option("--loop", is_flag=True, help="Of BAG: begin anew at its end.")
 @click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of its own.")
 @click.option(

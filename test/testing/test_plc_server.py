@@ -176,6 +176,32 @@ def test_a_place_in_modbus_that_can_t_be_is_refused(tmp_path: Path, theirs: str,
     assert str(refused.value).startswith(f"{tags}: line 2: ") and said in str(refused.value)
 
 
+def test_a_signal_is_not_written_where_nothing_can_be(tmp_path: Path) -> None:
+    """Else it would go to the holding register of the same address."""
+    pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+    tags = write_map(tmp_path / "tags.csv", {BOTTLES: "input register 2 uint16"})
+    with (
+        Scenario(LINE) as plant,
+        pytest.raises(TagMapError, match=f"line 2: {BOTTLES} is written, but input registers"),
+    ):
+        link("modbus://127.0.0.1:1", all_of(read_tag_map(tags, plant.simulation.process_image.tags)))
+
+
+def test_a_place_that_the_plc_lacks_is_said_at_once(tmp_path: Path) -> None:
+    pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+    plc = Plc("modbus", tmp_path)
+    try:
+        tags = write_map(tmp_path / "tags.csv", plc.places | {SETPOINT: "holding register 900 float32"})
+        with (
+            Scenario(LINE) as plant,
+            pytest.raises(LinkError, match=r"holding register 900 .* refused with exception 2"),
+        ):
+            plant.attach_plc(plc.url, tags)
+    finally:
+        plc.stop()
+        plc.thread.close()
+
+
 @pytest.mark.parametrize("url", ["http://127.0.0.1:1", "127.0.0.1", "opc.tcp://", "modbus://[", "modbus://a:b"])
 def test_a_url_that_can_t_be_is_refused(url: str) -> None:
     with pytest.raises(LinkError, match=r"expected opc\.tcp://host:port or modbus://host:port"):

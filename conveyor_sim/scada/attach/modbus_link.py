@@ -10,8 +10,10 @@ from typing import Any, get_args
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
+from conveyor_sim.line.tag import SIGNALS
 from conveyor_sim.scada.attach.link import PATIENCE, LinkError
-from conveyor_sim.scada.attach.tag_map import Mapped, TagMapError
+from conveyor_sim.scada.attach.tag_map import OWN, Mapped, TagMapError
+from conveyor_sim.scada.handshake import TICK
 from conveyor_sim.scada.modbus_map import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
 from conveyor_sim.support.printable import printable
 
@@ -19,6 +21,8 @@ MOST_WORDS = 100
 """Of one request; the protocol has 125 to read and 123 to write."""
 
 _BITS: tuple[Table, ...] = ("coil", "discrete input")
+_WRITABLE: tuple[Table, ...] = ("coil", "holding register")
+_WRITABLE_TEXT = " or ".join(f"a {table}" for table in _WRITABLE)
 
 
 class ModbusLink:
@@ -31,13 +35,14 @@ class ModbusLink:
         self._client: AsyncModbusTcpClient | None = None
 
     async def connect(self) -> None:
-        """Reach it."""
+        """Reach it, and read every place of the map once: who does not answer there is not reached."""
         logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs what LinkError says
         host, port = self._at
         client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
         self._client = client
         if not await asyncio.wait_for(client.connect(), 2.0 * PATIENCE):
             raise LinkError(f"{self._url}: can't be reached, expected the Modbus server of a PLC")
+        await self.read(list(self._rows))
 
     async def write(self, values: Mapping[str, float]) -> None:
         """Set coils and holding registers, in the order of the values."""
@@ -119,4 +124,7 @@ def _row(mapped: Mapped) -> Row:
     if (kind == "bool") != (table in _BITS):
         raise TagMapError(f"{mapped.where}: {kind} given in a {table}, {expected}")
     tag = mapped.tag
+    written = tag.name == TICK or (tag.role in SIGNALS and not tag.name.startswith(OWN))
+    if written and table not in _WRITABLE:
+        raise TagMapError(f"{mapped.where}: {tag.name} is written, but {table}s can't be, expected {_WRITABLE_TEXT}")
     return Row(tag.name, table, int(rest[0]), kind, order, tag.unit, "read", tag.low, tag.high, "")
