@@ -18,8 +18,6 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.line.run_state import ENDED, STOPPED
-from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
 from conveyor_sim.observe.events import Event
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros
 from conveyor_sim.ros.direct import Aside, WaitSet, take_message
@@ -90,13 +88,8 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
 
         What the node refuses is among the events.
         """
-        shown = self.shown
-        if shown.lost:
-            return shown.lost
-        if shown.run.state in (ENDED, STOPPED):
-            return f"the run has {shown.run.text}, expected a reset"
-        if size_of(given) > MESSAGE_BYTES:
-            return TOO_LARGE
+        if reason := self._objection(given):
+            return reason
 
         def answered(future: Future) -> None:
             answer = self._answer(future)

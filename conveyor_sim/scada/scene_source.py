@@ -21,7 +21,6 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
-from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
 from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Note, Task
 from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import HEARD, View
@@ -85,13 +84,8 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
 
     def give(self, given: Input) -> str:
         """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
-        shown = self.shown
-        if shown.lost:
-            return shown.lost
-        if shown.run.state in (ENDED, STOPPED):
-            return f"the run has {shown.run.text}, expected a reset"
-        if size_of(given) > MESSAGE_BYTES:
-            return TOO_LARGE
+        if reason := self._objection(given):
+            return reason
         with self._lock:
             if self._given - self._handed + self._waiting >= MOST_WAITING:
                 return f"{MOST_WAITING} inputs wait for the next tick already"

@@ -11,8 +11,10 @@ from typing import Any
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.run_state import RUNNING, RunState
+from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
 from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
@@ -80,6 +82,15 @@ class View:
     def wait(self, seconds: float) -> bool:
         """Until the line is known and there is something to show, or so long, s of wall time; whether it is."""
         return self._known.wait(seconds)
+
+    def _objection(self, given: Input) -> str:
+        """Why an input can't be handed on to the line as it is, "" if it can."""
+        shown = self.shown
+        if shown.lost:
+            return shown.lost
+        if shown.run.state in (ENDED, STOPPED):
+            return f"the run has {shown.run.text}, expected a reset"
+        return TOO_LARGE if size_of(given) > MESSAGE_BYTES else ""
 
     # By the thread that hears
 

@@ -18,9 +18,9 @@ from rclpy.signals import SignalHandlerOptions
 
 from conveyor_sim.bag.qos import ANSWERS
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.ros.child import Process
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.support.child_process import Process
 
 PATIENCE = 60.0  # s of wall time; only a failing test waits so long
 

@@ -16,7 +16,8 @@ from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from rosgraph_msgs.msg import Clock
 
-from conveyor_sim.ros.child import Child, Process
+from conveyor_sim.ros.child import Child
+from conveyor_sim.support.child_process import Process
 
 TWIN = "another node is named /conveyor_sim: requests may be answered by either"
 SHARED = "two simulations share the names /line, commands, lockstep, and commands reach both"

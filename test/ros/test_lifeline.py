@@ -14,12 +14,12 @@ from ros.line_client import until
 from ros.test_main_job import start_main_job
 
 from conveyor_sim.bag.recover import recover
-from conveyor_sim.ros.child import Process
+from conveyor_sim.support.child_process import Process
 
 PARENT = """
 import os, sys, time
 from pathlib import Path
-from conveyor_sim.ros.child import Process
+from conveyor_sim.support.child_process import Process
 Process("child", sys.argv[2:], os.environ, Path(sys.argv[1]))
 print("started", flush=True)
 time.sleep(600)

@@ -1,4 +1,4 @@
-"""Runs a command that ends with the process that started it, however that ends; `child.Process` starts it as
+"""Runs a command that ends with the process that started it, however that ends; `child_process.Process` starts it as
 
     python -I -S lifeline.py DESCRIPTOR PATIENCE COMMAND...
 
