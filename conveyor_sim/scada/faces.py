@@ -53,7 +53,7 @@ def _modbus_exposes(settings: Settings) -> str:
 
 def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
     from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.opcua.users import read_users
+    from conveyor_sim.scada.users import read_users
 
     return OpcUaServer(
         source,

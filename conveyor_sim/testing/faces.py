@@ -16,7 +16,7 @@ from conveyor_sim.scada.server_thread import ServerThread
 if TYPE_CHECKING:
     from conveyor_sim.scada.modbus_server import ModbusServer
     from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.opcua.users import Role
+    from conveyor_sim.scada.users import Role
     from conveyor_sim.testing.scenario import Scenario
 
 MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
@@ -84,7 +84,7 @@ class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
         FaceError if there is no port, ImportError without asyncua.
         """
         from conveyor_sim.scada.opcua.server import OpcUaServer
-        from conveyor_sim.scada.opcua.users import new_user
+        from conveyor_sim.scada.users import new_user
 
         known = {name: new_user(role, password) for name, (role, password) in (users or {}).items()}
         server = OpcUaServer(line.source(), known, stamps=stamps, certificates=Path(self._folder.name) / "own")

@@ -124,7 +124,7 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path],
 def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
     """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
     from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.opcua.users import new_user
+    from conveyor_sim.scada.users import new_user
 
     users = {USER: new_user("controller", password)}
     return lambda source, folder: OpcUaServer(source, users, port=port, certificates=folder / "certificates")

@@ -10,6 +10,14 @@ from html import escape
 from pathlib import Path
 
 PAGE = Path(__file__).parent / "page"
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+"""Of whatever a server of the page answers."""
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./([\w.]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
 _STYLE = re.compile(r'<link rel="stylesheet" href="([\w./]+)">')
@@ -41,6 +49,12 @@ def one_file(parts: Mapping[str, bytes], title: str) -> str:
     page = page.replace("<title>Line view</title>", f"<title>{escape(title)}</title>")
     page = page.replace("<!--policy-->", f'<meta http-equiv="Content-Security-Policy" content="{policy}">')
     return page.replace("<!--recording-->", data)
+
+
+def page_files() -> dict[str, str]:
+    """The content type of each file of the page, by its path in PAGE."""
+    found = (file for file in PAGE.rglob("*") if file.suffix in _TYPES)
+    return {file.relative_to(PAGE).as_posix(): _TYPES[file.suffix] for file in found}
 
 
 def joined(module: str) -> str:

@@ -7,20 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.bag.reader import Bag
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.geometry import BeltShape, belt_shapes, rail_shapes
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.view.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN
+from conveyor_sim.view.story import fields
 
 _ARC_POINTS = 96
 _DIGITS = 5
 """Of metres."""
 
 
-def head(bag: Bag, scene: Scene) -> dict[str, Any]:
-    """All that the page needs besides what changes."""
-    line = bag.line
+def head(line: Any, scene: Scene) -> dict[str, Any]:
+    """All that the page needs besides what changes, and how to read that, of a decoded message of topic line."""
     signals = list(line.signal_names)
     return {
         "scene": scene.name,
@@ -60,6 +60,15 @@ def head(bag: Bag, scene: Scene) -> dict[str, Any]:
         "signals": signals,
         "commands": list(line.command_names),
         "tags": _tags(line),
+        "fields": fields(),
+        "steps": {
+            "mm": MM,
+            "signal": SIGNAL_STEPS,
+            "force": LEAST_FORCE,
+            "levels": LEVELS,
+            "unknown": UNKNOWN,
+            "forceFrames": FORCE_FRAMES,
+        },
     }
 
 

@@ -10,21 +10,11 @@ from typing import Any
 from conveyor_sim.bag.messages import to_image
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.scene import parse_overrides, parse_scene
-from conveyor_sim.view.block import (
-    FORCE_FRAMES,
-    LEAST_FORCE,
-    LEVELS,
-    MM,
-    SECONDS,
-    SIGNAL_STEPS,
-    UNKNOWN,
-    block_ticks,
-    pack,
-)
+from conveyor_sim.view.block import SECONDS, block_ticks, pack
 from conveyor_sim.view.content import DRAWN, Collector
 from conveyor_sim.view.head import head
 from conveyor_sim.view.stamps import Stamps
-from conveyor_sim.view.story import TOPICS_READ, Story, fields
+from conveyor_sim.view.story import TOPICS_READ, Story
 
 
 @dataclass(frozen=True)
@@ -76,7 +66,7 @@ class Recording:
         return 1 + math.floor((self.last - self._began) * self._tick_ns * 1e-9 / self._detail.story)
 
     def head(self) -> dict[str, Any]:
-        """As `head.head`, and how to read the rest."""
+        """As `head.head`, and how much there is."""
         times = {
             "first": self.first,
             "last": self.last,
@@ -84,16 +74,8 @@ class Recording:
             "blocks": self.blocks,
             "stories": self.stories,
         }
-        steps = {
-            "mm": MM,
-            "signal": SIGNAL_STEPS,
-            "force": LEAST_FORCE,
-            "levels": LEVELS,
-            "unknown": UNKNOWN,
-            "forceFrames": FORCE_FRAMES,
-        }
         forced: list[int] = next((to_image(frame.data).forced.tolist() for frame in self._bag.messages("signals")), [])
-        return {**head(self._bag, self._scene), "times": times, "steps": steps, "fields": fields(), "forced": forced}
+        return {**head(self._bag.line, self._scene), "times": times, "forced": forced}
 
     def block(self, number: int) -> bytes:
         """A block, from 0 on, as `block.pack` writes it."""
@@ -106,14 +88,14 @@ class Recording:
 
     def story(self, number: int = 0) -> bytes:
         """What happened in a stretch of the recording, from 0 on, as JSON (`Story`)."""
-        story = Story(self._bag, 1.0 / self._detail.counters)
+        story = Story(self._bag.time, 1.0 / self._detail.counters)
         start = stop = None
         if self.stories > 1:
             length = round(self._detail.story * 1e9 / self._tick_ns)
             start = self._began + number * length
             stop = start + length
-        for topic, _, raw in self._stamps.messages(TOPICS_READ, start, stop):
-            story.add(topic, raw)
+        for topic, tick, raw in self._stamps.messages(TOPICS_READ, start, stop):
+            story.add(topic, self._bag.decode(topic, raw), tick)
         return text(story.data)
 
 

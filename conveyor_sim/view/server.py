@@ -16,16 +16,11 @@ from urllib.parse import urlsplit
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
-from conveyor_sim.view.bundle import PAGE
+from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.view.recording import Detail, Recording, text
 
 ADDRESS = "127.0.0.1"
 SERVED = Detail(bottles=50.0, contacts=25.0, belts=50.0, signals=50.0, block=2.0, story=60.0)
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'"
-)
-_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 
 class RecordingServer(AbstractContextManager["RecordingServer"]):
@@ -99,8 +94,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(HTTPStatus.FORBIDDEN, b"expected to be asked for as 127.0.0.1", "text/plain")
         elif path.startswith("data/"):
             self._send_part(path.removeprefix("data/"))
-        elif path in _files():
-            self._send(HTTPStatus.OK, (PAGE / path).read_bytes(), _TYPES[Path(path).suffix])
+        elif (kind := page_files().get(path)) is not None:
+            self._send(HTTPStatus.OK, (PAGE / path).read_bytes(), kind)
         else:
             self._send(HTTPStatus.NOT_FOUND, b"there is no such file", "text/plain")
 
@@ -115,21 +110,12 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
         self.send_response(status)
-        headers = {
-            "Content-Type": f"{kind}; charset=utf-8" if kind.startswith("text/") else kind,
-            "Content-Length": str(len(content)),
-            "Content-Security-Policy": POLICY,
-            "X-Content-Type-Options": "nosniff",
-            "Cache-Control": "no-store",
-        }
-        for name, value in headers.items():
+        self.send_header("Content-Type", f"{kind}; charset=utf-8" if kind.startswith("text/") else kind)
+        self.send_header("Content-Length", str(len(content)))
+        for name, value in HEADERS.items():
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Nothing: what can't be read is shown on the page."""
-
-
-def _files() -> set[str]:
-    return {file.relative_to(PAGE).as_posix() for file in PAGE.rglob("*") if file.suffix in _TYPES}

@@ -6,12 +6,11 @@ Every list is in the order of time; what says a state says it when it changes.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from conveyor_sim.bag.reader import Bag
 from conveyor_sim.bag.topics import TOPICS
 
 TOPICS_READ = ("events", "alarm_states", "readback", "counters", "rail_wear", "run_state")
@@ -33,33 +32,28 @@ WEAR_EVERY = 5.0
 class Story:
     """Collects it from messages in the order of time."""
 
-    def __init__(self, bag: Bag, counters_every: float) -> None:
-        """counters_every: s of simulated time from one entry of the counters to the next, at least."""
-        self._bag = bag
+    def __init__(self, time: Callable[[int], float], counters_every: float) -> None:
+        """time: s, of a tick. counters_every: s from one entry of the counters to the next, at least."""
+        self._time = time
         self._counters_every = counters_every
         self._last: dict[str, dict[Any, Any]] = {"alarms": {}, "commands": {}}
         self._counted = -math.inf
         self._worn = -math.inf
-        self.data: dict[str, Any] = {
-            "events": {name: [] for name in ("at", "kind", "name", "bottle", "value", "text")},
-            "alarms": {},
-            "alarm_changes": [],
-            "readback": [],
-            "counters": [],
-            "runs": [],
-            "bins": None,
-            "wear": [],
-        }
+        self.data = _nothing()
 
-    def add(self, topic: str, raw: bytes) -> None:
-        """A message of one of TOPICS_READ."""
-        message = self._bag.decode(topic, raw)
-        getattr(self, f"_{topic}")(message, self._bag.time(message.tick))
+    def take(self) -> dict[str, Any]:
+        """What was collected since the last call."""
+        data, self.data = self.data, _nothing()
+        return data
+
+    def add(self, topic: str, message: Any, tick: int) -> None:
+        """A decoded message of one of TOPICS_READ, or its columns."""
+        getattr(self, f"_{topic}")(message, self._time(tick))
 
     def _events(self, message: Any, _: float) -> None:
         columns = TOPICS["events"].unpack(message)
         events = self.data["events"]
-        events["at"] += [round(self._bag.time(int(tick)), 6) for tick in columns.at]
+        events["at"] += [round(self._time(int(tick)), 6) for tick in columns.at]
         events["kind"] += list(columns.kind)
         events["name"] += list(columns.name)
         events["bottle"] += columns.bottle.tolist()
@@ -72,7 +66,7 @@ class Story:
         for place, number in enumerate(columns.number.tolist()):
             self.data["alarms"][number] = {name: _plain(getattr(columns, name)[place]) for name in _DECLARED}
             state = [_plain(getattr(columns, name)[place]) for name in _ALARM]
-            state[_ALARM.index("since")] = self._bag.time(state[_ALARM.index("since")])
+            state[_ALARM.index("since")] = self._time(state[_ALARM.index("since")])
             if before.get(number) != state:
                 before[number] = state
                 self.data["alarm_changes"].append([time, number, *state])
@@ -107,6 +101,19 @@ class Story:
 
     def _run_state(self, message: Any, time: float) -> None:
         self.data["runs"].append([time, message.text, message.reason])
+
+
+def _nothing() -> dict[str, Any]:
+    return {
+        "events": {name: [] for name in ("at", "kind", "name", "bottle", "value", "text")},
+        "alarms": {},
+        "alarm_changes": [],
+        "readback": [],
+        "counters": [],
+        "runs": [],
+        "bins": None,
+        "wear": [],
+    }
 
 
 def fields() -> Mapping[str, tuple[str, ...]]:

@@ -56,14 +56,14 @@ class Watch:
         if (tick - self._start) % every:
             return
         bottles, contacts = simulation.bottles(), simulation.contacts()
-        self._content.bottles.append((tick, _with_forces(bottles, contacts)))
+        self._content.bottles.append((tick, with_forces(bottles, contacts)))
         if (tick - self._start) % max(every, round(1.0 / CONTACTS / seconds)) == 0:
             self._content.contacts.append((tick, contacts))
         self._content.belts.append((tick, simulation.belts().actual))
         self._content.signals.append((tick, simulation.signals()))
 
 
-def _with_forces(bottles: BottleColumns, contacts: ContactColumns) -> BottleColumns:
+def with_forces(bottles: BottleColumns, contacts: ContactColumns) -> BottleColumns:
     """With the largest force on each at this tick, where peaks since the last output are not known or never restart."""
     force = np.zeros(len(bottles.id))
     if len(force):

@@ -27,10 +27,10 @@ from conveyor_sim.scada.opcua.session import SafeServer
 from conveyor_sim.scada.opcua.transport import BoundedServer
 from conveyor_sim.scada.opcua.tree import add_line
 from conveyor_sim.scada.opcua.updates import Updates
-from conveyor_sim.scada.opcua.users import User, authenticate
 from conveyor_sim.scada.opcua.values import Clock
 from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
 from conveyor_sim.scada.source import TagSource
+from conveyor_sim.scada.users import User, authenticate
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,

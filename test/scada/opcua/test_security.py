@@ -18,7 +18,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from conveyor_sim.scada.opcua.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
-from conveyor_sim.scada.opcua.users import UsersError, authenticate, line_of, new_user, read_users
+from conveyor_sim.scada.users import UsersError, authenticate, line_of, new_user, read_users
 from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone, refused
 
 if TYPE_CHECKING:

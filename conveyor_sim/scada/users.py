@@ -1,4 +1,4 @@
-"""Who may do what over OPC UA: a file with a line for each user, and passwords that are checked against it.
+"""Who may do what by OPC UA and on the page: a file with a line for each user, and how passwords are checked by it.
 
     jo:operator:scrypt:<salt>:<hash>
 
