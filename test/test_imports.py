@@ -28,6 +28,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "timestep": "laws scene",
     "effects": "engine errors laws scene timestep | numpy",
     "observe": "| numpy",
+    "statistics": "| numpy scipy",
     "model": "effects engine errors laws scene timestep version | llvmlite numpy",
     "state": "engine errors model scene support | numpy pydantic",
     "accounts": "engine model observe scene state | numpy",
@@ -35,8 +36,8 @@ MAY_IMPORT: Mapping[str, str] = {
     "stepping": "accounts engine errors model scene state | numpy",
     "simulation": "accounts engine line model observe scene state stepping | numpy",
     "bag": "errors line observe scene simulation stepping support version | lz4 mcap numpy rosbags ruamel zstandard",
-    "accuracy": "accounts effects engine errors laws line model observe scene simulation stepping support timestep "
-    "version | numpy rich ruamel scipy",
+    "accuracy": "accounts effects engine errors laws line model observe scene simulation statistics stepping support "
+    "timestep version | numpy rich ruamel scipy",
     "explain": "effects errors model scene simulation support timestep | rich",
     "plot": "accuracy bag errors line observe scene support | matplotlib numpy",
     "view": "bag errors observe scene simulation support | numpy",

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from conveyor_sim.accuracy.effort import PROCESSORS
 from conveyor_sim.accuracy.ensemble import Ensemble, Progress, Run
@@ -22,6 +21,8 @@ from conveyor_sim.accuracy.results import Comparison, Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
+from conveyor_sim.statistics.comparisons import bonferroni
+from conveyor_sim.statistics.intervals import mean_and_variance, ratio_interval
 
 LOOKS = (8, 16, 32, 64, 128, 256)
 """Runs of a setting after which the intervals are looked at."""
@@ -29,7 +30,7 @@ LOOKS = (8, 16, 32, 64, 128, 256)
 ERROR_RATE = 0.05
 """Chance to accept an observable whose true difference is the tolerance, over all looks together; and to reject it."""
 
-CONFIDENCE = 1.0 - 2.0 * ERROR_RATE / len(LOOKS)
+CONFIDENCE = 1.0 - bonferroni(2.0 * ERROR_RATE, len(LOOKS))
 """Of the interval at one look: by Bonferroni, as each look may err at either end by its share of ERROR_RATE."""
 
 _EVERYTHING = (-math.inf, math.inf)
@@ -54,7 +55,7 @@ def compare(
         verdict = "equivalent"
     elif low > tolerance or high < -tolerance:
         verdict = "different"
-    (mean, variance), (reference_mean, reference_variance) = _mean(values), _mean(known)
+    (mean, variance), (reference_mean, reference_variance) = mean_and_variance(values), mean_and_variance(known)
     return Comparison(
         setting=setting,
         observable=observable,
@@ -183,35 +184,9 @@ def _floats(values: Sequence[float | None]) -> NDArray[np.float64]:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
 
 
-def _mean(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Mean of those that are known, and the variance of the mean."""
-    values = values[np.isfinite(values)]
-    if not len(values):
-        return math.nan, math.nan
-    return float(values.mean()), float(values.var(ddof=1) / len(values)) if len(values) > 1 else math.inf
-
-
 def _interval(candidate: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float, float]:
-    """Confidence interval of the ratio of two means, less 1.
-
-    All ratios r for which candidate - r reference cannot be told from 0 (Fieller 1954), with the degrees of freedom of
-    Welch (1947) at the ratio that was found. The mean of the reference is not taken for exact.
-    """
-    if min(len(candidate), len(reference)) < 2 or not np.isfinite([*candidate, *reference]).all():
-        return _EVERYTHING
-    (mean, variance), (base, base_variance) = _mean(candidate), _mean(reference)
-    if not mean and not base and not variance and not base_variance:
+    """Confidence interval of the ratio of two means, less 1; the mean of the reference is not taken for exact."""
+    if min(len(candidate), len(reference)) > 1 and not candidate.any() and not reference.any():
         return 0.0, 0.0  # nothing happened in any run of either
-    if base == 0.0:
-        return _EVERYTHING
-    ratio = mean / base
-    parts = variance, ratio**2 * base_variance
-    if sum(parts) == 0.0:
-        return ratio - 1.0, ratio - 1.0
-    freedom = sum(parts) ** 2 / (parts[0] ** 2 / (len(candidate) - 1) + parts[1] ** 2 / (len(reference) - 1))
-    t = float(stdtrit(freedom, 0.5 * (1.0 + CONFIDENCE)))
-    below = base**2 - t**2 * base_variance
-    if below <= 0.0:
-        return _EVERYTHING
-    spread = t * math.sqrt(mean**2 * base_variance + base**2 * variance - t**2 * variance * base_variance)
-    return (mean * base - spread) / below - 1.0, (mean * base + spread) / below - 1.0
+    found = ratio_interval(candidate, reference, CONFIDENCE)
+    return _EVERYTHING if found is None else (found[0] - 1.0, found[1] - 1.0)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from statistics import fmean, stdev
+
+import numpy as np
 
 from conveyor_sim.accuracy.answer import eligible, find_answer, largest_error
 from conveyor_sim.accuracy.bars import Bars
@@ -21,6 +22,7 @@ from conveyor_sim.accuracy.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
+from conveyor_sim.statistics.intervals import mean_and_variance
 
 EXACT = 0.1
 """Of the answer's error: what the setting that its long runs are compared with keeps on the short horizon."""
@@ -231,4 +233,5 @@ def _stiffness_rows(scene: Scene, points: Sequence[Point], samples: Sequence[Sam
 
 def _mean(values: Sequence[float]) -> tuple[float, float]:
     """Mean and standard error; infinite for a single value."""
-    return fmean(values), stdev(values) / len(values) ** 0.5 if len(values) > 1 else float("inf")
+    mean, variance = mean_and_variance(np.array(values))
+    return mean, variance**0.5

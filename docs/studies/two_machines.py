@@ -23,6 +23,7 @@ with while_importing():
 
     from conveyor_sim import Simulation
     from conveyor_sim.scene import Scene, parse_scene
+    from conveyor_sim.statistics.intervals import mean_interval
 
 RATE = 4.0  # 1/s, of both machines
 SPEED = 0.5  # m/s
@@ -176,15 +177,10 @@ def main() -> None:
             expected: list[Any] = [
                 conveyor_efficiency(machine, machine, RATE, held, way),
                 np.mean(runs),
-                half_width(runs),
+                mean_interval(runs).half_width,
             ]
             limits = efficiency(machine, machine, RATE, 0.0), machine.alone
             table.writerow([length, held, f"{way:.2f}", *(f"{value:.4f}" for value in (*expected, *limits))])
-
-
-def half_width(runs: list[float]) -> float:
-    """Of the 95 % confidence interval of the mean of ten runs."""
-    return float(2.262 * np.std(runs, ddof=1) / math.sqrt(len(runs)))
 
 
 if __name__ == "__main__":

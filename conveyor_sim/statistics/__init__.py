@@ -1,0 +1,1 @@
+"""What runs show and what they can't: intervals, differences, warm-up, batch means, many comparisons. Arrays only."""

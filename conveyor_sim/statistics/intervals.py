@@ -1,0 +1,98 @@
+"""Confidence intervals of means, and of the ratio of two means."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr, stdtrit
+
+CONFIDENCE = 0.95
+"""Of intervals, where no other is asked for."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Where a true mean lies, with a stated confidence."""
+
+    mean: float
+    half_width: float
+    """Half the length of the interval; infinite with a single value."""
+    values: int
+    """How many independent values it rests on."""
+
+    @property
+    def low(self) -> float:
+        """Its lower end."""
+        return self.mean - self.half_width
+
+    @property
+    def high(self) -> float:
+        """Its upper end."""
+        return self.mean + self.half_width
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the mean can be told from none."""
+        return self.low > 0.0 or self.high < 0.0
+
+
+def t_quantile(freedom: float, confidence: float) -> float:
+    """Of Student's distribution: between its minus and its plus lies a share `confidence` (Student 1908)."""
+    return float(stdtrit(freedom, 0.5 * (1.0 + confidence)))
+
+
+def t_probability(t: float, freedom: float) -> float:
+    """Chance of a |t| as large as this or larger where the true mean is none (two-sided p-value)."""
+    return 2.0 * float(stdtr(freedom, -abs(t)))
+
+
+def mean_and_variance(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean of those (n,) that are finite, and the variance of that mean: NaN of none, infinite of one."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return math.nan, math.nan
+    return float(values.mean()), float(values.var(ddof=1) / len(values)) if len(values) > 1 else math.inf
+
+
+def mean_interval(values: Sequence[float] | NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval:
+    """Of the mean of independent values (n,), such as one figure of n runs with different seeds.
+
+    Values that are not finite are left out. Exact for values that are normal, close for means of long runs.
+    """
+    known = np.asarray(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    mean, variance = mean_and_variance(known)
+    if len(known) < 2:
+        return Interval(mean, math.inf if len(known) else math.nan, len(known))
+    return Interval(mean, t_quantile(len(known) - 1, confidence) * math.sqrt(variance), len(known))
+
+
+def ratio_interval(
+    values: NDArray[np.float64], base: NDArray[np.float64], confidence: float = CONFIDENCE
+) -> tuple[float, float] | None:
+    """Low and high of mean of `values` (n,) / mean of `base` (m,), independent of each other.
+
+    All ratios r for which values - r base can't be told from 0 (Fieller 1954), with the degrees of freedom of Welch
+    (1947) at the ratio that was found. None where the mean of the base may as well be 0, or there are less than two of
+    either, or any is not finite.
+    """
+    if min(len(values), len(base)) < 2 or not np.isfinite([*values, *base]).all():
+        return None
+    (mean, variance), (base_mean, base_variance) = mean_and_variance(values), mean_and_variance(base)
+    if base_mean == 0.0:
+        return None
+    ratio = mean / base_mean
+    parts = variance, ratio**2 * base_variance
+    if sum(parts) == 0.0:
+        return ratio, ratio
+    freedom = sum(parts) ** 2 / (parts[0] ** 2 / (len(values) - 1) + parts[1] ** 2 / (len(base) - 1))
+    t = t_quantile(freedom, confidence)
+    below = base_mean**2 - t**2 * base_variance
+    if below <= 0.0:
+        return None
+    spread = t * math.sqrt(mean**2 * base_variance + base_mean**2 * variance - t**2 * variance * base_variance)
+    return (mean * base_mean - spread) / below, (mean * base_mean + spread) / below

@@ -1,0 +1,42 @@
+"""Warm-up removal: how much of the start of a run says more of how it was started than of the line.
+
+Rule MSER-5 (White 1997; White, Cobb and Spratt 2000): means of five values after the other; of these leave out the
+first d for which the standard error of the mean of the rest is least. What is left out at first lowers the error, as it
+is off; what is left out beyond that raises it, as less is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+BATCH = 5
+"""Values a mean."""
+
+LEAST = 10
+"""Means of BATCH values that a series must have for the rule."""
+
+
+def warm_up(series: Sequence[float] | NDArray[np.float64], batch: int = BATCH) -> int | None:
+    """How many values of a series (n,), at even times, to leave out; None: it is too short to say.
+
+    That is where the least is in the second half, so that the run may never have warmed up, or with less than LEAST
+    means. Of runs with many seeds, (runs, n), the rule is put to their mean series. To put it to each run by itself
+    would be wrong for what is skewed, such as queues: it leaves out the start of those that happen to get long.
+    """
+    values = np.asarray(series, dtype=np.float64)
+    if values.ndim == 2:
+        values = values.mean(axis=0)
+    means = values[: len(values) // batch * batch].reshape(-1, batch).mean(axis=1)
+    count = len(means)
+    if count < LEAST:
+        return None
+    left = count - np.arange(count)  # by how many are left out
+    about = means - means.mean()
+    rest, squares = (np.cumsum(part[::-1])[::-1] / left for part in (about, np.square(about)))
+    # The last ones are left out of the search: the error of two or three values may be anything.
+    error = (np.maximum(squares - np.square(rest), 0.0) / left)[:-BATCH]
+    best = int(np.argmin(error))
+    return None if best > count // 2 else best * batch

@@ -1,0 +1,41 @@
+"""What is said of intervals and differences."""
+
+import math
+
+import pytest
+
+from conveyor_sim.statistics.intervals import Interval
+from conveyor_sim.statistics.words import plus_minus, told
+
+
+@pytest.mark.parametrize(
+    ("interval", "text"),
+    [
+        (Interval(73.234, 2.13, 10), "73.2 ± 2.1 %"),
+        (Interval(0.0012345, 0.000052, 10), "0.001234 ± 0.000052 %"),
+        (Interval(1234.5, 210.0, 10), "1234 ± 210 %"),
+        (Interval(-0.001, 0.5, 10), "0.00 ± 0.50 %"),
+        (Interval(5.0, 0.0, 3), "5 ± 0 %"),
+        (Interval(5.0, math.inf, 1), "5 % (a single run)"),
+        (Interval(math.nan, math.nan, 0), "not known"),
+    ],
+)
+def test_a_mean_has_the_digits_that_are_known(interval: Interval, text: str) -> None:
+    assert plus_minus(interval, "%") == text
+
+
+def test_what_can_be_told_is_said() -> None:
+    said = told(Interval(0.8, 0.5, 20), "A", "B", "%")
+    assert said == "the difference of A and B, +0.80 ± 0.50 %, is told from none with 20 seeds: A has more than B"
+    assert told(Interval(-0.8, 0.5, 20), "A", "B").endswith("B has more than A")
+
+
+def test_what_can_not_be_told_is_said_with_how_many_seeds_would() -> None:
+    said = told(Interval(0.3, 0.5, 20), "A", "B", "%")
+    assert said == (
+        "the difference of A and B, +0.30 ± 0.50 %, can't be told from none with 20 seeds; "
+        "about 110 would, if it is as large as it seems"
+    )
+    assert "no number of seeds" in told(Interval(0.0, 0.5, 20), "A", "B")
+    assert told(Interval(0.0, 0.0, 5), "A", "B") == "A and B are the same with each of 5 seeds"
+    assert "with 1 seed; no number" in told(Interval(0.3, math.inf, 1), "A", "B")
