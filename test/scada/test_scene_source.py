@@ -20,7 +20,7 @@ from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, PAUSED, RUNNING, STOPPED
 from conveyor_sim.scada.scene_messages import Task
 from conveyor_sim.scada.scene_source import SceneSource
-from conveyor_sim.scada.source import MOST_WAITING
+from conveyor_sim.scada.source import MOST_WAITING, Shown
 from conveyor_sim.scene import Scene, load_scene
 
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
@@ -179,13 +179,13 @@ def test_what_waits_while_it_is_paused_is_bounded(served: Served) -> None:
 def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Served, tmp_path: Path) -> None:
     source = served(record=tmp_path / "bag")
     until(lambda: source.shown.tick > 20, "ticks")
-    run, lost = source.shown.run_id, list[str]()
-    source.listen(lambda: lost.append(source.shown.lost))
+    run, seen = source.shown.run_id, list[Shown]()
+    source.listen(lambda: seen.append(source.shown))
     os.kill(source.pid, signal.SIGKILL)
-    until(lambda: any(lost), "its loss")
-    assert "the process that simulates zoned_line was killed by signal 9" in lost
-    until(lambda: not source.shown.lost, "another one")
-    assert source.shown.run_id != run and source.shown.tick < 20
+    until(lambda: any(shown.lost for shown in seen), "its loss")
+    assert "the process that simulates zoned_line was killed by signal 9" in [shown.lost for shown in seen]
+    until(lambda: any(shown.run_id != run and not shown.lost for shown in seen), "another one")
+    assert next(shown.tick for shown in seen if shown.run_id != run) < 20
     assert any("begins anew" in sentence for sentence in served.said)
     source.close()
     assert source.recordings == [tmp_path / "bag", tmp_path / "bag_1"]

@@ -31,11 +31,11 @@ class History(HistoryStorageInterface):
         return name in self._kept
 
     def note(self, name: str, value: ua.DataValue) -> None:
-        """A tag has a value. Where its time has stepped back, what came after is no longer so."""
+        """A tag has a value. What it had at that time, and after it, where time has stepped back, is no longer so."""
         kept = self._kept.get(name)
         if kept is None:
             return
-        while kept and kept[-1].SourceTimestamp > value.SourceTimestamp:
+        while kept and kept[-1].SourceTimestamp >= value.SourceTimestamp:
             kept.pop()
         kept.append(value)
 

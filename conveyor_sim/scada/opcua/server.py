@@ -99,9 +99,10 @@ class OpcUaServer:
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
-        server = await self._empty()
-        updates = await self._fill(server)
-        await updates.bring_present()
+        with _without_collection():
+            server = await self._empty()
+            updates = await self._fill(server)
+            await updates.bring_present()
         try:
             await server.listen(host, port)
         except (OSError, OverflowError) as error:
@@ -120,8 +121,7 @@ class OpcUaServer:
         server = BoundedServer(internal)
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
         server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
-        with _without_collection():
-            await server.init()
+        await server.init()
         await server.load_certificate(own.certificate, "der")
         await server.load_private_key(own.key, format="pem")
         server.set_endpoint(f"opc.tcp://{host}:{port}")
@@ -177,7 +177,7 @@ class OpcUaServer:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """While the standard's 6000 nodes are made: looking through them again and again takes as long as making them."""
+    """While nodes are made: looking through the standard's 6000 again and again takes longer than making them all."""
     was = gc.isenabled()
     gc.disable()
     try:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +18,7 @@ pytest.importorskip("asyncua", reason="asyncua is not installed: pip install con
 from asyncua import ua
 from asyncua.sync import Client, SyncNode
 
+from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.scada.face import Stamps
 from conveyor_sim.scada.opcua.server import OpcUaServer
 from conveyor_sim.scada.server_thread import ServerThread
@@ -31,19 +32,70 @@ T = TypeVar("T")
 PATIENCE = 60.0
 """s"""
 
+SCENE = Path("config/scenarios/zoned_line.yaml")
+HISTORY = ["belts/zone1/cmd_*", "machines/*/produced"]
+
 PASSWORD = "open sesame"
 ROLES = ("viewer", "operator", "engineer", "controller", "test")
+
+
+class Renewed(TickSource):
+    """A simulation that a test steps, and what the test says of its run. Another one may take its place: a reset."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._reason = ""
+        super().__init__(simulation)
+
+    @property
+    def _run(self) -> RunState:
+        return RunState(RUNNING, self._reason)
+
+    def begin(self, simulation: Simulation, reason: str) -> None:
+        """Another simulation of the same scene. reason: by which clients tell it from the one before."""
+        self._simulation, self._reason = simulation, reason
+        self._waiting.clear()
+        self._alarms, self._read_back = simulation.line.alarms.columns(), simulation.line.read_back.columns()
+        self._show()
+        self._listeners.tell()
+
+    def show(self, **changes: Any) -> None:
+        """The line as it is, but for some things."""
+        self._shown = replace(self._shown, **changes)
+        self._listeners.tell()
 
 
 @dataclass
 class Line:
     """One that is stepped by the test, and served. Each role has a user of its name."""
 
-    simulation: Simulation
-    source: Any
+    source: Renewed
     server: OpcUaServer
     thread: ServerThread
     open: list[Client] = field(default_factory=list)
+
+    @property
+    def simulation(self) -> Simulation:
+        return self.source._simulation
+
+    def begin(self, simulation: Simulation) -> None:
+        """Serve another simulation of the same scene, to nobody but who comes from now on."""
+        reason = f"the line of a test, at {time.monotonic()}"
+        self.source.begin(simulation, reason)
+        server: Any = self.server._server
+        self.until(lambda: self.thread.run(server.get_node("ns=2;s=run/reason").read_value()) == reason)
+
+    def leave(self) -> None:
+        """Have all clients go; return once the server has noticed."""
+        for client in self.open:
+            client.disconnect()
+        self.open.clear()
+        self.until(lambda: self.clients == (0, 0))
+
+    @property
+    def clients(self) -> tuple[int, int]:
+        """How many there are, and for how many subscriptions."""
+        server: Any = self.server._server
+        return self.server.status().clients, len(server.iserver.subscription_service.subscriptions)
 
     def advance(self, ticks: int = 1) -> None:
         """Step, and wait until clients see it."""
@@ -102,12 +154,15 @@ def users() -> dict[str, User]:
     return {role: new_user(role, PASSWORD) for role in ROLES}
 
 
-Serve = Callable[..., Any]
+Serve = Callable[..., Line]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def serve(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
-    """Serves a scene: `serve(stamps="simulated")`."""
+    """Serves a scene of a test's own, for as long as its module runs: `serve(anonymous=False)`.
+
+    To start a server takes a second or two: most tests share those below.
+    """
     with serving(certificates, users) as make:
         yield make
 
@@ -118,39 +173,49 @@ def serving(certificates: Path, users: dict[str, User]) -> Iterator[Serve]:
     with ServerThread() as thread:
         lines: list[Line] = []
 
-        def make(
-            scene: str = "config/scenarios/zoned_line.yaml",
-            stamps: Stamps = "wall",
-            source: Callable[[TickSource], Any] = lambda real: real,
-            **options: Any,
-        ) -> Line:
-            simulation = Simulation(load_scene(scene), threads=1)
-            shown = source(TickSource(simulation))
-            options = {"users": users, "certificates": certificates, "stamps": stamps, **options}
-            server = OpcUaServer(shown, options.pop("users"), **options)
-            lines.append(line := Line(simulation, shown, server, thread))
+        def make(scene: Path = SCENE, **options: Any) -> Line:
+            source = Renewed(Simulation(load_scene(scene), threads=1))
+            options = {"users": users, "certificates": certificates, **options}
+            server = OpcUaServer(source, options.pop("users"), **options)
             thread.run(server.start())
-            return line
+            lines.append(Line(source, server, thread))
+            return lines[-1]
 
         yield make
         for line in lines:
-            for client in line.open:
-                client.disconnect()
+            line.leave()
             thread.run(line.server.stop())
 
 
-@pytest.fixture
-def line(serve: Serve) -> Line:
-    """The zoned line."""
-    made: Line = serve()
-    return made
-
-
-@pytest.fixture(scope="module")
-def still(certificates: Path, users: dict[str, User]) -> Iterator[Line]:
-    """The same for tests that don't change it: to start a server takes a second or two."""
+@pytest.fixture(scope="session")
+def shared(certificates: Path, users: dict[str, User]) -> Iterator[Callable[[Stamps], Line]]:
+    """The zoned line, served by a server for each kind of stamps that all tests share."""
     with serving(certificates, users) as make:
-        yield make()
+        lines: dict[Stamps, Line] = {}
+
+        def find(stamps: Stamps) -> Line:
+            if stamps not in lines:
+                lines[stamps] = make(stamps=stamps, history=HISTORY)
+            lines[stamps].begin(Simulation(load_scene(SCENE), threads=1))
+            return lines[stamps]
+
+        yield find
+
+
+@pytest.fixture
+def line(shared: Callable[[Stamps], Line]) -> Iterator[Line]:
+    """The zoned line from its first tick, with wall time; its clients are this test's own."""
+    found = shared("wall")
+    yield found
+    found.leave()
+
+
+@pytest.fixture
+def simulated(shared: Callable[[Stamps], Line]) -> Iterator[Line]:
+    """The same with simulated time."""
+    found = shared("simulated")
+    yield found
+    found.leave()
 
 
 @contextmanager

@@ -5,37 +5,30 @@ from __future__ import annotations
 from datetime import datetime, timedelta, timezone
 from typing import TYPE_CHECKING, Any
 
-import pytest
 from asyncua import ua
 
 from test.scada.opcua.conftest import refused
 
 if TYPE_CHECKING:
-    from test.scada.opcua.conftest import Line, Serve
+    from test.scada.opcua.conftest import Line
 
 START = datetime(2000, 1, 1, tzinfo=timezone.utc)
 TICK = timedelta(seconds=0.01)
-
-
-@pytest.fixture
-def line(serve: Serve) -> Line:
-    made: Line = serve(stamps="simulated", history=["belts/zone1/cmd_*", "machines/*/produced"])
-    return made
 
 
 def values(found: list[ua.DataValue]) -> list[tuple[Any, datetime]]:
     return [(each.Value.Value, each.SourceTimestamp) for each in found]
 
 
-def test_it_is_what_the_tag_was(line: Line) -> None:
-    node = line.node("belts/zone1/cmd_speed", line.client("test"))
+def test_it_is_what_the_tag_was(simulated: Line) -> None:
+    node = simulated.node("belts/zone1/cmd_speed", simulated.client("test"))
     first = node.read_value()
     expected = [(first, START)]
     for value in (0.1, 0.2, 0.3):
-        line.advance(10)
+        simulated.advance(10)
         node.write_value(value)
-        line.advance()
-        expected.append((value, START + line.simulation.tick * TICK))
+        simulated.advance()
+        expected.append((value, START + simulated.simulation.tick * TICK))
     end = START + timedelta(days=1)
     assert values(node.read_raw_history(START, end)) == expected
     assert values(node.read_raw_history(START + 5 * TICK, START + 25 * TICK)) == expected[1:3]
@@ -45,10 +38,12 @@ def test_it_is_what_the_tag_was(line: Line) -> None:
     assert ua.AccessLevel.HistoryRead in node.get_access_level()
 
 
-def test_others_have_none(line: Line) -> None:
-    node = line.node("belts/zone2/cmd_speed", line.client())
+def test_others_have_none(simulated: Line) -> None:
+    node = simulated.node("belts/zone2/cmd_speed", simulated.client())
     assert ua.AccessLevel.HistoryRead not in node.get_access_level()
     with refused(ua.StatusCodes.BadHistoryOperationUnsupported):
         node.read_raw_history(START, START + timedelta(days=1))
     with refused(ua.StatusCodes.BadHistoryOperationUnsupported):
-        line.client().nodes.server.read_event_history(START, START + timedelta(days=1), 1, [ua.ObjectIds.BaseEventType])
+        simulated.client().nodes.server.read_event_history(
+            START, START + timedelta(days=1), 1, [ua.ObjectIds.BaseEventType]
+        )

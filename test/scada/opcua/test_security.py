@@ -160,13 +160,20 @@ def test_a_secured_channel_carries_all(line: Line, client_files: str) -> None:
         assert line.outcomes() == [("opcua controller", "set", (SETPOINT,), (value / 8,), True)]
 
 
-def test_only_trusted_certificates_are_let_in_where_there_are_any(serve: Serve, tmp_path: Path) -> None:
-    folder = tmp_path / "own"
-    identity(folder)
-    known, other = own_certificate(tmp_path, name="known"), own_certificate(tmp_path, name="other")
-    (folder / TRUSTED / "known.der").write_bytes((tmp_path / "known.der").read_bytes())
-    line = serve(certificates=folder)
+@pytest.fixture(scope="module")
+def trusting(serve: Serve, tmp_path_factory: pytest.TempPathFactory) -> tuple[Line, str]:
+    """A server that trusts one certificate, and that."""
+    folder = tmp_path_factory.mktemp("trusting")
+    identity(folder / "own")
+    known = own_certificate(folder, name="known")
+    (folder / "own" / TRUSTED / "known.der").write_bytes((folder / "known.der").read_bytes())
+    return serve(certificates=folder / "own"), known
+
+
+def test_only_trusted_certificates_are_let_in_where_there_are_any(trusting: tuple[Line, str], tmp_path: Path) -> None:
+    line, known = trusting
     line.client("viewer", security=f"Basic256Sha256,SignAndEncrypt,{known}")
+    other = own_certificate(tmp_path, name="other")
     with refused(Codes.BadCertificateUntrusted):
         line.client("viewer", security=f"Basic256Sha256,SignAndEncrypt,{other}")
 
@@ -291,11 +298,6 @@ def test_a_session_can_not_be_taken_over(line: Line, client_files: str) -> None:
     assert all(token.NodeIdType is ua.NodeIdType.ByteString for token in known)
 
 
-def test_trusted_certificates_are_asked_for_on_every_channel(serve: Serve, tmp_path: Path) -> None:
-    folder = tmp_path / "own"
-    identity(folder)
-    own_certificate(tmp_path, name="known")
-    (folder / TRUSTED / "known.der").write_bytes((tmp_path / "known.der").read_bytes())
-    line = serve(certificates=folder)
+def test_trusted_certificates_are_asked_for_on_every_channel(trusting: tuple[Line, str]) -> None:
     with refused(Codes.BadSecurityModeInsufficient):
-        line.client()
+        trusting[0].client()

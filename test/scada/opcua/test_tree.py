@@ -29,8 +29,8 @@ def test_every_signal_and_command_reads_as_the_simulation_shows_it(line: Line) -
     assert values == pytest.approx([shown[name] for name in names])
 
 
-def test_the_namespace_keeps_its_index(still: Line) -> None:
-    assert still.client().get_namespace_array()[2] == NAMESPACE
+def test_the_namespace_keeps_its_index(line: Line) -> None:
+    assert line.client().get_namespace_array()[2] == NAMESPACE
 
 
 def test_tags_stand_below_their_device_and_the_place_of_the_line(serve: Serve, tmp_path: Any) -> None:
@@ -43,54 +43,54 @@ def test_tags_stand_below_their_device_and_the_place_of_the_line(serve: Serve, t
     assert found.nodeid.to_string() == "ns=2;s=belts/zone1/speed"
 
 
-def test_numbers_have_unit_and_range(still: Line) -> None:
-    tag = next(tag for tag in still.source.about.tags if tag.name == "belts/zone1/cmd_speed")
-    node = still.node(tag.name)
+def test_numbers_have_unit_and_range(line: Line) -> None:
+    tag = next(tag for tag in line.source.about.tags if tag.name == "belts/zone1/cmd_speed")
+    node = line.node(tag.name)
     assert node.read_type_definition().Identifier == ua.ObjectIds.AnalogUnitRangeType
     assert node.read_data_type_as_variant_type() is ua.VariantType.Double
     assert node.read_description().Text == tag.description
-    about = properties(still, tag.name)
+    about = properties(line, tag.name)
     assert (about["EURange"].Low, about["EURange"].High) == (tag.low, tag.high)
     unit = about["EngineeringUnits"]
     assert (unit.UnitId, unit.DisplayName.Text) == (5067859, "m/s")  # UNECE_to_OPCUA.csv
     assert unit.NamespaceUri == "http://www.opcfoundation.org/UA/units/un/cefact"
 
 
-def test_units_have_the_numbers_of_the_opc_foundation(still: Line) -> None:
+def test_units_have_the_numbers_of_the_opc_foundation(line: Line) -> None:
     """From UNECE_to_OPCUA.csv."""
     expected = {"m/s": 5067859, "1/h": 4731184, "1/min": 4405556, "N": 5129559, "J": 4869973, "%": 20529, "1": 4404786}
-    found = {tag.unit: unit_of(tag).UnitId for tag in still.source.about.tags}
+    found = {tag.unit: unit_of(tag).UnitId for tag in line.source.about.tags}
     assert {unit: number for unit, number in found.items() if unit in expected}.items() <= expected.items()
     assert len(expected.keys() & found) >= 2
 
 
-def test_enumerations_have_their_texts(still: Line) -> None:
-    state = still.node("machines/filler/state")
+def test_enumerations_have_their_texts(line: Line) -> None:
+    state = line.node("machines/filler/state")
     assert state.read_type_definition().Identifier == ua.ObjectIds.MultiStateDiscreteType
-    strings = [text.Text for text in properties(still, "machines/filler/state")["EnumStrings"]]
+    strings = [text.Text for text in properties(line, "machines/filler/state")["EnumStrings"]]
     assert strings[state.read_value()] == "Execute"
-    reason = still.node("belts/zone1/mode")  # 1, 2, 3
+    reason = line.node("belts/zone1/mode")  # 1, 2, 3
     assert reason.read_type_definition().Identifier == ua.ObjectIds.MultiStateValueDiscreteType
-    about = properties(still, "belts/zone1/mode")
+    about = properties(line, "belts/zone1/mode")
     assert {value.Value: value.DisplayName.Text for value in about["EnumValues"]} == {
         1: "Automatic",
         2: "Maintenance",
         3: "Manual",
     }
     assert about["ValueAsText"].Text == "Automatic"
-    assert properties(still, "run/state")["ValueAsText"].Text == "running"
+    assert properties(line, "run/state")["ValueAsText"].Text == "running"
 
 
-def test_bools_and_counts_have_plain_types(still: Line) -> None:
-    assert still.node("belts/zone1/running").read_data_type_as_variant_type() is ua.VariantType.Boolean
-    assert still.node("belts/zone1/bottles").read_data_type_as_variant_type() is ua.VariantType.UInt32
+def test_bools_and_counts_have_plain_types(line: Line) -> None:
+    assert line.node("belts/zone1/running").read_data_type_as_variant_type() is ua.VariantType.Boolean
+    assert line.node("belts/zone1/bottles").read_data_type_as_variant_type() is ua.VariantType.UInt32
 
 
-def test_only_commands_can_be_written(still: Line) -> None:
-    engineer = still.client("engineer")
+def test_only_commands_can_be_written(line: Line) -> None:
+    engineer = line.client("engineer")
     writable = ua.AccessLevel.CurrentWrite
-    assert writable in still.node("belts/zone1/cmd_speed", engineer).get_user_access_level()
-    assert writable not in still.node("belts/zone1/speed", engineer).get_access_level()
-    viewer = still.client("viewer")
-    assert writable in still.node("belts/zone1/cmd_speed", viewer).get_access_level()
-    assert writable not in still.node("belts/zone1/cmd_speed", viewer).get_user_access_level()
+    assert writable in line.node("belts/zone1/cmd_speed", engineer).get_user_access_level()
+    assert writable not in line.node("belts/zone1/speed", engineer).get_access_level()
+    viewer = line.client("viewer")
+    assert writable in line.node("belts/zone1/cmd_speed", viewer).get_access_level()
+    assert writable not in line.node("belts/zone1/cmd_speed", viewer).get_user_access_level()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
 from typing import TYPE_CHECKING, Any
 
@@ -12,45 +11,14 @@ from asyncua import ua
 
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, REPLAYING, RUNNING, STOPPED, RunState
 from conveyor_sim.scada.opcua.updates import MOST_BEHIND
-from conveyor_sim.scada.source import Shown, TickSource
 from test.scada.opcua.conftest import refused
 
 if TYPE_CHECKING:
-    from test.scada.opcua.conftest import Line, Serve
+    from test.scada.opcua.conftest import Line
 
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
 START = datetime(2000, 1, 1, tzinfo=timezone.utc)
 Codes = ua.StatusCodes
-
-
-class Told:
-    """A real source, but for what a test says of its run."""
-
-    def __init__(self, real: TickSource) -> None:
-        self._real = real
-        self._shown: Shown | None = None
-        self._listeners: list[Callable[[], None]] = []
-        self.about, self.controls, self.give, self.events = real.about, real.controls, real.give, real.events
-        self.control = real.control
-
-    @property
-    def shown(self) -> Shown:
-        return self._shown or self._real.shown
-
-    def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
-        self._listeners.append(heard)
-        return self._real.listen(heard)
-
-    def before_tick(self) -> None:
-        self._real.before_tick()
-
-    def after_tick(self) -> None:
-        self._real.after_tick()
-
-    def show(self, **changes: Any) -> None:
-        self._shown = replace(self.shown, **changes)
-        for heard in self._listeners:
-            heard()
 
 
 @dataclass
@@ -65,15 +33,6 @@ class Heard:
         self.stamps.append(data.monitored_item.Value.SourceTimestamp)
 
 
-@pytest.fixture(params=["wall"])
-def told(serve: Serve, request: pytest.FixtureRequest) -> Line:
-    made: Line = serve(stamps=request.param, source=Told)
-    return made
-
-
-simulated = pytest.mark.parametrize("told", ["simulated"], indirect=True)
-
-
 WORTH = [
     (RUNNING, "", Codes.Good),
     (PAUSED, "", Codes.UncertainLastUsableValue),
@@ -86,60 +45,58 @@ WORTH = [
 ]
 
 
-def test_the_status_says_what_values_are_worth(told: Line) -> None:
+def test_the_status_says_what_values_are_worth(line: Line) -> None:
     for run, lost, code in WORTH:
         why = f"{run} {lost}"
-        told.source.show(run=RunState(run, why), lost=lost, forced=frozenset({SPEED}))
-        told.until(lambda why=why: told.read("run/reason") == why)
-        assert told.read("run/lost") == lost
+        line.source.show(run=RunState(run, why), lost=lost, forced=frozenset({SPEED}))
+        line.until(lambda why=why: line.read("run/reason") == why)
+        assert line.read("run/lost") == lost
         override = Codes.GoodLocalOverride if code == Codes.Good else code
         for name, expected in ((SETPOINT, code), (SPEED, override), ("alarm_states/belts/zone1/tripped/state", code)):
-            found = told.node(name).read_data_value(raise_on_bad_status=False)
+            found = line.node(name).read_data_value(raise_on_bad_status=False)
             assert found.StatusCode.value == expected, (name, run)
             assert (found.Value.Value is None) == (code >= 0x80000000)
-        assert told.read("run/state") == run  # which is Good
+        assert line.read("run/state") == run  # which is Good
 
 
-def test_nothing_is_taken_where_nothing_would_act(told: Line) -> None:
-    node = told.node(SETPOINT, told.client("controller"))
+def test_nothing_is_taken_where_nothing_would_act(line: Line) -> None:
+    node = line.node(SETPOINT, line.client("controller"))
     for changes in ({"run": RunState(ENDED)}, {"run": RunState(REPLAYING)}, {"lost": "gone"}):
-        told.source.show(**{"run": RunState(RUNNING), "lost": "", **changes})
+        line.source.show(**{"run": RunState(RUNNING), "lost": "", **changes})
         with refused(Codes.BadInvalidState):
             node.write_value(0.1)
-    told.source.show(run=RunState(PAUSED), lost="")
+    line.source.show(run=RunState(PAUSED), lost="")
     node.write_value(0.1)  # it waits
 
 
-@simulated
-def test_simulated_stamps_are_those_of_the_tick(told: Line) -> None:
-    told.advance(50)
-    assert told.node("run/tick").read_data_value().SourceTimestamp == START + timedelta(seconds=0.5)
-    assert told.read("run/date_time") == START + timedelta(seconds=0.5)
-    assert told.read("run/time") == pytest.approx(0.5)
-    unchanged = told.node("photo_eyes/full6/edges").read_data_value()
+def test_simulated_stamps_are_those_of_the_tick(simulated: Line) -> None:
+    simulated.advance(50)
+    assert simulated.node("run/tick").read_data_value().SourceTimestamp == START + timedelta(seconds=0.5)
+    assert simulated.read("run/date_time") == START + timedelta(seconds=0.5)
+    assert simulated.read("run/time") == pytest.approx(0.5)
+    unchanged = simulated.node("photo_eyes/full6/edges").read_data_value()
     assert unchanged.SourceTimestamp == START
     assert abs(unchanged.ServerTimestamp - datetime.now(timezone.utc)) < timedelta(hours=1)
 
 
-@simulated
-def test_after_a_step_back_nothing_is_of_the_future(told: Line) -> None:
-    told.advance(50)
+def test_after_a_step_back_nothing_is_of_the_future(simulated: Line) -> None:
+    simulated.advance(50)
     heard = Heard()
-    subscription = told.open[0].create_subscription(10, heard)
-    subscription.subscribe_data_change(told.node("run/tick"))
-    told.until(lambda: heard.values == [50])
-    told.source.show(tick=20)
-    told.until(lambda: heard.values == [50, 20])
+    subscription = simulated.open[0].create_subscription(10, heard)
+    subscription.subscribe_data_change(simulated.node("run/tick"))
+    simulated.until(lambda: heard.values == [50])
+    simulated.source.show(tick=20)
+    simulated.until(lambda: heard.values == [50, 20])
     assert heard.stamps == [START + timedelta(seconds=0.5), START + timedelta(seconds=0.2)]
-    for tag in told.source.about.tags:
+    for tag in simulated.source.about.tags:
         if tag.role != "fault" and tag.role != "run":
-            assert told.node(tag.name).read_data_value().SourceTimestamp == heard.stamps[-1], tag.name
+            assert simulated.node(tag.name).read_data_value().SourceTimestamp == heard.stamps[-1], tag.name
 
 
-def test_wall_stamps_are_of_now_and_of_changes_only(told: Line) -> None:
+def test_wall_stamps_are_of_now_and_of_changes_only(line: Line) -> None:
     before = datetime.now(timezone.utc)
-    told.advance(20)
-    tick, still = (told.node(name).read_data_value().SourceTimestamp for name in ("run/tick", "photo_eyes/full6/edges"))
+    line.advance(20)
+    tick, still = (line.node(name).read_data_value().SourceTimestamp for name in ("run/tick", "photo_eyes/full6/edges"))
     assert still < before <= tick <= datetime.now(timezone.utc)
 
 
@@ -155,14 +112,14 @@ def test_who_keeps_up_misses_no_change(line: Line) -> None:
     assert heard.values == list(range(1, 302))
 
 
-def test_who_is_far_behind_gets_what_is_latest(told: Line) -> None:
+def test_who_is_far_behind_gets_what_is_latest(line: Line) -> None:
     """More ticks than wait for the loop: those in between are left out, the last one never is."""
     heard = Heard()
-    subscription = told.client().create_subscription(10, heard)
-    subscription.subscribe_data_change(told.node("run/tick"), queuesize=10_000)
-    told.until(lambda: heard.values == [0])
+    subscription = line.client().create_subscription(10, heard)
+    subscription.subscribe_data_change(line.node("run/tick"), queuesize=10_000)
+    line.until(lambda: heard.values == [0])
     most = 50 * MOST_BEHIND
     for tick in range(1, most + 1):
-        told.source.show(tick=tick)
-    told.until(lambda: heard.values[-1] == most)
+        line.source.show(tick=tick)
+    line.until(lambda: heard.values[-1] == most)
     assert heard.values == sorted(set(heard.values))
