@@ -56,6 +56,8 @@ setup(
         "plot": requirements("plot"),
         "accuracy": requirements("accuracy"),
         "scada": requirements("scada"),
+        "studies": requirements("studies"),
+        "dask": requirements("dask"),
         "st": requirements("st"),
         "bench": requirements("bench"),
         "test": requirements("pytest"),

@@ -13,6 +13,10 @@ class SceneError(ConveyorError):
     """A scene file that can't be: one line per problem, with file, line, field, value and what was expected."""
 
 
+class StudyError(ConveyorError):
+    """A study that can't be: one line per problem of its file, or what a run of it lacks."""
+
+
 class CommandError(ConveyorError):
     """A command that names what is not there, or asks for what can't be."""
 

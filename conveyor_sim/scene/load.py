@@ -55,19 +55,19 @@ def parse_scene(
     """
     document = _document(text, name)
     changes = plain(overrides or {}, name)
-    merged = _merge(document.data, changes) if changes else document.data
-    data, unread = with_tables(merged, beside)
+    laid_over = merged(document.data, changes) if changes else document.data
+    data, unread = with_tables(laid_over, beside)
     if unread:
-        raise _refused(unread, document, name, changes)
+        raise refused(unread, document, name, changes)
     try:
         scene = Scene.model_validate(data)
     except ValidationError as error:
-        raise _refused(_untagged(error), document, name, changes) from None
+        raise refused(untagged(error), document, name, changes) from None
     problems = problems_of(scene)
     if problems:
-        raise _refused(problems, document, name, changes)
+        raise refused(problems, document, name, changes)
     # A recording keeps the text and the overrides: with the tables among them, it needs no file.
-    kept = changes if data is merged else {**changes, "contacts": data["contacts"]}
+    kept = changes if data is laid_over else {**changes, "contacts": data["contacts"]}
     kept_text = _yaml_text(kept)
     if len(kept_text) > LONGEST_TEXT:
         most = in_mb(LONGEST_TEXT)
@@ -113,13 +113,14 @@ def plain(value: Any, name: str) -> Any:
     raise SceneError(f"{name} (override): a value of type {type(value).__name__} given, expected what YAML can hold")
 
 
-def _merge(data: Any, changes: Any) -> Any:
+def merged(data: Any, changes: Any) -> Any:
+    """Changes laid over plain data: mappings merge, all else replaces."""
     if not (isinstance(data, dict) and isinstance(changes, dict)):
         return changes
-    return {**data, **{key: _merge(data.get(key), change) for key, change in changes.items()}}
+    return {**data, **{key: merged(data.get(key), change) for key, change in changes.items()}}
 
 
-def _untagged(error: ValidationError) -> list[Problem]:
+def untagged(error: ValidationError) -> list[Problem]:
     """The problems of a failed validation; kinds of belts, rails and bottles are left out of their paths."""
     return [
         Problem(tuple(part for part in item["loc"] if not str(part).startswith("(")), item["msg"])
@@ -127,7 +128,8 @@ def _untagged(error: ValidationError) -> list[Problem]:
     ]
 
 
-def _refused(problems: list[Problem], document: Document, name: str, changes: Any) -> SceneError:
+def refused(problems: list[Problem], document: Document, name: str, changes: Any) -> SceneError:
+    """The error for what is wrong in a file, a line a problem, in the order of the file."""
     lines = []
     for problem in problems:
         overridden = holds(changes, problem.path)

@@ -1,0 +1,88 @@
+"""What a study names in Python: functions in files or modules, found from the folder of the study."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Mapping
+from functools import lru_cache
+from hashlib import blake2b
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from conveyor_sim.errors import StudyError
+
+PYTHON = ".py"
+
+
+def located(reference: str, folder: Path) -> str:
+    """A reference (`file.py:name`, `module:name`, `program.st`) with its file, if it names one, from a folder."""
+    where, colon, name = reference.rpartition(":") if PYTHON in reference or ":" in reference else (reference, "", "")
+    is_file = where.endswith(PYTHON) or not colon
+    return f"{folder / where}{colon}{name}" if is_file else reference
+
+
+def file_of(reference: str) -> Path | None:
+    """The file that decides what a located reference is; None of a module that is not there."""
+    where, colon, _ = reference.rpartition(":")
+    if not colon or where.endswith(PYTHON):
+        return Path(where if colon else reference)
+    try:
+        spec = importlib.util.find_spec(where)
+    except (ImportError, ValueError):
+        return None
+    return None if spec is None or spec.origin is None else Path(spec.origin)
+
+
+def function(reference: str, arguments: Mapping[str, Any] | None = None) -> Any:
+    """The function (or class) that a located reference names. Raises StudyError if there is none, or if it does not
+    take the arguments.
+    """
+    where, colon, name = reference.rpartition(":")
+    if not (colon and where and name):
+        raise StudyError(f"{reference}: given as a function, expected file.py:function or module:function")
+    found = getattr(_module(where), name, None)
+    if not callable(found):
+        raise StudyError(f"{reference}: {where} has no function {name}")
+    if arguments is not None:
+        try:
+            inspect.signature(found).bind(**arguments)
+        except TypeError as error:
+            expected = ", ".join(map(str, inspect.signature(found).parameters.values())) or "none"
+            raise StudyError(f"{reference}: {error}; its arguments are {expected}") from None
+    return found
+
+
+def digest_of(file: Path) -> str:
+    """A hash of what a file holds; "" if it can't be read."""
+    try:
+        return blake2b(file.read_bytes(), digest_size=8).hexdigest()
+    except OSError:
+        return ""
+
+
+def _module(where: str) -> ModuleType:
+    try:
+        if not where.endswith(PYTHON):
+            return importlib.import_module(where)
+        path = Path(where)
+        return _from_file(path, path.stat().st_mtime_ns)
+    except OSError as error:
+        raise StudyError(f"{where}: {error.strerror}, expected a Python file") from None
+    except (ImportError, SyntaxError) as error:
+        raise StudyError(f"{where}: {error}") from error
+
+
+@lru_cache(maxsize=16)
+def _from_file(path: Path, _changed: int) -> ModuleType:
+    """Executed once a process: a study calls its functions many times."""
+    name = f"conveyor_study_{path.stem}_{blake2b(str(path).encode(), digest_size=4).hexdigest()}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None  # for a name that ends in .py there is a loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up by name
+    spec.loader.exec_module(module)
+    return module

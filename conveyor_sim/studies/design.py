@@ -1,0 +1,81 @@
+"""Which points a study looks at: each is a value for every parameter."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.errors import StudyError
+from conveyor_sim.studies.study import Parameter, Study
+
+Point = dict[str, Any]
+"""Values by parameter."""
+
+
+def points_of(study: Study) -> list[Point]:
+    """The points in their order, equal for equal studies. Raises StudyError where a package is missing."""
+    names, parameters = list(study.parameters), list(study.parameters.values())
+    if study.design in ("grid", "list"):
+        values = [parameter.values or () for parameter in parameters]
+        rows = itertools.product(*values) if study.design == "grid" else zip(*values, strict=True)
+        return [dict(zip(names, row, strict=True)) for row in rows]
+    shares = _shares(study, len(names))
+    columns = [[value_at(parameter, share) for share in shares[:, i]] for i, parameter in enumerate(parameters)]
+    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def value_at(parameter: Parameter, share: float) -> float | int:
+    """The value of a range that has a share of it below, from 0 to 1."""
+    low, high = float(parameter.low or 0.0), float(parameter.high or 0.0)
+    if parameter.whole:  # each whole number has an equal part of the range
+        return min(int(high), math.ceil(low) + math.floor(share * (math.floor(high) - math.ceil(low) + 1)))
+    if parameter.log:
+        return math.exp(math.log(low) + share * (math.log(high) - math.log(low)))
+    return low + share * (high - low)
+
+
+def _shares(study: Study, count: int) -> NDArray[np.float64]:
+    """(points, parameters), each from 0 to 1."""
+    wanted = study.points or 1
+    _require("scipy", study)
+    from scipy.stats import qmc
+
+    if study.design == "saltelli":
+        return saltelli(names_of(study), wanted, study.design_seed)
+    if study.design == "latin_hypercube":
+        return np.asarray(qmc.LatinHypercube(count, rng=study.design_seed).random(wanted))
+    # A sequence of Sobol is balanced over its first 2^m points: any number of the first ones is taken of such.
+    points = qmc.Sobol(count, rng=study.design_seed).random_base2(math.ceil(math.log2(wanted)))
+    return np.asarray(points[:wanted])
+
+
+def names_of(study: Study) -> list[str]:
+    """Names of the parameters."""
+    return list(study.parameters)
+
+
+def saltelli(names: Sequence[str], base: int, seed: int) -> NDArray[np.float64]:
+    """base x (parameters + 2) points, as SALib's analysis of first and total indices takes them (Saltelli 2010)."""
+    if find_spec("SALib") is None:
+        raise StudyError("design: saltelli: SALib is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    from SALib.sample import sobol
+
+    return np.asarray(sobol.sample(salib_problem(names), base, calc_second_order=False, seed=seed))
+
+
+def salib_problem(names: Sequence[str]) -> dict[str, Any]:
+    """Shares from 0 to 1, as SALib describes them."""
+    return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
+
+
+def _require(package: str, study: Study) -> None:
+    if find_spec(package) is None:
+        raise StudyError(
+            f"design: {study.design}: {package} is not installed, expected it (pip install 'conveyor_sim[studies]')"
+        )

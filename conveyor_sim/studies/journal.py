@@ -1,0 +1,154 @@
+"""The folder of a study: each finished run in a file of its own, so that none is ever lost."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+from contextlib import AbstractContextManager, suppress
+from dataclasses import asdict, fields
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.errors import StudyError
+from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.setup import Setup
+from conveyor_sim.support.files import FileError, write_file
+
+ORIGIN = "study.json"
+"""What a folder's runs are of."""
+SOURCE = "study.yaml"
+RUNS = "runs"
+STARTS = "warm_starts"
+FREE = ("description", "seeds", "bags", "metrics", "optimise", "points")
+"""Fields of a study that may change while its finished runs stay: all but these decide a run."""
+
+_FIELDS = {item.name for item in fields(Row)}
+
+
+class Journal(AbstractContextManager["Journal"]):
+    """The finished runs of one study, by their keys. One process at a time writes it."""
+
+    def __init__(self, folder: Path, setup: Setup) -> None:
+        """Read what is there. The folder is made.
+
+        Raises StudyError if it has runs of another study or version, another process works on it, or it can't be
+        written.
+        """
+        self.folder = folder
+        self._setup = setup
+        try:
+            (folder / RUNS).mkdir(parents=True, exist_ok=True)
+            self._lock = open(folder / ".lock", "ab")  # noqa: SIM115 (closed by __exit__)
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise StudyError(f"{folder}: another process works on this study, expected it to end first") from None
+            except OSError:
+                pass  # a file system without locks
+            self._check_origin()
+            self.rows = {row.key: row for row in read_rows(folder) if row.status != "lost"}
+            """Those that were there, and those added since."""
+        except OSError as error:
+            raise StudyError(f"{error.filename or folder}: {error.strerror}, expected a folder to write to") from None
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.close()
+
+    def row_of(self, job: Job) -> Row | None:
+        """What came of a run before; None if it is to be made. Raises StudyError if it was made of other values."""
+        row = self.rows.get(job.key)
+        if row is not None and dict(row.parameters) != dict(job.parameters):
+            raise StudyError(
+                f"{self.folder}: point {job.point} was made with {dict(row.parameters)}, not {dict(job.parameters)}; "
+                "expected another folder, or this one emptied to begin anew"
+            )
+        lacks = row is not None and row.status == "finished" and not set(self._setup.metrics) <= set(row.metrics)
+        return None if lacks else row
+
+    def add(self, row: Row) -> None:
+        """Keep a run; when this returns, it is on the disk. Raises StudyError if it can't be written."""
+        self._write(Path(RUNS) / f"point_{row.point}_seed_{row.seed}.json", json.dumps(asdict(row), default=str))
+        self.rows[row.key] = row
+
+    def start_of(self, seed: int) -> Path:
+        """Where the warm start of a seed is kept, once it is there."""
+        return self.folder / STARTS / f"seed_{seed}.npz"
+
+    def keep_start(self, seed: int, content: bytes) -> None:
+        """Keep a warm start. Raises StudyError if it can't be written."""
+        self._write(Path(STARTS) / f"seed_{seed}.npz", content)
+
+    def _write(self, name: Path, content: str | bytes) -> None:
+        path = self.folder / name
+        try:
+            path.parent.mkdir(exist_ok=True)
+            write_file(path, content.encode() if isinstance(content, str) else content)
+        except (FileError, OSError) as error:
+            reason = error if isinstance(error, FileError) else f"can't be written ({error.strerror})"
+            raise StudyError(
+                f"{path}: {reason}; {len(self.rows)} finished runs are kept, and the same command goes on with them"
+            ) from None
+
+    def _check_origin(self) -> None:
+        origin, path = origin_of(self._setup), self.folder / ORIGIN
+        found: Any = None
+        if path.exists():
+            with suppress(ValueError):
+                found = json.loads(path.read_text(encoding="utf-8"))
+        elif any((self.folder / RUNS).iterdir()):
+            found = {}
+        if found is None:
+            self.rows = {}
+            self._write(Path(ORIGIN), json.dumps(origin, indent=1))
+            self._write(Path(SOURCE), self._setup.source)
+            return
+        other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
+        if other:
+            raise StudyError(
+                f"{self.folder}: its runs were made with another {' and another '.join(other)}, so they can't be "
+                "compared with new ones; expected another folder, or this one emptied to begin anew"
+            )
+
+
+def origin_of(setup: Setup) -> dict[str, str]:
+    """What decides a run beside its parameters and seed, by what it is."""
+    study = setup.study.model_dump(mode="json", exclude=set(FREE))
+    return {
+        "study": _hash(json.dumps(study, sort_keys=True)),
+        "scene": _hash(setup.text, setup.overrides),
+        "code": _hash(*(f"{Path(file).name} {digest}" for file, digest in setup.code.items())),
+        "engine": setup.engine,
+        "version of conveyor_sim": setup.sources,
+    }
+
+
+def fingerprint(setup: Setup) -> str:
+    """A short text by which a study and a version differ from all others."""
+    return _hash(*origin_of(setup).values())[:8]
+
+
+def read_rows(folder: Path) -> list[Row]:
+    """The finished runs in a folder, in the order of their keys. Raises StudyError for what is no such folder."""
+    rows = []
+    try:
+        files = [*(folder / RUNS).iterdir()]
+    except OSError as error:
+        raise StudyError(f"{folder}: {error.strerror}, expected the folder of a study") from None
+    for file in files:
+        if file.suffix != ".json":
+            continue  # an unfinished one of a process that was killed
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            if set(data) != _FIELDS:
+                raise ValueError
+            rows.append(Row(**data))
+        except (ValueError, TypeError, OSError):
+            raise StudyError(
+                f"{file}: not a run as conveyor_sim writes it, expected it removed to make it anew"
+            ) from None
+    return sorted(rows, key=lambda row: row.key)
+
+
+def _hash(*parts: str) -> str:
+    return blake2b("\0".join(parts).encode(), digest_size=8).hexdigest()

@@ -1,0 +1,100 @@
+"""The line of a run: a scene with the values of its parameters laid over it, and its controller."""
+
+from __future__ import annotations
+
+import copy
+import difflib
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+from conveyor_sim.control.scan import ControlError, Controller
+from conveyor_sim.errors import ConveyorError, StudyError
+from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene.load import merged
+from conveyor_sim.scene.words import listed
+from conveyor_sim.st.load import load
+from conveyor_sim.studies.code import function
+from conveyor_sim.studies.setup import Setup
+
+_STEP = re.compile(r"([A-Za-z]\w*)|\[(\d+)\]")
+
+
+def scene_of(setup: Setup, parameters: Mapping[str, Any], seed: int) -> Scene:
+    """The scene of a run. Raises SceneError or StudyError for one that can't be, or whatever the function raises."""
+    study = setup.study
+    text, name, overrides = setup.text, setup.name, setup.overrides
+    if setup.function:
+        arguments = study.arguments | _of(setup, parameters, "argument")
+        made = function(setup.function, arguments)(**arguments)
+        if not isinstance(made, Scene):
+            raise StudyError(f"{setup.function}: returned a {type(made).__name__}, expected a Scene")
+        text, name, overrides = made.source_text, made.source_name, made.overrides_text
+    base = merged(_data(text), _data(overrides))
+    changes = merged({"seed": seed}, study.overrides)
+    for path, value in _of(setup, parameters, "field").items():
+        changes = _with_field(base, changes, path, value)
+    changes = merged(changes, setup.needs(merged(base, changes)))
+    start = study.warm_start or 0.0
+    duration = study.duration if study.duration is not None else float(merged(base, changes).get("duration", 0.0))
+    changes["duration"] = start + duration
+    return parse_scene(text, name, merged(_data(overrides), changes))
+
+
+def controller_of(setup: Setup, parameters: Mapping[str, Any]) -> Controller | None:
+    """The controller of a run, new; None for a study without one. Raises ConveyorError for one that can't be."""
+    if not setup.controller:
+        return None
+    try:
+        return load(setup.controller, setup.study.settings | _of(setup, parameters, "controller"))
+    except ControlError as error:
+        raise ConveyorError(str(error)) from error
+
+
+def _of(setup: Setup, parameters: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    """Values by field, argument or parameter of the controller."""
+    declared = setup.study.parameters
+    pairs = ((getattr(declared[name], kind), value) for name, value in parameters.items() if name in declared)
+    return {place: value for place, value in pairs if place is not None}
+
+
+@lru_cache(maxsize=8)
+def _data(text: str) -> dict[str, Any]:
+    """YAML as plain data, which is not to be changed."""
+    return parse_overrides(text)
+
+
+def _with_field(base: dict[str, Any], changes: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """The changes with one more. A list is laid over as a whole, so what it has beside comes along."""
+    steps: list[Any] = [name or int(index) for name, index in _STEP.findall(path)]
+    _require_named(merged(base, changes), steps, path)
+    first_index = next((place for place, step in enumerate(steps) if isinstance(step, int)), len(steps))
+    new: Any = value
+    if first_index < len(steps):
+        there: Any = merged(base, changes)
+        for step in steps[:first_index]:
+            there = there.get(step) if isinstance(there, dict) else None
+        new = copy.deepcopy(there)
+        inner = new
+        try:
+            for step in steps[first_index:-1]:
+                inner = inner[step]
+            inner[steps[-1]] = value
+        except (TypeError, IndexError, KeyError):
+            raise StudyError(f"{path}: the scene has no such entry of a list") from None
+    for step in reversed(steps[:first_index]):
+        new = {step: new}
+    changed: dict[str, Any] = merged(changes, new)
+    return changed
+
+
+def _require_named(data: dict[str, Any], steps: list[Any], path: str) -> None:
+    """Refuse a path to what the scene does not have by that name: a belt of one field would be missing all others."""
+    entries = data.get(steps[0])
+    if len(steps) < 3 or not isinstance(entries, dict) or not all(isinstance(one, dict) for one in entries.values()):
+        return
+    if steps[1] not in entries:
+        close = difflib.get_close_matches(str(steps[1]), list(map(str, entries)), n=1)
+        wanted = f"did you mean {close[0]}?" if close else "expected " + listed([str(name) for name in entries])
+        raise StudyError(f"{path}: no {steps[0]}.{steps[1]} in the scene, {wanted}")

@@ -1,0 +1,55 @@
+"""A run of a study: what is asked of it, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Status = Literal["finished", "failed", "lost"]
+"""lost: its process died, twice; the next time that the study runs it is tried again."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to make. Its key is (point, seed)."""
+
+    point: int
+    """Number of the point in the design, or of a trial."""
+    parameters: Mapping[str, Any]
+    """Numbers, texts, true or false, by name."""
+    seed: int
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """By which its row is kept."""
+        return self.point, self.seed
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of a run."""
+
+    point: int
+    seed: int
+    parameters: Mapping[str, Any]
+    status: Status
+    error: str = ""
+    """One sentence, of a run that has not finished."""
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    """By name, in SI units or as docs/studies.md says; NaN: there is none. Empty unless finished."""
+    simulated: float = 0.0
+    """s, from the start of the run or of its warm start."""
+    dt: float = 0.0
+    """s, of a step."""
+    wall: float = 0.0
+    """s, to build the line and simulate it."""
+    cpu: float = 0.0
+    """s of a processor, the same."""
+    bag: str = ""
+    """Its recording, below the folder of the study; "": none."""
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """By which it is kept."""
+        return self.point, self.seed

@@ -1,0 +1,210 @@
+"""One run of a study, from the scene to its metrics: the same bits wherever it is made."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from conveyor_sim.bag.outputs import Outputs, forget_past
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import ConveyorError, StudyError
+from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
+from conveyor_sim.model import Model
+from conveyor_sim.runs.compilation import compile_kernels
+from conveyor_sim.runs.controlled import Controlled
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.studies.gauges import Gauge
+from conveyor_sim.studies.line_of import controller_of, scene_of
+from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.setup import Setup
+from conveyor_sim.support.printable import SENTENCE, printable
+
+STUDY = "study"
+"""Source of its inputs, in a bag's outcomes."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """A run, and all that it needs, as it goes to the process that makes it."""
+
+    setup: Setup
+    job: Job
+    start: Path | bytes | None = field(default=None, repr=False)
+    """Of a study with `warm_start`: the checkpoint, or the file that holds it."""
+    folder: Path | None = None
+    """Of the study, for recordings; None: none are made."""
+
+
+def make_row(work: Work) -> Row:
+    """Make a run. Whatever fails in it is in its row."""
+    job, clock = work.job, _Clock()
+    row = Row(job.point, job.seed, dict(job.parameters), "failed")
+    wanted = "none" if work.folder is None else work.setup.study.bags
+    bag = None if work.folder is None else work.folder / bag_name(job)
+    try:
+        work.setup.require_same_versions()
+        row = simulate(work, bag if wanted == "all" else None, clock)
+    except Exception as error:  # of the functions and controllers of whoever wrote the study, too
+        row = replace(row, error=_sentence(error))
+        if bag is not None and wanted == "failed" and isinstance(error, ConveyorError):
+            with suppress(Exception):  # it fails again, in the same tick
+                simulate(work, bag, _Clock())
+        if bag is not None and bag.exists():
+            row = replace(row, bag=bag_name(job))
+    return replace(row, wall=clock.wall, cpu=clock.cpu)
+
+
+def bag_name(job: Job) -> str:
+    """Folder of the recording of a run, below that of its study."""
+    return f"bags/point_{job.point}_seed_{job.seed}"
+
+
+def warm_start(work: Work) -> bytes:
+    """A checkpoint of the line as it is at the end of the warm start, for runs with the seed of the job.
+
+    Raises whatever fails in it.
+    """
+    study, job = work.setup.study, work.job
+    work.setup.require_same_versions()
+    scene = scene_of(work.setup, {}, job.seed)
+    simulation = Simulation(scene, threads=1)
+    controller = controller_of(work.setup, {})
+    controlled = None if controller is None else Controlled(simulation, controller)
+    for _ in range(round((study.warm_start or 0.0) / scene.tick)):
+        _tick(simulation, controlled, None)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "start.npz"
+        simulation.save(path)
+        return path.read_bytes()
+
+
+def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
+    """One run, recorded to a folder if one is given. Raises whatever fails in it, with a whole recording."""
+    study, job = work.setup.study, work.job
+    scene = scene_of(work.setup, job.parameters, job.seed)
+    controller = controller_of(work.setup, job.parameters)
+    simulation = _started(scene, work.start)
+    with nullcontext() if clock is None else clock.standing():
+        _load_kernels(simulation)
+    recorder = None if bag is None else Recorder(bag)
+    try:
+        outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
+        if work.start is not None:
+            forget_past(simulation)
+        outputs.start()
+        outputs.show_run(RunState(RUNNING))
+        controlled = None if controller is None else Controlled(simulation, controller)
+        first, last = simulation.tick, scene.duration_ticks
+        measured = first + round(study.warm_up / scene.tick)
+        if measured >= last:
+            raise StudyError(f"warm_up: {study.warm_up:g} s given, expected less than a run takes")
+        try:
+            while simulation.tick < measured:
+                _tick(simulation, controlled, outputs)
+            if simulation.tick and simulation.line.counters() is not None:
+                simulation.give(Input(STUDY, STUDY, "test", "reset_counters", (), ()))
+            gauges = _gauges(work.setup, simulation)
+            while simulation.tick < last:
+                _tick(simulation, controlled, outputs)
+                for gauge in gauges.values():
+                    gauge.after_tick()
+        except Exception as error:
+            outputs.after_failure()
+            outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
+            raise
+        outputs.show_run(RunState(ENDED))
+    finally:
+        if recorder is not None:
+            recorder.close()
+    return Row(
+        job.point,
+        job.seed,
+        dict(job.parameters),
+        "finished",
+        metrics={name: float(gauge.value()) for name, gauge in gauges.items()},
+        simulated=(last - first) * scene.tick,
+        dt=simulation.model.dt,
+        bag="" if bag is None else bag_name(job),
+    )
+
+
+def _started(scene: Scene, start: Path | bytes | None) -> Simulation:
+    if start is None:
+        return Simulation(scene, threads=1)
+    if isinstance(start, Path):
+        return Simulation.load(start, threads=1, scene=scene)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "start.npz"
+        path.write_bytes(start)
+        return Simulation.load(path, threads=1, scene=scene)
+
+
+def _tick(simulation: Simulation, controlled: Controlled | None, outputs: Outputs | None) -> None:
+    if controlled is not None:
+        controlled.before_tick()
+    simulation.advance(1)
+    outcomes = simulation.take_outcomes() if outputs is None else outputs.after_tick()
+    if controlled is not None:
+        controlled.after_tick(outcomes)
+
+
+def _gauges(setup: Setup, simulation: Simulation) -> Mapping[str, Gauge]:
+    gauges: dict[str, Gauge] = {}
+    for name, metric in setup.kept.items():
+        try:
+            gauges[name] = metric.make(simulation)
+        except StudyError as error:
+            raise StudyError(f"metrics.{name}: {error}") from None
+    return gauges
+
+
+_LOADED: set[tuple[str, ...]] = set()
+
+
+def kernels_of(model: Model) -> tuple[str, ...]:
+    """Models with the same answer need, as a rule, the same kernels."""
+    return (model.integrator, *(choice.name for choice in model.effects if choice.on))
+
+
+def _load_kernels(simulation: Simulation) -> None:
+    """Have them in this process."""
+    kind = kernels_of(simulation.model)
+    if kind not in _LOADED:
+        compile_kernels(simulation.scene)
+        _LOADED.add(kind)
+
+
+class _Clock:
+    """Wall and processor time of a run in this thread, without what is done while it stands."""
+
+    def __init__(self) -> None:
+        self._wall, self._cpu = time.perf_counter(), time.thread_time()
+
+    @property
+    def wall(self) -> float:
+        """s"""
+        return time.perf_counter() - self._wall
+
+    @property
+    def cpu(self) -> float:
+        """s"""
+        return time.thread_time() - self._cpu
+
+    @contextmanager
+    def standing(self) -> Iterator[None]:
+        """Compiling and loading kernels is no part of a run."""
+        wall, cpu = self.wall, self.cpu
+        yield
+        self._wall, self._cpu = time.perf_counter() - wall, time.thread_time() - cpu
+
+
+def _sentence(error: BaseException) -> str:
+    kind = "" if isinstance(error, ConveyorError) else f"{type(error).__name__}: "
+    return printable(" ".join(f"{kind}{error}".split()) or kind, SENTENCE)

@@ -1,0 +1,137 @@
+"""The runs of a study: those in its journal, and an engine that makes the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.model import build_model
+from conveyor_sim.runs.compilation import Compilation
+from conveyor_sim.studies.engine import Engine
+from conveyor_sim.studies.journal import Journal
+from conveyor_sim.studies.line_of import scene_of
+from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.run import Work, kernels_of, make_row, warm_start
+from conveyor_sim.studies.setup import Setup
+from conveyor_sim.support.worker_pool import DiedError, WorkerPool
+
+Progress = Callable[[int, int, float | None, Row | None], None]
+"""Called with the runs finished, the runs wanted, an estimate of the time left (s; None: nothing to go by), and the run
+that has just been finished.
+"""
+
+
+class Runs(AbstractContextManager["Runs"]):
+    """Makes runs and keeps them in a folder. A run depends on the study, its parameters and its seed alone.
+
+    Leaving the context by an exception, such as a Ctrl-C, ends what is under way; finished runs are on disk.
+    """
+
+    def __init__(
+        self, setup: Setup, folder: Path, engine: Engine | None = None, say: Callable[[str], object] = lambda _: None
+    ) -> None:
+        """engine: None is a process for each core that this one may use. say: is told of what takes long.
+
+        Raises StudyError as `Journal`.
+        """
+        self._setup, self._say = setup, say
+        self.folder = folder
+        with ExitStack() as stack:
+            self.journal = stack.enter_context(Journal(folder, setup))
+            self._engine = stack.enter_context(WorkerPool() if engine is None else engine)
+            self._stack = stack.pop_all()
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.__exit__(*error)  # type: ignore[arg-type]
+
+    def run(self, jobs: Sequence[Job], progress: Progress = lambda *_: None) -> list[Row]:
+        """Make those that are not there yet; all of them, in the order of the jobs.
+
+        Raises StudyError if one can't be kept. A run that fails is a Row with its error.
+        """
+        found = {job.key: row for job in jobs if (row := self.journal.row_of(job)) is not None}
+        todo = list({job.key: job for job in jobs if job.key not in found}.values())
+        rows: dict[tuple[int, int], Row] = dict(found)
+        progress(len(found), len(rows) + len(todo), self._left(rows.values(), len(todo)), None)
+        if todo:
+            self._compile(todo)
+        unstarted = self._warm(todo)
+        for job in [job for job in todo if job.seed in unstarted]:
+            rows[job.key] = self._keep(Row(job.point, job.seed, dict(job.parameters), "failed", unstarted[job.seed]))
+        works = [self._work(job) for job in todo if job.key not in rows]
+        total = len(rows) + len(works)
+        for work, made in self._engine.each(make_row, works):
+            job = work.job
+            lost = Row(job.point, job.seed, dict(job.parameters), "lost", str(made))
+            row = lost if isinstance(made, DiedError) else made
+            rows[job.key] = self._keep(row)
+            progress(len(rows), total, self._left(rows.values(), total - len(rows)), row)
+        return [rows[job.key] for job in jobs]
+
+    def _work(self, job: Job) -> Work:
+        start: Path | bytes | None = None
+        if self._setup.study.warm_start is not None:
+            start = self.journal.start_of(job.seed).resolve()
+            start = start if self._engine.is_here else start.read_bytes()
+        return Work(self._setup, job, start, self.folder.resolve())
+
+    def _keep(self, row: Row) -> Row:
+        self.journal.add(row)
+        return row
+
+    def _compile(self, jobs: Sequence[Job]) -> None:
+        """Have the kernels in the cache, each kind once, before processes want them at the same time."""
+        kinds = set()
+        parameters = {tuple(job.parameters.items()): job for job in jobs}
+        for job in _different(list(parameters.values())):
+            try:
+                scene = scene_of(self._setup, job.parameters, job.seed)
+                kind = kernels_of(build_model(scene))
+                if kind not in kinds:
+                    kinds.add(kind)
+                    Compilation(scene, self._say).run()
+            except Exception:  # the run says it
+                continue
+
+    def _warm(self, jobs: Sequence[Job]) -> dict[int, str]:
+        """Have a warm start for each seed; why there is none, by seed."""
+        if self._setup.study.warm_start is None:
+            return {}
+        seeds = {job.seed: replace(job, point=-1, parameters={}) for job in jobs}
+        works = [Work(self._setup, job) for seed, job in seeds.items() if not self.journal.start_of(seed).exists()]
+        failed = {}
+        for work, made in self._engine.each(_warmed, works):
+            if isinstance(made, bytes):
+                self.journal.keep_start(work.job.seed, made)
+            else:
+                failed[work.job.seed] = f"warm start: {made}"
+        return failed
+
+    def _left(self, rows: Iterable[Row], todo: int) -> float | None:
+        """s of wall time for so many runs more."""
+        walls = [row.wall for row in rows if row.status == "finished"]
+        return todo * sum(walls) / len(walls) / max(1, self._engine.processes) if walls else None
+
+
+def _warmed(work: Work) -> bytes | str:
+    try:
+        return warm_start(work)
+    except ConveyorError as error:
+        return str(error)
+    except Exception as error:  # of whoever wrote the study
+        return f"{type(error).__name__}: {error}"
+
+
+def _different(jobs: Sequence[Job]) -> list[Job]:
+    """Jobs that have every value of every parameter that is no number among them: these may need other kernels."""
+    seen: set[tuple[str, object]] = set()
+    chosen: list[Job] = []
+    for job in jobs:
+        values = {(name, value) for name, value in job.parameters.items() if isinstance(value, (str, bool))}
+        if not chosen or values - seen:
+            seen |= values
+            chosen.append(job)
+    return chosen

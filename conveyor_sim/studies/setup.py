@@ -1,0 +1,69 @@
+"""All that the runs of a study have in common, as it goes to the processes that make them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
+from conveyor_sim.errors import StudyError
+from conveyor_sim.scene.load import merged
+from conveyor_sim.studies.code import digest_of
+from conveyor_sim.studies.metrics import Metric, metric_of
+from conveyor_sim.studies.study import Study
+from conveyor_sim.version import sources_hash
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A study, its scene as text, and what it names, found."""
+
+    study: Study
+    path: str
+    """Of its file."""
+    source: str
+    """Text of its file."""
+    text: str
+    """Of the scene, as `overrides`; "" where a function returns it."""
+    name: str
+    overrides: str
+    function: str
+    """Located, as are the controller and functions in metrics; "": there is none."""
+    controller: str
+    metrics: Mapping[str, str]
+    """By name, what is kept."""
+    code: Mapping[str, str] = field(default_factory=dict)
+    """By file, a hash of what it held when the study was read."""
+    engine: str = ENGINE_HASH
+    sources: str = field(default_factory=sources_hash)
+
+    @cached_property
+    def kept(self) -> dict[str, Metric]:
+        """The metrics by name. Raises StudyError for one that there is not."""
+        return {name: metric_of(what) for name, what in self.metrics.items()}
+
+    def needs(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """What is laid over a scene (as plain data) so that all metrics can be looked at."""
+        changes: dict[str, Any] = {}
+        for metric in self.kept.values():
+            changes = merged(changes, metric.needs(data))
+        return changes
+
+    def require_same_versions(self) -> None:
+        """Raises StudyError in a process whose package or code is another: no other gives the same bits."""
+        if (self.engine, self.sources) != (ENGINE_HASH, sources_hash()):
+            raise StudyError(
+                f"conveyor_sim here has engine {ENGINE_HASH} and sources {sources_hash()}, expected {self.engine} and "
+                f"{self.sources}, as where the study runs"
+            )
+        for file, before in self.code.items():
+            if (now := digest_of(Path(file))) != before:
+                what = "is not here" if not now else "has changed since the study was read"
+                raise StudyError(f"{file}: {what}, expected the same file")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the metrics: functions of a file are found again where they are needed."""
+        return {name: value for name, value in self.__dict__.items() if name != "kept"}

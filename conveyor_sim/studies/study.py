@@ -1,0 +1,223 @@
+"""A study as its YAML file says it: what varies, how often each point is run, what is asked of a run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Gt, Len, Lt
+from pydantic import BeforeValidator, Strict, StrictBool, StrictFloat, StrictInt, StrictStr
+
+from conveyor_sim.scene.part import Part
+from conveyor_sim.scene.problems import Problem
+from conveyor_sim.scene.types import (
+    Count,
+    Flag,
+    Holds,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Says,
+    Seed,
+    Text,
+    quantity,
+)
+from conveyor_sim.scene.words import listed, shown
+
+LEAST_BATCH = 10
+"""Runs of a point, at least, before it is asked whether there are enough: of fewer the spread is hardly known."""
+
+RESERVED = ("point", "seed", "status", "error", "simulated", "dt", "wall", "cpu", "bag")
+"""Columns that every table of runs has."""
+
+Design = Literal["grid", "list", "latin_hypercube", "sobol", "saltelli"]
+
+Value = StrictBool | StrictInt | StrictFloat | StrictStr
+"""Of a parameter."""
+
+_Value = Annotated[Value, Says("a number, a text, true or false")]
+_Batch = Annotated[int, Strict(), Ge(LEAST_BATCH), Says(f"a whole number, {LEAST_BATCH} or greater")]
+_Confidence = Annotated[float, Strict(), Gt(0), Lt(1), Says("a number between 0 and 1")]
+_Path = re.compile(r"[A-Za-z]\w*(\[\d+\])*(\.[A-Za-z]\w*(\[\d+\])*)*")
+
+
+class Parameter(Part):
+    """Something that varies from point to point."""
+
+    field: Text | None = quantity("Path of a field of the scene, such as `belts.main.speed`.", default=None)
+    controller: Text | None = quantity("Name of a parameter of the controller's factory.", default=None)
+    argument: Text | None = quantity("Name of an argument of the function that returns the scene.", default=None)
+    values: Annotated[tuple[_Value, ...], Len(1), Holds("a list of values, at least one")] | None = quantity(
+        "Its values: all of a grid, one a point of a list.", default=None
+    )
+    low: Number | None = quantity("Least value of a range, for the other designs.", default=None)
+    high: Number | None = quantity("Greatest value of a range.", default=None)
+    log: Flag = quantity("Whether the range is divided by ratio.", default=False)
+    whole: Flag = quantity("Whether values of the range are whole numbers.", default=False)
+
+    def problems(self, path: tuple[str, ...]) -> Iterator[Problem]:
+        """What is wrong with it by itself."""
+        given = [name for name in ("field", "controller", "argument") if getattr(self, name) is not None]
+        if len(given) != 1:
+            said = listed(given) if given else "nothing"
+            yield Problem(path, f"{said} given, expected one of field, controller and argument")
+        if self.field is not None and not _Path.fullmatch(self.field):
+            text = f"{shown(self.field)} given, expected a path such as belts.main.speed or contacts[0].friction"
+            yield Problem((*path, "field"), text)
+        ends = [end for end in ("low", "high") if getattr(self, end) is not None]
+        if (self.values is None) != (len(ends) == 2):
+            yield Problem(path, "expected either values, or low and high")
+        if self.low is None or self.high is None:
+            return
+        if not self.low < self.high:
+            yield Problem((*path, "high"), f"{shown(self.high)} given, expected more than low, {shown(self.low)}")
+        if self.log and self.low <= 0.0:
+            yield Problem((*path, "low"), f"{shown(self.low)} given, expected a number greater than 0, as log is true")
+
+
+class Until(Part):
+    """When a point has been run often enough."""
+
+    metric: Text = quantity("Name of the metric.")
+    half_width: Positive = quantity("Half width of the confidence interval of its mean, in its unit.")
+    relative: Flag = quantity("Whether the half width is a share of the mean.", default=False)
+    confidence: _Confidence = quantity("Of the interval.", "1", default=0.95)
+
+
+class Seeds(Part):
+    """The seeds of each point: the same for all points, so that differences between points are paired."""
+
+    count: Count | None = quantity("Runs of each point. Left out: as many as `until` takes.", "1", default=None)
+    first: Seed = quantity("The first one; those that follow it are used in order.", "1", default=1)
+    until: Annotated[Until, Holds("a mapping with the fields " + ", ".join(Until.model_fields))] | None = quantity(
+        "In batches, until the interval is narrow enough.", default=None
+    )
+    batch: _Batch = quantity("Runs of a point between two looks at the interval.", "1", default=LEAST_BATCH)
+    most: Count = quantity("Runs of a point at most, with `until`.", "1", default=200)
+
+    def problems(self, path: tuple[str, ...]) -> Iterator[Problem]:
+        """What is wrong with it by itself."""
+        if (self.count is None) == (self.until is None):
+            yield Problem(path, "expected either count or until")
+        if self.until is not None and self.most < self.batch:
+            text = f"{shown(self.most)} given, expected at least the batch, {self.batch}"
+            yield Problem((*path, "most"), text)
+
+
+def _counted(value: Any) -> Any:
+    return {"count": value} if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _named(value: Any) -> Any:
+    """Metrics as a mapping from names, of a list of names and of mappings with one of them each."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    pairs: list[tuple[Any, Any]] = []
+    for one in value:
+        pairs += one.items() if isinstance(one, Mapping) else [(one, one)]
+    names = [name for name, _ in pairs]
+    if len(set(map(str, names))) < len(names):
+        raise ValueError("given twice")
+    return dict(pairs)
+
+
+_METRICS = (
+    "a list of metrics, each a name such as efficiency, or a mapping of a name of yours to one metric, such as "
+    "queue: mean zones/table/bottles; each name once"
+)
+
+
+class Study(Part):
+    """A scene, or a function that returns one, asked many questions."""
+
+    name: Name = quantity("Name of the study.")
+    description: Text = quantity("What it asks.", default="")
+    scene: Text | None = quantity(
+        "Scene file, from the folder of the study, or the name of a shipped one.", default=None
+    )
+    function: Text | None = quantity("`file.py:function` or `module:function` that returns a Scene.", default=None)
+    arguments: Annotated[dict[str, Any], Holds("a mapping of arguments to values")] = quantity(
+        "Of the function, beside those that vary.", default={}
+    )
+    overrides: Annotated[dict[str, Any], Holds("a mapping of fields of the scene")] = quantity(
+        "Laid over the scene in every run.", default={}
+    )
+    controller: Text | None = quantity(
+        "`program.st`, `file.py:factory` or `module:factory`; it scans at every tick.", default=None
+    )
+    settings: Annotated[dict[str, Any], Holds("a mapping of parameters to values")] = quantity(
+        "Parameters of the factory, beside those that vary.", default={}
+    )
+    duration: Positive | None = quantity("Of each run. Left out: the scene's.", "s", default=None)
+    warm_up: NotNegative = quantity("At the start of each run, which metrics leave out.", "s", default=0.0)
+    warm_start: Positive | None = quantity(
+        "For so long the line is run once a seed, with the controller as `settings` have it; every run begins there. "
+        "For studies in which only the controller varies.",
+        "s",
+        default=None,
+    )
+    parameters: Annotated[dict[Name, Parameter], Len(1), Holds("a mapping of names to parameters, at least one")] = (
+        quantity("What varies.")
+    )
+    design: Annotated[Design, Says('"grid", "list", "latin_hypercube", "sobol" or "saltelli"')] = quantity(
+        "Which points: grid: all combinations of values; list: the first values of all, the second ones, ...; "
+        "latin_hypercube, sobol: spread over ranges; saltelli: as Sobol indices need them.",
+        default="grid",
+    )
+    points: Count | None = quantity(
+        "How many, of the last three designs; of saltelli the base sample.", "1", default=None
+    )
+    design_seed: Seed = quantity("Seed of designs that are drawn.", "1", default=0)
+    seeds: Annotated[
+        Seeds,
+        BeforeValidator(_counted),
+        Holds("a whole number, 1 or greater, or a mapping with the fields " + ", ".join(Seeds.model_fields)),
+    ] = quantity("How often each point is run.")
+    metrics: Annotated[dict[Name, Text], Len(1), BeforeValidator(_named), Says(_METRICS)] = quantity(
+        "What is kept of a run."
+    )
+    bags: Annotated[Literal["failed", "all", "none"], Says('"failed", "all" or "none"')] = quantity(
+        "Of which runs a recording is kept.", default="failed"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """Everything that is wrong with a study whose fields are each valid by themselves."""
+        if (self.scene is None) == (self.function is None):
+            yield Problem((), "expected either scene or function")
+        for name, parameter in self.parameters.items():
+            path = ("parameters", name)
+            yield from parameter.problems(path)
+            if name in RESERVED or name in self.metrics:
+                yield Problem(path, f"{name} given as a name, expected another: runs have a column of that name")
+            if parameter.argument is not None and self.function is None:
+                yield Problem((*path, "argument"), "given, expected function beside it, which takes the argument")
+            if parameter.controller is not None and self.controller is None:
+                yield Problem((*path, "controller"), "given, expected controller beside parameters, which takes it")
+            if self.warm_start is not None and parameter.controller is None:
+                yield Problem(
+                    (*path,), "varies the line, expected a parameter of the controller, as runs share a warm_start"
+                )
+            if self.design == "grid" and parameter.values is None:
+                yield Problem((*path, "values"), "missing, expected a list of values, as the design is a grid")
+            if self.design == "list" and parameter.values is None:
+                yield Problem((*path, "values"), "missing, expected a list of values, as the design is a list")
+            if self.design not in ("grid", "list") and parameter.values is not None:
+                yield Problem((*path, "values"), f"given, expected low and high, as the design is {self.design}")
+        for name in self.metrics:
+            if name in RESERVED:
+                yield Problem(("metrics", name), "given as a name, expected another: runs have a column of that name")
+        lengths = {len(parameter.values or ()) for parameter in self.parameters.values()}
+        if self.design == "list" and len(lengths) > 1:
+            numbers = ", ".join(map(str, sorted(lengths)))
+            yield Problem(("design",), f"list given with {numbers} values, expected equally many of all parameters")
+        if (self.points is None) != (self.design in ("grid", "list")):
+            if self.points is None:
+                yield Problem(("design",), f"{self.design} given, expected points beside it, how many")
+            else:
+                yield Problem(("points",), f"{self.points} given, expected none: a {self.design} has them by values")
+        yield from self.seeds.problems(("seeds",))
+        if self.seeds.until is not None and self.seeds.until.metric not in self.metrics:
+            text = f"{shown(self.seeds.until.metric)} given, expected one of {', '.join(self.metrics)}"
+            yield Problem(("seeds", "until", "metric"), text)
