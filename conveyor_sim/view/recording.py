@@ -35,8 +35,7 @@ class Detail:
 class Recording:
     """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
 
-    def __init__(self, bag: Bag, detail: Detail, shown: float | None = None) -> None:
-        """shown: s at its end that are drawn; None: all of it. What happened is listed from the beginning."""
+    def __init__(self, bag: Bag, detail: Detail) -> None:
         self._bag = bag
         self._detail = detail
         self._tick_ns = int(bag.line.tick_ns)
@@ -46,9 +45,11 @@ class Recording:
         self._stamps = Stamps(bag, (*DRAWN, *TOPICS_READ))
         self._began = self.first = int(bag.line.tick)
         self.last = max(self.first, self._stamps.last)
-        if shown is not None:
-            self.first = min(self.last, max(self.first, self.last - round(shown * 1e9 / self._tick_ns)))
         self._block_ticks = block_ticks(self._tick_ns, detail.block)
+
+    def begin_before(self, tick: int, seconds: float) -> None:
+        """Draw it only from so many seconds before a tick on. What happened is still listed from the beginning."""
+        self.first = min(self.last, max(self.first, tick - round(seconds * 1e9 / self._tick_ns)))
 
     @property
     def name(self) -> str:

@@ -17,6 +17,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
+from conveyor_sim.view.difference import Comparison
 from conveyor_sim.view.recording import Detail, Recording, text
 
 ADDRESS = "127.0.0.1"
@@ -26,13 +27,19 @@ SERVED = Detail(bottles=50.0, contacts=25.0, belts=50.0, signals=50.0, block=2.0
 class RecordingServer(AbstractContextManager["RecordingServer"]):
     """Serves a bag's page until it is closed."""
 
-    def __init__(self, path: Path, port: int = 0) -> None:
-        """port: 0 for any that is free. Raises BagError, SceneError, and ConveyorError if it can't listen there."""
+    def __init__(self, path: Path, port: int = 0, other: Path | None = None) -> None:
+        """port: 0 for any that is free. other: a recording that is shown beside it, at the same times.
+
+        Raises BagError, SceneError, and ConveyorError if it can't listen there, or these can't be compared.
+        """
         with ExitStack() as stack:
+            bags = [path] if other is None else [path, other]
             # Whoever reads on through the whole recording does not throw out what somebody looks at.
-            self._shown = Recording(stack.enter_context(open_bag(path, by_index=True)), SERVED)
-            self._read_on = Recording(stack.enter_context(open_bag(path, by_index=True)), SERVED)
-            self._locks = {id(recording): threading.Lock() for recording in (self._shown, self._read_on)}
+            looked, read_on = ([stack.enter_context(open_bag(bag, by_index=True)) for bag in bags] for _ in range(2))
+            self._shown = [Recording(bag, SERVED) for bag in looked]
+            self._read_on = [Recording(bag, SERVED) for bag in read_on]
+            self._comparison = None if other is None else Comparison(read_on[0], read_on[1], SERVED.story)
+            self._reading, self._reading_on = threading.Lock(), threading.Lock()
             try:
                 self._server = _Server((ADDRESS, port), _Handler)
             except OSError as error:
@@ -52,29 +59,44 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         return f"http://{ADDRESS}:{self._server.server_address[1]}/"
 
     def answer(self, name: str) -> bytes:
-        """The deflated part of a name: head, story/<n>, block/<n>. Raises KeyError if there is none, and BagError."""
-        kind, _, number = name.partition("/")
-        if name == "head":
-            return self._deflated(self._shown, lambda: text(self._shown.head()))
-        counts = {"story": self._shown.stories, "block": self._shown.blocks}
+        """The deflated part of a name. Raises KeyError if there is none, and BagError.
+
+        head, story/<n>, block/<n>, and the same behind other/; difference/<n>.
+        """
+        place = int(name.startswith("other/"))
+        if place >= len(self._shown):
+            raise KeyError(name)
+        kind, _, number = name.removeprefix("other/").partition("/")
+        shown, read_on, comparison = self._shown[place], self._read_on[place], self._comparison
+        if kind == "head" and not number:
+            compared = {"compared": comparison.head()} if comparison is not None and not place else {}
+            return self._deflated(self._reading, lambda: text({**shown.head(), **compared}))
+        counts = {"story": read_on.stories, "block": shown.blocks}
+        if comparison is not None and not place:
+            counts["difference"] = comparison.stretches
         if kind not in counts or not (number.isdecimal() and len(number) < 10) or int(number) >= counts[kind]:
             raise KeyError(name)
-        recording = self._shown if kind == "block" else self._read_on
-        return self._deflated(recording, lambda: getattr(recording, kind)(int(number)))
+        if kind == "block":
+            return self._deflated(self._reading, lambda: shown.block(int(number)))
+        if kind == "difference" and comparison is not None:
+            return self._deflated(self._reading_on, lambda: text(comparison.part(int(number))))
+        return self._deflated(self._reading_on, lambda: read_on.story(int(number)))
 
     def __exit__(self, *_: object) -> None:
         """Nothing is answered any more."""
         self._stack.close()
         self._thread.join()
 
-    def _deflated(self, recording: Recording, make: Callable[[], bytes]) -> bytes:
-        with self._locks[id(recording)]:
+    def _deflated(self, lock: threading.Lock, make: Callable[[], bytes]) -> bytes:
+        with lock:
             made = make()
         return zlib.compress(made, 1)
 
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
+    request_queue_size = 128
+    """Connections that wait to be accepted: one that finds no room tries again only after a second."""
     answer: Callable[[str], bytes]
 
     def handle_error(self, request: Any, client_address: Any) -> None:

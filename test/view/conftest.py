@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,12 @@ BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-c
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The line, recorded for 24 s. Not to be written to."""
     return record(tmp_path_factory.mktemp("view") / "bag")
+
+
+@pytest.fixture(scope="session")
+def other_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, but the gate does not close at 6 s. Not to be written to."""
+    return record(tmp_path_factory.mktemp("view") / "other", closes=False)
 
 
 @pytest.fixture(scope="session")
@@ -44,6 +51,13 @@ def browser() -> Iterator[Any]:
 @pytest.fixture
 def page(browser: Any, html: Path) -> Iterator[Any]:
     """The one-file page at 1280 x 720, with the network off; anything that goes wrong in it fails the test."""
+    with opened_page(browser, html) as opened:
+        yield opened
+
+
+@contextmanager
+def opened_page(browser: Any, html: Path) -> Iterator[Any]:
+    """As `page`, on some file."""
     context = browser.new_context(viewport={"width": 1280, "height": 720}, offline=True)
     context.set_default_timeout(60_000)
     opened, wrong = context.new_page(), []

@@ -10,15 +10,15 @@ from conveyor_sim.simulation import Simulation
 LINE = Path(__file__).parent / "line.yaml"
 
 
-def record(folder: Path, seconds: float = 24.0) -> Path:
-    """The line with a fault, a refused command, and a gate that closes and opens."""
+def record(folder: Path, seconds: float = 24.0, closes: bool = True) -> Path:
+    """The line with a fault, a refused command, and a gate that closes at 6 s, if it does, and opens."""
     scene = load_scene(LINE)
     simulation = Simulation(scene)
     with Recorder(folder) as recorder:
         outputs = Outputs(simulation, [recorder], run_id="run")
         outputs.start()
         for tick in range(round(seconds / 0.01)):
-            if tick == 600:
+            if tick == 600 and closes:
                 simulation.command(["gates/hold/open"], [0.0], "test")
             if tick == 900:
                 simulation.command(["gates/hold/open"], [1.0], "test")

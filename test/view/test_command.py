@@ -15,7 +15,7 @@ from conveyor_sim.cli import main
 
 
 def test_one_file_is_written_and_named(bag: Path, tmp_path: Path) -> None:
-    file = tmp_path / "new" / "page.html"
+    file = tmp_path / "page.html"
     done = CliRunner().invoke(main, ["view", str(bag), "--html", str(file), "--last", "5"])
     assert (done.exit_code, done.output) == (0, f"{file}\n")
     assert file.read_text().startswith("<!doctype html>")
@@ -45,6 +45,13 @@ def test_a_recording_is_not_overwritten_by_its_page(bag: Path) -> None:
         done = CliRunner().invoke(main, ["view", str(bag), "--html", str(part)])
         assert done.exit_code == 1 and "which is a file of the recording, expected another one" in done.output
         assert part.read_bytes() == content
+
+
+def test_a_folder_that_is_not_there_is_not_made(bag: Path, tmp_path: Path) -> None:
+    file = tmp_path / "new" / "page.html"
+    done = CliRunner().invoke(main, ["view", str(bag), "--html", str(file)])
+    assert done.exit_code == 1 and f"{file}: can't be written (No such file or directory)" in done.output
+    assert not file.parent.exists()
 
 
 def test_a_recording_is_served_until_ctrl_c(bag: Path) -> None:

@@ -106,6 +106,8 @@ def test_what_stock_rosbag2_recorded_gives_the_same_blocks(bag: Path, tmp_path: 
         for topic, stamp, data in opened.raw():
             writer.write(connections[topic], 1_700_000_000_000_000_000 + stamp // 2, data)
     with open_bag(bag) as opened, open_bag(folder) as other:
-        ours, theirs = Recording(opened, Detail(), 15.0), Recording(other, Detail(), 15.0)
+        ours, theirs = Recording(opened, Detail()), Recording(other, Detail())
+        for recording in (ours, theirs):
+            recording.begin_before(recording.last, 15.0)
         assert (ours.first, ours.last, ours.story()) == (theirs.first, theirs.last, theirs.story())
         assert all(ours.block(number) == theirs.block(number) for number in range(ours.blocks))

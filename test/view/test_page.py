@@ -37,18 +37,19 @@ def to_pixels(page: Any, x: float, y: float) -> tuple[float, float]:
     return width / 2 + (x - at_x) * scale, height / 2 - (y - at_y) * scale
 
 
-def canvas(page: Any) -> np.ndarray:
-    """The pixels (height, width, 3) of the plan."""
+def canvas(page: Any, found: str = "#plan") -> np.ndarray:
+    """The pixels (height, width, 3) of a canvas: the plan."""
     data = page.evaluate(
-        """() => {
-            const plan = document.getElementById("plan"), { width, height } = plan;
+        """(found) => {
+            const plan = document.querySelector(found), { width, height } = plan;
             const bytes = plan.getContext("2d").getImageData(0, 0, width, height).data;
             const pieces = [], most = 30000;
             for (let at = 0; at < bytes.length; at += most) {
                 pieces.push(String.fromCharCode(...bytes.subarray(at, at + most)));
             }
             return [width, height, btoa(pieces.join(""))];
-        }"""
+        }""",
+        found,
     )
     pixels = np.frombuffer(b64decode(data[2]), dtype=np.uint8).astype(np.int64)
     return pixels.reshape(data[1], data[0], 4)[..., :3]

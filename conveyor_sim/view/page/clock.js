@@ -3,10 +3,12 @@
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30];
 
 export class Clock extends EventTarget {
-  constructor(recording) {
+  // other: a recording that is shown at the same time. The one that ends last says what times there are.
+  constructor(recording, other = null) {
     super();
-    this.recording = recording;
-    this.time = recording.start;
+    this.all = other ? [recording, other] : [recording];
+    this.recording = other && other.end > recording.end ? other : recording;
+    this.time = this.recording.start;
     this.playing = false;
     this.speed = 1;
   }
@@ -51,8 +53,9 @@ export class Clock extends EventTarget {
 
   // seconds: of wall time since the last call. Time stands while what it needs is loading: nothing is left out.
   advance(seconds) {
-    if (!this.playing || !this.recording.block(this.recording.number(this.time))) return;
-    this.recording.block(this.recording.number(this.time) + 1);
+    const there = (ahead) => this.all.map((one) => one.block(one.number(this.time) + ahead));
+    if (!this.playing || there(0).includes(null)) return;
+    there(1);
     this.time += seconds * this.speed;
     if (this.time >= this.recording.end) {
       this.time = this.recording.end;

@@ -41,6 +41,10 @@ function ramp(colours) {
 
 export const SCALES = { speed: ramp(CIVIDIS), force: ramp(HEAT), age: ramp([...CIVIDIS].reverse()) };
 
+const FAR = 50; // mm between two recordings, and all above it
+
+export const colourings = (view) => Object.keys(COLOURINGS).filter((name) => name !== "apart" || view.rival);
+
 // How bottles are coloured: a colour for each bottle, and what the legend says of it.
 export const COLOURINGS = {
   type: {
@@ -51,6 +55,7 @@ export const COLOURINGS = {
   speed: scaled("by speed", "m/s", "speed", (bottle) => bottle.speed, (view) => view.fastest),
   force: scaled("by force", "N", "force", (bottle) => bottle.force, (view) => view.strongest),
   age: scaled("by age", "s", "age", (bottle, view) => view.clock.time - (view.story.fed.get(bottle.id) ?? view.recording.start), (view) => view.oldest),
+  apart: scaled("by distance A to B", "mm", "force", (bottle, view) => 1000 * view.apart(bottle), () => FAR),
   defect: {
     label: "by defect",
     of: (bottle, view) => (view.story.rejected.has(bottle.id) ? SERIES[1] : SERIES[0]),

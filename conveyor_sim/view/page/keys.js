@@ -9,7 +9,7 @@ const TABLE = [
 ];
 
 export function listenToKeys(view) {
-  const { clock, camera, recording } = view, dialog = byId("keys");
+  const { clock, camera, clock: { recording } } = view, dialog = byId("keys");
   dialog.append(element("h2", {}, "Keys"), element("table", {}, ...TABLE.map(([keys, what]) => element("tr", {}, element("th", {}, keys), element("td", {}, what)))),
     element("button", { onclick: () => dialog.close() }, "Close"));
   byId("help").addEventListener("click", () => dialog.showModal());

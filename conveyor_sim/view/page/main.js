@@ -2,10 +2,12 @@
 
 import { Alarms } from "./alarms.js";
 import { Bars } from "./bars.js";
+import { Beside } from "./beside.js";
 import { Bottle } from "./bottle.js";
 import { Camera } from "./camera.js";
 import { Clock, SPEEDS } from "./clock.js";
-import { COLOURINGS, SCALES, isDark } from "./colours.js";
+import { COLOURINGS, SCALES, colourings, isDark } from "./colours.js";
+import { Compare } from "./compare.js";
 import { deviceOf, middle } from "./devices.js";
 import { byId, element, seconds } from "./dom.js";
 import { Events } from "./events.js";
@@ -22,18 +24,27 @@ import { Trends } from "./trends.js";
 import { WEARS, Wear } from "./wear.js";
 
 const MEASURED = 5000; // forces of a block that its scale is made from
+const BEFORE = 2; // s before the first difference, where a comparison opens
 const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
 
 class View {
-  constructor(recording, story) {
-    Object.assign(this, { recording, story, bottle: null, following: false, colouring: "type", showForces: true, showNames: true, dirty: true });
+  // other: a recording that is shown beside it, and its story; else null.
+  constructor(recording, story, other) {
+    Object.assign(this, { recording, story, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
+    this.rival = null; // what is shown beside this
     this.fastest = 0.1;
     this.strongest = 1;
     this.oldest = Math.max(1, Math.min(60, recording.end - recording.start));
-    this.clock = new Clock(recording);
-    this.camera = new Camera(boundsOf(recording.head));
+    this.clock = new Clock(recording, other?.recording);
+    this.camera = new Camera(boundsOf([recording, other?.recording]));
     this.wear = new Wear(this);
     this.plan = new Plan(byId("plan"), this);
+    this.plans = [this.plan];
+    if (other) {
+      this.beside = new Beside(this, other.recording, other.story, recording.head.compared.names);
+      this.compare = new Compare(this, recording.head.compared);
+      this.plans.push(this.beside.plan);
+    }
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
@@ -43,10 +54,12 @@ class View {
     const line = { title: "Line", parts: [this.bars, new Tiles(this)] };
     const panels = { line, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [this.events] },
       device: { title: "Device", parts: [this.faceplate] }, bottle: { title: "Bottle", parts: [new Bottle(this)] } };
-    this.tabs = new Tabs(panels, "line");
+    this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : "line");
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
-    recording.addEventListener("loaded", () => this._loaded());
-    recording.addEventListener("failed", (event) => this.say(event.detail));
+    for (const one of this.clock.all) {
+      one.addEventListener("loaded", () => this._loaded());
+      one.addEventListener("failed", (event) => this.say(event.detail));
+    }
     this.snapping = false;
   }
 
@@ -87,7 +100,7 @@ class View {
 
   // Scales that only grow, so that a colour means the same from frame to frame.
   _measure() {
-    for (const block of this.recording.blocks.values()) {
+    for (const block of this.clock.all.flatMap(({ blocks }) => [...blocks.values()])) {
       if (block.measured) continue;
       block.measured = true;
       for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
@@ -103,9 +116,26 @@ class View {
   // Time stands at a frame of the recording, once that is there.
   snap() {
     if (this.clock.playing) return;
-    const at = this.recording.place(this.clock.time);
+    const at = this.clock.recording.place(this.clock.time);
     this.snapping = !at;
     if (at && this.clock.time !== at.block.times[at.frame]) this.clock.seek(at.block.times[at.frame]);
+  }
+
+  // How far a bottle is from where the other recording has it, m; not there: no end.
+  apart(bottle) {
+    const { frame } = this.rival.plan;
+    if (!frame) return 0;
+    frame.byId ??= new Map(frame.bottles.map((other) => [other.id, other]));
+    const other = frame.byId.get(bottle.id);
+    return other ? Math.hypot(bottle.x - other.x, bottle.y - other.y) : Infinity;
+  }
+
+  // What the comparison has found: said, and marked.
+  compared() {
+    this.story.differences = this.compare.marks();
+    this.story.build();
+    this.say(this.compare.words());
+    this.touch();
   }
 
   // To a time, and to the place of a tag or a bottle.
@@ -171,7 +201,7 @@ class View {
   }
 
   nextColouring() {
-    const names = Object.keys(COLOURINGS);
+    const names = colourings(this);
     this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
   }
 
@@ -194,15 +224,15 @@ class View {
     byId("legend").replaceChildren(...entries);
   }
 
-  clicked(px, py) {
-    const bottle = this.plan.bottleAt(px, py);
+  clicked(px, py, plan = this.plan) {
+    const bottle = plan.bottleAt(px, py), { head } = plan.view.recording;
     if (bottle !== null) {
       this.selectBottle(bottle);
       return;
     }
     const [x, y] = this.camera.at(px, py), near = 12 / this.camera.scale;
-    const mark = this.recording.head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
-    const belt = mark ? null : [...this.recording.head.belts].reverse().find(({ outline }) => inside(outline, x, y));
+    const mark = head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
+    const belt = mark ? null : [...head.belts].reverse().find(({ outline }) => inside(outline, x, y));
     const device = mark ? deviceOf(mark) : belt ? `belts/${belt.name}` : null;
     if (device) {
       this.faceplate.show(device);
@@ -210,10 +240,17 @@ class View {
     }
   }
 
+  resize() {
+    this.beside?.resize();
+    this.plan.resize();
+    this.touch();
+  }
+
   draw(now) {
+    for (const plan of this.plans) plan.update();
     this._follow();
-    this.plan.draw();
-    this._follow();
+    for (const plan of this.plans) plan.draw();
+    this.beside?.draw();
     this.scrubber.draw();
     const { clock, camera } = this, play = byId("play");
     byId("clock").textContent = seconds(clock.time);
@@ -237,8 +274,8 @@ class View {
   }
 }
 
-function boundsOf(head) {
-  const points = [...head.belts.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)];
+function boundsOf(recordings) {
+  const points = recordings.filter(Boolean).flatMap(({ head }) => [...head.belts.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)]);
   const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k]));
   const least = (list) => list.reduce((a, b) => Math.min(a, b), Infinity), most = (list) => list.reduce((a, b) => Math.max(a, b), -Infinity);
   return points.length ? [least(xs), least(ys), most(xs), most(ys)] : [-1, -1, 1, 1];
@@ -263,14 +300,14 @@ function wire(view) {
   const { clock, camera, recording } = view, { head } = recording;
   byId("scene").textContent = document.title = head.scene;
   byId("where").textContent = head.where || head.description || "";
-  byId("end").textContent = seconds(recording.end);
-  byId("colour").append(...Object.entries(COLOURINGS).map(([name, { label }]) => element("option", { value: name }, label)));
+  byId("end").textContent = seconds(clock.recording.end);
+  byId("colour").append(...colourings(view).map((name) => element("option", { value: name }, COLOURINGS[name].label)));
   byId("colour").addEventListener("change", (event) => view.setColouring(event.target.value));
   byId("speed").append(...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
   const clicks = {
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
-    to_start: () => { clock.seek(recording.start); view.snap(); },
+    to_start: () => { clock.seek(clock.recording.start); view.snap(); },
     theme: () => { document.documentElement.dataset.theme = isDark() ? "light" : "dark"; view.touch(); },
     toggle_trends: () => {
       const hidden = byId("drawer").toggleAttribute("hidden");
@@ -279,7 +316,7 @@ function wire(view) {
   };
   for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
   byId("wear").append(...Object.entries(WEARS).map(([name, { label }]) => element("option", { value: name }, label)));
-  byId("wear").addEventListener("change", (event) => { view.wear.shown = event.target.value; view.draw(0); view.legend(); });
+  byId("wear").addEventListener("change", (event) => { view.shownWear = event.target.value; view.draw(0); view.legend(); });
   view.worn();
   for (const [id, field] of [["forces", "showForces"], ["names", "showNames"]]) {
     byId(id).addEventListener("change", (event) => { view[field] = event.target.checked; view.touch(); });
@@ -287,23 +324,51 @@ function wire(view) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view.touch());
   camera.listen(byId("plan"), (px, py) => view.clicked(px, py), () => view.setFollowing(false));
   listenToKeys(view);
-  new ResizeObserver(() => { view.plan.resize(); view.touch(); }).observe(byId("stage"));
+  new ResizeObserver(() => view.resize()).observe(byId("stage"));
   view.setColouring("type");
 }
 
+// A recording and what happened; of a long one that is read later.
+async function opened(source) {
+  const head = await read(source, "head"), story = new Story(head);
+  if (head.times.stories === 1) story.add(await read(source, "story/0"));
+  return { recording: new Recording(source, head), story };
+}
+
+async function read(source, name) {
+  return JSON.parse(new TextDecoder().decode(await source.bytes(name)));
+}
+
+// Goes through both recordings until the first difference of each kind is found, and then before the first of all.
+async function compare(view, source, { stretches }) {
+  const untouched = !view.clock.playing && view.clock.time === view.clock.recording.start;
+  for (let part = 0; part < stretches && !view.compare.complete; part++) {
+    const before = view.compare.found.length;
+    view.compare.add(await read(source, `difference/${part}`));
+    if (view.compare.found.length === before) continue;
+    view.compared();
+    for (const { signals } of view.compare.found) for (const name of signals.slice(0, 3)) view.trends.add(name);
+    if (before || !untouched) continue;
+    view.clock.seek(view.compare.found[0].time - BEFORE);
+    view.snap();
+  }
+  view.compare.done = true;
+  view.compared();
+  document.body.dataset.compared = "yes";
+}
+
 async function start() {
-  const source = openSource(), read = async (name) => JSON.parse(new TextDecoder().decode(await source.bytes(name)));
-  const head = await read("head"), story = new Story(head), parts = head.times.stories;
-  if (parts === 1) story.add(await read("story/0"));
-  const recording = new Recording(source, head), view = new View(recording, story);
+  const source = openSource(), { recording, story } = await opened(source), { head } = recording, parts = head.times.stories;
+  const behind = { bytes: (name) => source.bytes(`other/${name}`) }, other = head.compared ? await opened(behind) : null;
+  const view = new View(recording, story, other);
   wire(view);
-  view.plan.resize();
+  view.resize();
   const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
   if (failure) {
     view.say(failure.text);
     view.clock.seek(Math.max(recording.start, failure.time - 5));
   }
-  await recording.load(recording.number(view.clock.time));
+  await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
   view.snap();
   let before = performance.now();
   const loop = (now) => {
@@ -320,10 +385,14 @@ async function start() {
   // A long recording is gone through while one looks at it already.
   for (let part = 0; parts > 1 && part < parts; part++) {
     view.say(`reading what happened: ${Math.round((100 * part) / parts)} %`);
-    view.toldMore(await read(`story/${part}`));
+    view.toldMore(await read(source, `story/${part}`));
   }
   if (parts > 1) view.say("");
   document.body.dataset.told = "yes";
+  for (let part = 0; other && part < other.recording.head.times.stories; part++) {
+    if (other.recording.head.times.stories > 1) other.story.add(await read(behind, `story/${part}`));
+  }
+  if (other) await compare(view, source, head.compared);
 }
 
 start().catch((error) => {

@@ -31,10 +31,14 @@ export class Plan {
     this.view.camera.resize(clientWidth, clientHeight);
   }
 
+  // What there is to draw now; while it loads, what was there.
+  update() {
+    const { clock, recording } = this.view;
+    this.frame = recording.frame(clock.time, clock.playing) ?? this.frame;
+  }
+
   draw() {
-    const { view, context } = this, { camera, clock, recording } = view, colours = palette();
-    const frame = recording.frame(clock.time, clock.playing) ?? this.frame; // while it loads, what was there
-    this.frame = frame;
+    const { view, context, frame } = this, { camera, clock, recording } = view, colours = palette();
     const speeds = recording.head.belts.map((_, i) => recording.at("belts", i, clock.time) ?? 0);
     const gone = this.last === null ? 0 : clock.time - this.last;
     if (Math.abs(gone) < 1) this.belts.advance(speeds, gone);

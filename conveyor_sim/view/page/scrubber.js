@@ -3,7 +3,7 @@
 import { palette } from "./colours.js";
 import { byId, element, seconds, sharp } from "./dom.js";
 
-const KINDS = { alarm: ["#d55e00", 0], fault: ["#cc79a7", 1], refused: ["#e69f00", 1], failed: ["#d1330d", 2] };
+const KINDS = { alarm: ["#d55e00", 0], fault: ["#cc79a7", 1], refused: ["#e69f00", 1], failed: ["#d1330d", 2], difference: ["#8250df", 2] };
 const NEAR = 6; // px
 
 export class Scrubber {
@@ -13,7 +13,7 @@ export class Scrubber {
     this.canvas = this.box.querySelector("canvas");
     this.tip = element("div", { class: "tip", role: "tooltip", hidden: true });
     this.box.append(this.tip);
-    const { recording } = view;
+    const { recording } = view.clock;
     this.box.setAttribute("aria-valuemin", recording.start.toFixed(2));
     this.box.setAttribute("aria-valuemax", recording.end.toFixed(2));
     this.dragging = false;
@@ -33,12 +33,12 @@ export class Scrubber {
   }
 
   x(time) {
-    const { start, end } = this.view.recording;
+    const { start, end } = this.view.clock.recording;
     return 8 + ((time - start) / Math.max(end - start, 1e-9)) * (this.box.clientWidth - 16);
   }
 
   _time(event) {
-    const { start, end } = this.view.recording, box = this.box.getBoundingClientRect();
+    const { start, end } = this.view.clock.recording, box = this.box.getBoundingClientRect();
     return Math.min(end, Math.max(start, start + ((event.clientX - box.left - 8) / (box.width - 16)) * (end - start)));
   }
 
@@ -49,7 +49,7 @@ export class Scrubber {
 
   _markAt(event) {
     const px = event.clientX - this.box.getBoundingClientRect().left;
-    const near = this.view.story.marks.filter((mark) => Math.abs(this.x(mark.time) - px) < NEAR && mark.time >= this.view.recording.start);
+    const near = this.view.story.marks.filter((mark) => Math.abs(this.x(mark.time) - px) < NEAR && mark.time >= this.view.clock.recording.start);
     return near.sort((a, b) => KINDS[b.kind][1] - KINDS[a.kind][1] || Math.abs(this.x(a.time) - px) - Math.abs(this.x(b.time) - px))[0];
   }
 
@@ -64,7 +64,7 @@ export class Scrubber {
   draw() {
     const context = sharp(this.canvas);
     if (!context) return;
-    const { clock, recording, story } = this.view, colours = palette(), height = this.canvas.clientHeight, middle = height / 2;
+    const { clock, clock: { recording }, story } = this.view, colours = palette(), height = this.canvas.clientHeight, middle = height / 2;
     const line = (from, to, width, colour) => {
       context.fillStyle = colour;
       context.fillRect(from, middle - width / 2, to - from, width);

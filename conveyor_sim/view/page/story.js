@@ -20,6 +20,7 @@ const LISTS = ["alarm_changes", "readback", "counters", "runs", "wear"];
 export class Story {
   constructor(head) {
     this.head = head;
+    this.differences = []; // from another recording: marks
     this.data = { events: {}, alarms: {} };
     for (const list of LISTS) this.data[list] = [];
     this.build();
@@ -63,7 +64,7 @@ export class Story {
   }
 
   _marks() {
-    const marks = [];
+    const marks = [...this.differences];
     for (const event of this.events) {
       if (event.kind === "alarm_raised") marks.push({ time: event.time, kind: "alarm", text: `alarm ${event.name} ${event.text}` });
       if (event.kind === "fault_injected") marks.push({ time: event.time, kind: "fault", text: `fault ${event.name}` });

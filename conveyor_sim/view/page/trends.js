@@ -4,7 +4,7 @@ import { COLOURED, palette } from "./colours.js";
 import { byId, element, seconds } from "./dom.js";
 
 const MOST = 8; // signals
-const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d" };
+const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d", difference: "#8250df" };
 const LONGEST = 28; // letters of a mark
 const WINDOWS = [10, 30, 60, 120]; // s
 
@@ -21,6 +21,7 @@ export class Trends {
       ...WINDOWS.map((window) => element("option", { value: window, selected: window === this.window }, `${window} s`)));
     byId("trendbar").append(this.chips, this.input,
       element("datalist", { id: "signals" }, ...recording.head.signals.map((name) => element("option", { value: name }))), this.choice);
+    if (view.rival) byId("trendbar").append(element("small", {}, "dashed: B"));
     this.box = byId("trends");
     for (const name of this._first()) this.add(name);
   }
@@ -79,20 +80,27 @@ export class Trends {
     const stepped = uPlot.paths.stepped({ align: 1 });
     this.plot = new uPlot({
       width: this.box.clientWidth, height: this.box.clientHeight, legend: { show: false }, scales, axes, cursor: { y: false, drag: { x: false, y: false } },
-      series: [{}, ...this.names.map((name, i) => ({ label: name, scale: this._scale(name), stroke: COLOURED(i), width: 2, points: { show: false }, spanGaps: false, paths: this.view.recording.tags.get(name)?.kind === "number" ? undefined : stepped }))],
+      series: [{}, ...this._drawn().map(({ name, i, dash }) => ({ label: name, scale: this._scale(name), stroke: COLOURED(i), width: 2, dash, points: { show: false }, spanGaps: dash !== null, paths: this.view.recording.tags.get(name)?.kind === "number" ? undefined : stepped }))],
       hooks: { draw: [(plot) => this._marks(plot)] },
     }, this._data(), this.box);
     this.plot.over.addEventListener("click", (event) => this.view.jump(this.plot.posToVal(event.offsetX, "x")));
     this.theme = colours;
   }
 
+  // A line for each signal, and a dashed one for what it is in the recording beside.
+  _drawn() {
+    const lines = this.names.map((name, i) => ({ name, i, of: this.view.recording, dash: null })), { rival } = this.view;
+    return rival ? [...lines, ...lines.map((line) => ({ ...line, of: rival.recording, dash: [5, 4] }))] : lines;
+  }
+
   _span() {
-    const { clock, recording } = this.view, from = Math.max(recording.start, clock.time - 0.75 * this.window);
+    const { clock, clock: { recording } } = this.view, from = Math.max(recording.start, clock.time - 0.75 * this.window);
     return [from, Math.min(Math.max(recording.end, from + 1), from + this.window)];
   }
 
   _data() {
-    const [from, to] = this._span(), all = this.names.map((name) => this.view.recording.series(name, from, to));
+    const [from, to] = this._span(), all = this._drawn().map(({ name, of }) => of.series(name, from, to));
+    if (this.view.rival) return uPlot.join(all.map(({ times, values }) => [times, values]));
     return [all[0]?.times ?? [], ...all.map(({ values }) => values)];
   }
 
@@ -149,7 +157,7 @@ export class Trends {
 
   _range(scale) {
     if (scale === "switch") return { min: -0.1, max: 4 };
-    const values = this.names.flatMap((name, i) => (this._scale(name) === scale ? Array.from(this.plot.data[i + 1]).filter(Number.isFinite) : []));
+    const values = this._drawn().flatMap(({ name }, i) => (this._scale(name) === scale ? Array.from(this.plot.data[i + 1]).filter(Number.isFinite) : []));
     const low = values.reduce((least, value) => Math.min(least, value), Infinity), high = values.reduce((most, value) => Math.max(most, value), -Infinity);
     if (!(low <= high)) return { min: 0, max: 1 };
     const room = low === high ? Math.max(0.5, 0.1 * Math.abs(low)) : 0.08 * (high - low);

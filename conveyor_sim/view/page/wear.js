@@ -12,17 +12,24 @@ export const WEARS = {
 export class Wear {
   constructor(view) {
     this.view = view;
-    this.shown = "";
     this.most = 1;
   }
 
+  get shown() {
+    return this.view.shownWear;
+  }
+
+  // The scale is that of the end, so that a colour means the same all the time.
+  scale() {
+    const { story, recording } = this.view, { bins, wear } = story.data, last = wear[wear.length - 1];
+    return last ? Math.max(1e-9, ...bins.x.map((_, i) => WEARS[this.shown].of(last, i, bins, recording.start))) : 1e-9;
+  }
+
   draw(context, camera) {
-    const { story, clock, recording } = this.view, { bins, wear } = story.data, wanted = WEARS[this.shown];
-    const row = wear[lastUpTo(wear.map(([time]) => time), clock.time + 1e-6)];
+    const { story, clock, recording, rival } = this.view, { bins, wear } = story.data;
+    const wanted = WEARS[this.shown], row = wear[lastUpTo(wear.map(([time]) => time), clock.time + 1e-6)];
     if (!wanted.of || !row) return;
-    // The scale is that of the end, so that a colour means the same all the time.
-    const last = wear[wear.length - 1], all = bins.x.map((_, i) => wanted.of(last, i, bins, recording.start));
-    this.most = Math.max(1e-9, ...all);
+    this.most = Math.max(this.scale(), rival ? rival.wear.scale() : 0);
     context.lineCap = "butt";
     context.lineWidth = Math.max(6, 0.02 * camera.scale);
     bins.x.forEach((x, i) => {
