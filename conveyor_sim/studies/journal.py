@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict, fields
 from hashlib import blake2b
@@ -20,6 +21,9 @@ ORIGIN = "study.json"
 SOURCE = "study.yaml"
 RUNS = "runs"
 STARTS = "warm_starts"
+VERSION = "version of conveyor_sim"
+UNITS = "units.json"
+"""Of metrics, with the names of the parameters and the path of the study."""
 FREE = ("description", "seeds", "bags", "metrics", "optimise", "points")
 """Fields of a study that may change while its finished runs stay: all but these decide a run."""
 
@@ -79,6 +83,11 @@ class Journal(AbstractContextManager["Journal"]):
         """Keep a warm start. Raises StudyError if it can't be written."""
         self._write(Path(STARTS) / f"seed_{seed}.npz", content)
 
+    def keep_units(self, units: Mapping[str, str]) -> None:
+        """Keep the units of the metrics. Raises StudyError if they can't be written."""
+        about = {"path": self._setup.path, "units": dict(units), "parameters": list(self._setup.study.parameters)}
+        self._write(Path(UNITS), json.dumps(about, indent=1))
+
     def _write(self, name: Path, content: str | bytes) -> None:
         path = self.folder / name
         try:
@@ -119,7 +128,7 @@ def origin_of(setup: Setup) -> dict[str, str]:
         "scene": _hash(setup.text, setup.overrides),
         "code": _hash(*(f"{Path(file).name} {digest}" for file, digest in setup.code.items())),
         "engine": setup.engine,
-        "version of conveyor_sim": setup.sources,
+        VERSION: setup.sources,
     }
 
 

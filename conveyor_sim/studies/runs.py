@@ -10,6 +10,7 @@ from pathlib import Path
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import build_model
 from conveyor_sim.runs.compilation import Compilation
+from conveyor_sim.studies.check import units_of
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import scene_of
@@ -84,17 +85,22 @@ class Runs(AbstractContextManager["Runs"]):
 
     def _compile(self, jobs: Sequence[Job]) -> None:
         """Have the kernels in the cache, each kind once, before processes want them at the same time."""
-        kinds = set()
+        kinds: set[tuple[str, ...]] = set()
+        units = {name: metric.unit or "1" for name, metric in self._setup.kept.items()}
         parameters = {tuple(job.parameters.items()): job for job in jobs}
         for job in _different(list(parameters.values())):
             try:
                 scene = scene_of(self._setup, job.parameters, job.seed)
                 kind = kernels_of(build_model(scene))
-                if kind not in kinds:
-                    kinds.add(kind)
-                    Compilation(scene, self._say).run()
-            except Exception:  # the run says it
+                if kind in kinds:
+                    continue
+                Compilation(scene, self._say).run()
+            except Exception:  # the run says it, in a row of its own
                 continue
+            if not kinds:
+                units = units_of(self._setup, scene)
+            kinds.add(kind)
+        self.journal.keep_units(units)
 
     def _warm(self, jobs: Sequence[Job]) -> dict[int, str]:
         """Have a warm start for each seed; why there is none, by seed."""

@@ -1,0 +1,112 @@
+"""Commands on studies: sweep, study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from conveyor_sim.cli.output import say, show
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.garbage import collected_later
+
+if TYPE_CHECKING:
+    from conveyor_sim.studies.engine import Engine
+    from conveyor_sim.studies.setup import Setup
+
+
+@click.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder (default: runs/study_<name>_<hash>).")
+@click.option("--processes", type=click.IntRange(1), help="On this machine (default: one for each core).")
+@click.option("--dask", help="Workers of Dask instead: the address of a scheduler, or `local`.")
+@click.option("--set", "given", multiple=True, metavar="NAME=VALUE", help="One run alone, with --seed: a parameter.")
+@click.option("--seed", type=click.IntRange(0), help="Of the run alone.")
+@click.option("--record", type=click.Path(path_type=Path), help="Of the run alone: folder to record to.")
+def sweep(
+    study: Path,
+    out: Path | None,
+    processes: int | None,
+    dask: str | None,
+    given: tuple[str, ...],
+    seed: int | None,
+    record: Path | None,
+) -> None:
+    """Run a scene at many points and seeds, as STUDY (YAML) says.
+
+    Each finished run is kept in a file of its own; the same command goes on after a Ctrl-C, a crash or a full disk.
+    At the end all runs are in one Parquet file, and `conveyor-sim study` draws them.
+    """
+    if find_spec("scipy") is None:
+        raise ConveyorError("sweep: scipy is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    with collected_later():
+        from conveyor_sim.studies.check import check_study
+        from conveyor_sim.studies.load import load_study
+
+    setup = load_study(study)
+    if given or seed is not None or record is not None:
+        if not given or seed is None or out or processes or dask:
+            raise ConveyorError("--set, --seed, --record: expected --set for each parameter and --seed, and no others")
+        _alone(setup, given, seed, record)
+        return
+    check_study(setup)
+    _sweep(setup, out, engine_of(processes, dask))
+
+
+def engine_of(processes: int | None, dask: str | None) -> Callable[[], Engine]:
+    """What makes the engine that options ask for. Raises ConveyorError for options that do not go together."""
+    if dask is None:
+        from conveyor_sim.support.worker_pool import WorkerPool
+
+        return lambda: WorkerPool(processes)
+    if find_spec("distributed") is None:
+        raise ConveyorError("--dask: distributed is not installed, expected it (pip install 'conveyor_sim[dask]')")
+    if processes is not None and dask != "local":
+        raise ConveyorError("--processes: given with the address of a scheduler, expected one of them")
+    from conveyor_sim.studies.dask_engine import DaskEngine
+
+    return lambda: DaskEngine(dask, processes, say)
+
+
+def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None:
+    from conveyor_sim.studies.display import Display
+    from conveyor_sim.studies.results import PARQUET, read_results, run_command, write_parquet
+    from conveyor_sim.studies.runs import Runs
+    from conveyor_sim.studies.sweep import study_folder, sweep
+    from conveyor_sim.studies.table import points_table
+
+    folder = study_folder(setup) if out is None else out
+    try:
+        with ExitStack() as stack:
+            runs = stack.enter_context(Runs(setup, folder, engine(), say))
+            display = stack.enter_context(Display(setup))
+            rows = sweep(runs, setup, display.update)
+    except KeyboardInterrupt:
+        say(f"finished runs are kept in {folder}; the same command goes on with them")
+        raise
+    results = read_results(folder)
+    show(points_table(rows, results.units))
+    for row in rows:
+        if row.status != "finished":
+            click.echo(f"{row.status}: {row.error}: {run_command(setup.path, row)}")
+    click.echo(f"any run alone: {run_command(setup.path, rows[0])}")
+    if find_spec("pyarrow") is None:
+        say("no Parquet file: pyarrow is not installed (pip install 'conveyor_sim[studies]')")
+    else:
+        click.echo(f"table: {write_parquet(results, folder / PARQUET)}")
+    click.echo(f"pictures: conveyor-sim study {folder}")
+
+
+def _alone(setup: Setup, given: tuple[str, ...], seed: int, record: Path | None) -> None:
+    from conveyor_sim.studies.alone import job_of, run_alone
+
+    job = job_of(setup, given, seed)
+    row = run_alone(setup, job, record)
+    for name, value in row.metrics.items():
+        click.echo(f"{name}: {value!r}")
+    if record is not None:
+        click.echo(f"recorded to {record}")

@@ -1,0 +1,72 @@
+"""A study looked over before its runs: what would fail in many of them is said once, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from conveyor_sim.errors import ConveyorError, StudyError
+from conveyor_sim.scene import Scene
+from conveyor_sim.scene.load import refused
+from conveyor_sim.scene.problems import Path, Problem
+from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.yaml_lines import Document
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.studies.design import Point, points_of
+from conveyor_sim.studies.line_of import controller_of, scene_of
+from conveyor_sim.studies.setup import Setup
+from conveyor_sim.studies.study import Parameter
+
+
+def check_study(setup: Setup, first: Point | None = None) -> None:
+    """Make the line of the first point, and with each value of each parameter alone, but run none.
+
+    first: None is that of the design. Raises StudyError with a line for each value that can't be.
+    """
+    first = points_of(setup.study)[0] if first is None else first
+    path: Path = ("function",) if setup.function else ("scene",)
+    problems = [*_problems(setup, first, path)]
+    for name, parameter in setup.study.parameters.items() if not problems else ():
+        for place, value in _values(name, parameter):
+            if value != first[name]:
+                found = next(_problems(setup, {**first, name: value}, place), None)
+                problems += [Problem(place, f"{shown(value)} given, but {found.text}")] if found else []
+    if problems:
+        raise StudyError(str(refused(problems, Document(setup.source, setup.path), setup.path, {})))
+
+
+def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
+    """The unit of each metric. scene: of any run. Raises StudyError for a metric that its line has not."""
+    simulation = Simulation(scene, threads=1)
+    units, problems = {}, []
+    for name, metric in setup.kept.items():
+        try:
+            gauge = metric.make(simulation)
+        except StudyError as error:
+            problems.append(Problem(("metrics", name), str(error)))
+            continue
+        units[name] = metric.unit or str(getattr(gauge, "unit", "1"))
+    if problems:
+        raise StudyError(str(refused(problems, Document(setup.source, setup.path), setup.path, {})))
+    return units
+
+
+def _problems(setup: Setup, point: Point, path: Path) -> Iterator[Problem]:
+    """The first thing that is wrong with the line of a point."""
+    try:
+        scene = scene_of(setup, point, setup.study.seeds.first)
+        if setup.study.warm_up >= scene.duration - (setup.study.warm_start or 0.0):
+            yield Problem(("warm_up",), f"{setup.study.warm_up:g} given, expected less than a run takes (s)")
+        controller_of(setup, point)
+    except ConveyorError as error:
+        yield Problem(path, str(error).splitlines()[0])
+    except Exception as error:  # of a function of whoever wrote the study
+        yield Problem(path, f"{type(error).__name__}: {error}")
+
+
+def _values(name: str, parameter: Parameter) -> Iterator[tuple[Path, Any]]:
+    if parameter.values is not None:
+        yield from ((("parameters", name, "values", index), value) for index, value in enumerate(parameter.values))
+    else:
+        ends = (("low", parameter.low), ("high", parameter.high))
+        yield from ((("parameters", name, end), value) for end, value in ends)

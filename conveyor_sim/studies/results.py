@@ -1,0 +1,158 @@
+"""The table of a study, a row a run, with units, and what it is of."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.errors import StudyError
+from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, read_rows
+from conveyor_sim.studies.row import Row
+from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.version import __version__
+
+PARQUET = "results.parquet"
+METADATA = "conveyor_sim"
+"""Key of what the file says of itself."""
+FIXED_UNITS = {"simulated": "s", "dt": "s", "wall": "s", "cpu": "s"}
+MOST = 64_000_000
+"""Bytes of a file of units or of a study that are read."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """The runs of a study."""
+
+    study: str
+    """Text of its file."""
+    path: str
+    """Of its file, as the study was run."""
+    units: Mapping[str, str]
+    """By metric."""
+    parameters: Sequence[str]
+    versions: Mapping[str, str]
+    rows: Sequence[Row]
+
+    def command(self, row: Row) -> str:
+        """What makes a run again, alone."""
+        return run_command(self.path, row)
+
+
+def run_command(path: str, row: Row) -> str:
+    """What makes a run of a study file again, alone."""
+    given = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
+    return " ".join(["conveyor-sim sweep", shlex.quote(path), *given, f"--seed {row.seed}"])
+
+
+def text_of(value: Any) -> str:
+    """A value of a parameter, as YAML reads it."""
+    return json.dumps(value)
+
+
+def read_results(path: Path) -> Results:
+    """Of the folder of a study, finished or not, or of its Parquet file alone. Raises StudyError."""
+    if path.is_file():
+        return _of_parquet(path)
+    rows = read_rows(path)
+    try:
+        study = (path / SOURCE).read_text(encoding="utf-8")
+        about = json.loads((path / UNITS).read_text(encoding="utf-8"))
+        origin = json.loads((path / ORIGIN).read_text(encoding="utf-8"))
+        versions = {"conveyor_sim": __version__, "engine": origin["engine"], "sources": origin[VERSION]}
+        return Results(study, about["path"], about["units"], about["parameters"], versions, rows)
+    except (OSError, ValueError, KeyError, TypeError):
+        raise StudyError(
+            f"{path}: not the folder of a study that has begun, expected one of conveyor-sim sweep"
+        ) from None
+
+
+def write_parquet(results: Results, path: Path) -> Path:
+    """One file, readable by itself. Raises StudyError if it can't be written or pyarrow is missing."""
+    if find_spec("pyarrow") is None:
+        raise StudyError("a Parquet file: pyarrow is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    import pyarrow
+    from pyarrow import parquet
+
+    table = _table(results)
+    sink = pyarrow.BufferOutputStream()
+    parquet.write_table(table, sink)
+    try:
+        write_file(path, sink.getvalue().to_pybytes())
+    except FileError as error:
+        raise StudyError(f"{path}: {error}, expected a file to write to; all runs are kept in {path.parent}") from None
+    return path
+
+
+def _table(results: Results) -> Any:
+    import pyarrow
+
+    rows = results.rows
+    columns: dict[str, tuple[Any, str]] = {
+        "point": (pyarrow.array([row.point for row in rows], pyarrow.int64()), ""),
+        "seed": (pyarrow.array([row.seed for row in rows], pyarrow.uint64()), ""),
+    }
+    for name in results.parameters:
+        columns[name] = (pyarrow.array(_alike([row.parameters.get(name) for row in rows])), "")
+    for name, unit in results.units.items():
+        values = [row.metrics.get(name) for row in rows]
+        columns[name] = (pyarrow.array(values, pyarrow.float64()), unit)
+    for name in ("status", "error"):
+        columns[name] = (pyarrow.array([getattr(row, name) for row in rows], pyarrow.string()), "")
+    for name, unit in FIXED_UNITS.items():
+        columns[name] = (pyarrow.array([getattr(row, name) for row in rows], pyarrow.float64()), unit)
+    for name, texts in {
+        "bag": [row.bag for row in rows],
+        "command": [results.command(row) for row in rows],
+        "versions": [" ".join(f"{what}={value}" for what, value in results.versions.items())] * len(rows),
+    }.items():
+        columns[name] = (pyarrow.array(texts, pyarrow.string()), "")
+    fields = [
+        pyarrow.field(name, column.type, metadata={"unit": unit} if unit else None)
+        for name, (column, unit) in columns.items()
+    ]
+    about = {
+        "study": results.study,
+        "path": results.path,
+        "units": dict(results.units),
+        "parameters": list(results.parameters),
+        "versions": dict(results.versions),
+    }
+    schema = pyarrow.schema(fields, metadata={METADATA: json.dumps(about)})
+    return pyarrow.Table.from_arrays([column for column, _ in columns.values()], schema=schema)
+
+
+def _of_parquet(path: Path) -> Results:
+    if find_spec("pyarrow") is None:
+        raise StudyError(f"{path}: pyarrow is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    from pyarrow import ArrowException, parquet
+
+    try:
+        table = parquet.read_table(path)
+        about = json.loads(table.schema.metadata[METADATA.encode()])
+        rows = [_row(values, about) for values in table.to_pylist()]
+        return Results(about["study"], about["path"], about["units"], about["parameters"], about["versions"], rows)
+    except (ArrowException, KeyError, TypeError, ValueError, OSError):
+        raise StudyError(f"{path}: not the results of a study, expected a Parquet file of conveyor-sim sweep") from None
+
+
+def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> Row:
+    kept = ("point", "seed", "status", "error", *FIXED_UNITS, "bag")
+    finished = values["status"] == "finished"
+    return Row(
+        **{name: values[name] for name in kept},
+        parameters={name: values[name] for name in about["parameters"]},
+        metrics={name: values[name] for name in about["units"]} if finished else {},
+    )
+
+
+def _alike(values: Sequence[Any]) -> list[Any]:
+    """Values as one type has them: numbers, or else texts."""
+    kinds = {type(value) for value in values if value is not None}
+    if kinds <= {int, float} and len(kinds) > 1:
+        return [None if value is None else float(value) for value in values]
+    return list(values) if len(kinds) <= 1 else [None if value is None else str(value) for value in values]

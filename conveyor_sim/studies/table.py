@@ -1,0 +1,57 @@
+"""What a study has found so far, as a table: a line a point, the mean of each metric with its confidence interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+from conveyor_sim.statistics.intervals import CONFIDENCE, mean_interval
+from conveyor_sim.studies.row import Row
+
+LONGEST = 40
+"""Points that a table on a terminal shows; the file has all."""
+
+
+def points_table(rows: Iterable[Row], units: Mapping[str, str], longest: int = LONGEST) -> Table:
+    """Rows of any order; those of failed runs are counted apart."""
+    by_point: dict[int, list[Row]] = {}
+    for row in rows:
+        by_point.setdefault(row.point, []).append(row)
+    first = next(iter(by_point.values()), [])
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    names = list(first[0].parameters) if first else []
+    for name in names:
+        table.add_column(name)
+    table.add_column("runs", justify="right")
+    for name, unit in units.items():
+        table.add_column(f"{name} ({unit})" if unit not in ("", "1") else name, justify="right")
+    for point in sorted(by_point)[:longest]:
+        found = by_point[point]
+        finished = [row for row in found if row.status == "finished"]
+        lacking = len(found) - len(finished)
+        runs = f"{len(finished)}" + (f", {lacking} failed" if lacking else "")
+        values = [number(found[0].parameters[name]) for name in names]
+        table.add_row(*values, runs, *(spread([row.metrics[name] for row in finished]) for name in units))
+    if len(by_point) > longest:
+        table.add_row(f"and {len(by_point) - longest} more points")
+    return table
+
+
+def spread(values: Sequence[float]) -> str:
+    """Mean with the half width of its interval of CONFIDENCE."""
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return "-"
+    found = mean_interval(known, CONFIDENCE)
+    if len(known) < 2 or found.half_width == 0.0:
+        return f"{found.mean:.4g}"
+    digits = max(0, 1 - math.floor(math.log10(found.half_width)))
+    return f"{found.mean:.{digits}f} ± {found.half_width:.{digits}f}"
+
+
+def number(value: Any) -> str:
+    """A value of a parameter, short."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
