@@ -17,7 +17,7 @@ from conveyor_sim.support.garbage import collected_later
 if TYPE_CHECKING:
     from conveyor_sim.ros.node_source import NodeSource
     from conveyor_sim.scada.bag_source import BagSource
-    from conveyor_sim.scada.face import Stamps
+    from conveyor_sim.scada.face import Settings, Stamps
     from conveyor_sim.scada.scene_source import SceneSource
     from conveyor_sim.scada.serving import Serving
 
@@ -28,9 +28,11 @@ LOOK = 1.0
 PLAIN_LOOK = 10.0
 """The same where lines stay."""
 
+IN_LOCKSTEP = "in lockstep: the line stands until a client writes run/target_tick"
+
 PORT = click.IntRange(0, 65535)
 
-OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables")
+OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables", "lockstep")
 TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
 OF_BAG = ("loop",)
 
@@ -56,6 +58,7 @@ _WHERE = {
 @click.option("--bind", default="127.0.0.1", help="Address to listen on, for other machines (default: this one only).")
 @click.option("--stamps", type=click.Choice(["wall", "simulated"]), default="wall", help="What times of values are.")
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
+@click.option("--lockstep", is_flag=True, help="Of SCENE: it waits for each scan of a PLC that is a client.")
 @click.option("--loop", is_flag=True, help="Of BAG: begin anew at its end.")
 @click.option("--duration", type=float, help="Of SCENE: simulated time in s, instead of its own.")
 @click.option(
@@ -100,9 +103,12 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             source = stack.enter_context(_bag(Path(what), console, given["real_time_factor"], given["loop"]))
         else:
             _require_not_given(what, OF_BAG)
+            if given["lockstep"]:
+                _require_lockstep(settings)
             source = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
         with Serving(source, chosen, settings) as serving:
-            watch(serving, console, serving.greeting)
+            in_lockstep = [IN_LOCKSTEP] if given["lockstep"] else []
+            watch(serving, console, [*serving.greeting, *in_lockstep])
             summary = serving.summary()
     bags = getattr(source, "recordings", [])
     click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
@@ -114,12 +120,21 @@ def _is_bag(what: str) -> bool:
     return Path(what).is_dir() or Path(what).suffix in SUFFIXES
 
 
-def _require_not_given(what: str, names: Sequence[str]) -> None:
+def _require_lockstep(settings: Settings) -> None:
+    _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
+    if settings.modbus_role != "controller" and settings.opcua_users is None:
+        raise ConveyorError(
+            "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or --opcua-users "
+            "with a controller"
+        )
+
+
+def _require_not_given(what: str, names: Sequence[str], expected: str = "") -> None:
     context = click.get_current_context()
     for name in names:
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             option = name.replace("_", "-")
-            raise ConveyorError(f"--{option}: given with {what}, expected {_WHERE[name]}")
+            raise ConveyorError(f"--{option}: given with {what}, expected {expected or _WHERE[name]}")
 
 
 @contextmanager
@@ -133,8 +148,9 @@ def scene_source(
     threads: int | None,
     outside_tables: bool,
     playing: bool = True,
+    lockstep: bool = False,
 ) -> Iterator[SceneSource]:
-    """A scene, once its tags are known. playing: whether it runs at once."""
+    """A scene, once its tags are known. playing: whether it runs at once. lockstep: whether clients say how far."""
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.scada.scene_messages import Task
@@ -147,7 +163,7 @@ def scene_source(
     if not no_record:
         folder = click.get_current_context().with_resource(run_folder(out))
         require_recordable(folder)
-    with SceneSource(Task(scene, folder, 0, real_time_factor, threads, playing), console.print) as source:
+    with SceneSource(Task(scene, folder, 0, real_time_factor, threads, playing, lockstep), console.print) as source:
         source.wait_for_line()
         yield source
 

@@ -70,6 +70,11 @@ class Session:
         reached = achieved(simulation.model, self._peaks.force)
         return account if reached is None else f"{account}; {reached.sentence}"
 
+    @property
+    def to_bag(self) -> str:
+        """Where it is recorded to, as the end of a sentence; empty: it is not."""
+        return f", recorded to {self.bag}" if self.bag else ""
+
     def take_last_outcomes(self) -> list[CommandOutcome]:
         """What became of the commands of a tick that failed."""
         outcomes, self._last_outcomes = self._last_outcomes, []

@@ -47,12 +47,14 @@ class Stepper:
         real_time_factor: float,
         playing: bool,
         lockstep_max_ticks: int,
+        stepped_by: str = "",
         beat: Callable[[int, float], None],
         ended: Callable[[], object] = lambda: None,
         died: Callable[[Exception], None],
         log: Log,
     ) -> None:
         """`open_session`: opens the run with the given number of runs before it; with a Simulation, if one is given.
+        `stepped_by`: whose lockstep the run shows itself to be in, though nobody owns it; empty: in nobody's.
         `beat`: called after each tick and while idle, with the simulated time in ns and the wall time in s.
         `ended`: called at the end of each run, when its recording is complete. `died`: if the thread can't go on.
 
@@ -70,7 +72,7 @@ class Stepper:
         self.inbox = Inbox()
         self.reception = Reception(self.inbox, log.warning)
         self.guard_events = 0
-        self.lockstep = Lockstep(lockstep_max_ticks)
+        self.lockstep, self._stepped_by = Lockstep(lockstep_max_ticks), stepped_by
         self.pacer = Pacer(real_time_factor, self.session.simulation.model.tick_ns * 1e-9)
         self._advance: Advance | None = None
         self._ended = False
@@ -163,7 +165,7 @@ class Stepper:
             raise
         finally:
             refuse(broken_off, reason)
-        self._log.info(f"reset: run {self.session.run_id}" + _to_bag(self.session))
+        self._log.info(f"reset: run {self.session.run_id}" + self.session.to_bag)
 
     def save(self, path: Path, folder: Path | None = None) -> None:
         """Write a checkpoint of the present state; the path may not leave the folder. Raises CheckpointError."""
@@ -184,7 +186,7 @@ class Stepper:
         self.state = State.PAUSED
         refuse(broken_off, reason)
         tick = session.simulation.tick
-        self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + _to_bag(session))
+        self._log.info(f"loaded {printable(path)}: run {session.run_id} from tick {tick}" + session.to_bag)
         if tick >= session.last_tick:
             self._end()
 
@@ -283,7 +285,7 @@ class Stepper:
         finally:
             self._abandon("the simulation is shutting down")
             if not self._ended and self.session.simulation.tick > 0:
-                self._log.info(f"stopped, {self.session.account}" + _to_bag(self.session))
+                self._log.info(f"stopped, {self.session.account}" + self.session.to_bag)
             if not self.standstill:
                 self.failure = "the simulation is shutting down"
                 self._show_run()
@@ -364,7 +366,7 @@ class Stepper:
         self.state, self._ended = State.PAUSED, True
         self._show_run()
         self._close_recording()
-        self._log.info(f"end of the run, {self.session.account}" + _to_bag(self.session))
+        self._log.info(f"end of the run, {self.session.account}" + self.session.to_bag)
         self._tell_end()
 
     def _fail(self, error: Exception) -> None:
@@ -379,7 +381,8 @@ class Stepper:
 
     def _show_run(self) -> None:
         try:
-            self.session.outputs.show_run(run_state_of(self.state, self.failure, self._ended, self.lockstep.owner))
+            owner = self.lockstep.owner or self._stepped_by
+            self.session.outputs.show_run(run_state_of(self.state, self.failure, self._ended, owner))
         except ConveyorError as error:
             if not self.failure:
                 self._fail(error)
@@ -394,7 +397,3 @@ class Stepper:
         except ConveyorError as error:
             self.failure = str(error)
             self._log.error(f"the recording may be incomplete: {error}")
-
-
-def _to_bag(session: Session) -> str:
-    return f", recorded to {session.bag}" if session.bag else ""

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from typing import TYPE_CHECKING
 
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.inputs import Input, WriterKind
 from conveyor_sim.line.run_state import LOCKSTEP, RUN, RunState
 from conveyor_sim.scada.source import Control, TickSource
-from conveyor_sim.simulation import Simulation
+
+if TYPE_CHECKING:
+    from conveyor_sim.simulation import Simulation
 
 TICK = f"{RUN}/tick"
 """Tag: the tick that all other tags are of."""
@@ -22,8 +25,23 @@ TICK = f"{RUN}/tick"
 TARGET = f"{RUN}/target_tick"
 """Tag: to which a client has the line go on."""
 
+MAY_GO_ON: tuple[WriterKind, ...] = ("controller", "test")
+"""Who may say how far a line in lockstep goes."""
+
+HANDSHAKE = "by handshake"
+"""In whose lockstep such a run is, as it shows itself."""
+
 FURTHEST = 100_000
 """Ticks that a target may be ahead."""
+
+
+def problem(what: Control, value: float, tick: int) -> str:
+    """Why something can't be asked of a line in lockstep that is at a tick; "" if it can."""
+    if what != "target":
+        return f"{what}: the line is in lockstep, expected {TARGET} alone"
+    if not float(value).is_integer() or value > tick + FURTHEST:
+        return f"{TARGET}: {value:g} given, expected a whole number of at most {tick + FURTHEST}"
+    return ""
 
 
 class HandshakeSource(TickSource):
@@ -40,11 +58,8 @@ class HandshakeSource(TickSource):
 
     def control(self, what: Control, value: float, by: str) -> str:
         """Take a target; one that is reached, or was given before, changes nothing."""
-        if what != "target":
-            return f"{what}: the line is in lockstep, expected {TARGET} alone"
-        tick = self._shown.tick
-        if not float(value).is_integer() or value > tick + FURTHEST:
-            return f"{TARGET}: {value:g} given, expected a whole number of at most {tick + FURTHEST}"
+        if reason := problem(what, value, self._shown.tick):
+            return reason
         with self._written:
             if value > self._target:
                 self._sets.append((self._target, tuple(self._waiting)))
@@ -76,4 +91,4 @@ class HandshakeSource(TickSource):
 
     @property
     def _run(self) -> RunState:
-        return RunState(LOCKSTEP, "by handshake")
+        return RunState(LOCKSTEP, HANDSHAKE)

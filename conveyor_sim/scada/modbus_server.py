@@ -29,7 +29,7 @@ from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.hands import objection
-from conveyor_sim.scada.handshake import TARGET, TICK
+from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET, TICK
 from conveyor_sim.scada.holding import Holding
 from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
@@ -285,6 +285,8 @@ class _Image:
         ):
             return ExcCodes.DEVICE_BUSY
         in_lockstep = "target" in self._source.controls
+        if target is not None and self._role not in MAY_GO_ON:
+            return ExcCodes.ILLEGAL_FUNCTION
         if target is not None and not in_lockstep:
             return ExcCodes.DEVICE_BUSY
         # Whoever attached a PLC that goes in lockstep has said whose the line is.

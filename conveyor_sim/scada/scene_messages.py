@@ -28,6 +28,8 @@ class Task:
     threads: int | None
     playing: bool = True
     """Whether it runs at once, and does not wait to be resumed."""
+    lockstep: bool = False
+    """Whether it goes as far as it is told, and no further; `playing` counts for nothing then."""
 
 
 class Give(NamedTuple):
@@ -42,6 +44,13 @@ class Ask(NamedTuple):
     what: Control
     value: float
     by: str
+
+
+class Go(NamedTuple):
+    """Sent to a process in lockstep: a tick to go to once the one before is reached, and what acts as it sets off."""
+
+    target: int
+    inputs: Sequence[Input]
 
 
 class Copy(NamedTuple):

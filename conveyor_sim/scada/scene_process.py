@@ -24,10 +24,12 @@ from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.live.inbox import size_of
+from conveyor_sim.live.lockstep import Refused
 from conveyor_sim.live.session import Session
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.runs.compilation import Cancelled, Compilation
-from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Note, Task
+from conveyor_sim.scada.handshake import HANDSHAKE
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task
 from conveyor_sim.scada.source import MOST_EVENTS, Control
 from conveyor_sim.scada.view import HEARD
 from conveyor_sim.simulation import Simulation
@@ -47,11 +49,11 @@ FRAME = "world"
 class Copies:
     """A sink whose messages are sent by a thread of its own."""
 
-    def __init__(self, pipe: Connection) -> None:
-        """It sends from now on."""
-        self._pipe = pipe
+    def __init__(self, pipe: Connection, shortest: float) -> None:
+        """It sends from now on. shortest: s of wall time between two copies, in which it makes one of many."""
+        self._pipe, self._shortest = pipe, shortest
         self._now: dict[str, bytes] = {}
-        self._now_events: list[bytes] = []
+        self._now_events: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._states: dict[str, bytes] = {}
         self._events: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._others: deque[Note | Failed] = deque(maxlen=MOST_NOTES)
@@ -84,7 +86,15 @@ class Copies:
                 self._events += self._now_events
                 self._counts, self._new = counts, True
                 self._wake.notify()
-        self._now, self._now_events = {}, []
+        self._now = {}
+        self._now_events.clear()
+
+    def live(self) -> None:
+        """Nothing is to be shown yet, but it is at work. By the stepping thread."""
+        with self._wake:
+            if time.monotonic() > self._sent + LIFE_SIGN:
+                self._new = True
+                self._wake.notify()
 
     def tell(self, other: Note | Failed) -> None:
         """Send something else. From any thread."""
@@ -116,7 +126,7 @@ class Copies:
                     self._pipe.send(other)
                 if done:
                     return
-                time.sleep(SHORTEST)
+                time.sleep(self._shortest)
 
 
 class _Log:
@@ -139,10 +149,12 @@ class _Process:
 
     def __init__(self, pipe: Connection, task: Task, stop: StopRequest) -> None:
         self._pipe, self._task, self._stop = pipe, task, stop
-        self._copies = Copies(pipe)
+        self._copies = Copies(pipe, 0.0 if task.lockstep else SHORTEST)
         self._compilation = Compilation(task.scene, lambda sentence: self._copies.tell(Note(sentence)))
         self._stepper: Stepper | None = None
         self._handed = 0
+        self._goals: deque[Go] = deque()
+        self._goal: Go | None = None  # where the line is on its way to
         self._shown = ("", -1)  # run and tick of the signals that were copied last
 
     def run(self) -> None:
@@ -173,8 +185,9 @@ class _Process:
         return Stepper(
             open_session,
             real_time_factor=task.real_time_factor,
-            playing=task.playing,
+            playing=task.playing and not task.lockstep,
             lockstep_max_ticks=1,
+            stepped_by=HANDSHAKE if task.lockstep else "",
             beat=lambda stamp_ns, now: self._beat(),
             died=self._fail,
             log=_Log(self._copies),
@@ -184,6 +197,9 @@ class _Process:
         if (stepper := self._stepper) is None:
             return
         simulation = stepper.simulation
+        if self._goal is not None and simulation.tick < self._goal.target and not stepper.standstill:
+            self._copies.live()  # nobody sees a tick before the target
+            return
         if self._shown != (now := (stepper.run_id, simulation.tick)):
             self._shown = now
             header = Header(simulation.tick, simulation.stamp_ns, FRAME)
@@ -205,7 +221,7 @@ class _Process:
         time.sleep(PATIENCE)
         os._exit(1)
 
-    def _do(self, request: Give | Ask) -> None:
+    def _do(self, request: Give | Go | Ask) -> None:
         stepper = self._stepper
         if stepper is None:  # nobody knows the line yet
             return
@@ -214,6 +230,10 @@ class _Process:
                 stepper.inbox.receive()
             stepper.give(request.given, size_of(request.given))
             self._handed += 1
+            return
+        if isinstance(request, Go):
+            self._goals.append(request)
+            stepper.call(self._set_off)
             return
         what, value, by = request
         todo: Mapping[Control, Any] = {
@@ -230,6 +250,29 @@ class _Process:
             self._copies.tell(Note(told) if error is None else Note(f"{told}, refused: {error}", bad=True))
 
         stepper.call(todo[what]).add_done_callback(done)
+
+    def _set_off(self) -> None:
+        """Towards the next target, once the one before is reached. By the stepping thread."""
+        if (stepper := self._stepper) is None or self._goal is not None or not self._goals:
+            return
+        goal = self._goals.popleft()
+        try:
+            reached = stepper.step(goal.target - stepper.simulation.tick)
+        except Refused:  # it stands for good, and its state says why
+            return
+        self._goal = goal
+        for given in goal.inputs:
+            size = size_of(given)
+            if given.operation == SET:
+                stepper.inbox.receive()
+            stepper.inbox.occupy(1, size)
+            stepper.reception.hand_over(stepper.session, given, size)
+
+        def arrived(_: Future[None]) -> None:
+            self._goal = None
+            self._set_off()
+
+        reached.add_done_callback(arrived)
 
 
 def main() -> None:

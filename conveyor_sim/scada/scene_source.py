@@ -21,9 +21,13 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
-from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Note, Task
+from conveyor_sim.scada.handshake import TARGET, problem
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task
 from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import HEARD, View
+
+RUNNING_FREE: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
+IN_LOCKSTEP: frozenset[Control] = frozenset({"target"})
 
 SILENCE = 5.0
 """s of wall time without a sign of life after which what is shown is stale."""
@@ -39,8 +43,6 @@ CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.scada.scene_proces
 class SceneSource(View, AbstractContextManager["SceneSource"]):
     """Simulated from its start until close(). If its process dies, another one begins the scene anew."""
 
-    controls: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
-
     def __init__(self, task: Task, say: Callable[[str], object]) -> None:
         """say: called with a sentence whenever there is something to tell people, by a thread of this source.
 
@@ -52,7 +54,9 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         self._failure = ""  # why there is nothing to wait for
         self._lock = threading.Lock()
         self._given = self._handed = self._waiting = 0
-        self._requests: SimpleQueue[Task | Give | Ask | None] = SimpleQueue()
+        self._target = 0  # in lockstep: up to which tick it goes
+        self._set: list[Input] = []  # that acts with the next target
+        self._requests: SimpleQueue[Task | Give | Go | Ask | None] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._thread = threading.Thread(target=self._supervise, name="scene", daemon=True)
@@ -66,6 +70,11 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         while not self.wait(LOOK):
             if self._failure:
                 raise ConveyorError(self._failure)
+
+    @property
+    def controls(self) -> frozenset[Control]:
+        """What `control` can do here."""
+        return IN_LOCKSTEP if self._task.lockstep else RUNNING_FREE
 
     @property
     def pid(self) -> int:
@@ -83,10 +92,17 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         return found
 
     def give(self, given: Input) -> str:
-        """Have an input judged and applied as the next tick begins. Why it can't wait for that, "" if it does."""
+        """Have an input judged and applied as the next tick begins, in lockstep with the next target. Why it can't wait
+        for that, "" if it does.
+        """
         if reason := self._objection(given):
             return reason
         with self._lock:
+            if self._task.lockstep:
+                if len(self._set) >= MOST_WAITING:
+                    return f"{MOST_WAITING} inputs wait for the next {TARGET} already"
+                self._set.append(given)
+                return ""
             if self._given - self._handed + self._waiting >= MOST_WAITING:
                 return f"{MOST_WAITING} inputs wait for the next tick already"
             self._given += 1
@@ -96,6 +112,8 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
     def control(self, what: Control, value: float, by: str) -> str:
         """Ask something of the run, in the name of somebody. Why that can't be, "" if it will be done."""
         shown = self.shown
+        if self._task.lockstep:
+            return self._go(what, value)
         if what not in self.controls:
             return f"{what}: expected one of {', '.join(sorted(self.controls))} of a scene that is simulated"
         if shown.lost:
@@ -112,6 +130,22 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
             if self._requests.qsize() >= 2 * MOST_WAITING:  # beside inputs, which may wait as long as it is paused
                 return f"{MOST_WAITING} requests wait already"
             self._requests.put(Ask(what, value, by))
+        return ""
+
+    def _go(self, what: Control, value: float) -> str:
+        """Take a target with all that was given before it; one that was given before changes nothing."""
+        shown, last = self.shown, self._task.scene.duration_ticks
+        if reason := problem(what, value, shown.tick) or shown.lost:
+            return reason
+        if value > last:
+            return f"{TARGET}: {value:g} given, expected at most {last}, the end of the run"
+        if shown.run.state == STOPPED:
+            return "the run has stopped, expected a reset"
+        with self._lock:
+            if value > self._target:
+                self._target = int(value)
+                self._requests.put(Go(self._target, tuple(self._set)))
+                self._set.clear()
         return ""
 
     def close(self) -> None:
@@ -165,7 +199,8 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
             with self._lock:
                 if self._closing:
                     return ENDED_HERE
-                self._given = self._handed = self._waiting = 0
+                self._given = self._handed = self._waiting = self._target = 0
+                self._set.clear()
                 self._requests = SimpleQueue()
                 self._requests.put(replace(self._task, number=len(self.recordings)))
                 # A session of its own: Ctrl-C at the terminal is this process's affair.

@@ -13,11 +13,12 @@ from scada.waiting import until
 from scenes import MASS, NO_FLOOR, RADIUS, bottle, contact, segment
 from scenes import scene as bottle_scene
 
+from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
-from conveyor_sim.line.run_state import ENDED, PAUSED, RUNNING, STOPPED
+from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPED
 from conveyor_sim.scada.scene_messages import Task
 from conveyor_sim.scada.scene_source import SceneSource
 from conveyor_sim.scada.source import MOST_WAITING, Shown
@@ -37,8 +38,10 @@ class Served:
         self.sources: list[SceneSource] = []
         self.said: list[str] = []
 
-    def __call__(self, scene: Scene | None = None, record: Path | None = None, factor: float = 1.0) -> SceneSource:
-        source = SceneSource(Task(scene or zoned(), record, 0, factor, 1), self.said.append)
+    def __call__(
+        self, scene: Scene | None = None, record: Path | None = None, factor: float = 1.0, lockstep: bool = False
+    ) -> SceneSource:
+        source = SceneSource(Task(scene or zoned(), record, 0, factor, 1, lockstep=lockstep), self.said.append)
         self.sources.append(source)
         source.wait_for_line()
         return source
@@ -134,6 +137,35 @@ def test_pause_step_resume_reset(served: Served, tmp_path: Path) -> None:
     source.close()
     assert source.recordings == [tmp_path / "bag", tmp_path / "bag_1"]
     assert all(replay(bag).difference is None for bag in source.recordings)
+
+
+def test_in_lockstep_time_passes_up_to_the_target_with_what_was_written_before_it(
+    served: Served, tmp_path: Path
+) -> None:
+    source = served(zoned(duration=0.1), record=tmp_path / "bag", lockstep=True)
+    seen: list[tuple[int, float]] = []
+    source.listen(lambda: seen.append((source.shown.tick, source.shown.values[SETPOINT])))
+    assert (source.shown.tick, source.shown.run.state, source.shown.run.reason) == (0, LOCKSTEP, "by handshake")
+    assert source.give(setpoint(0.1)) == "" == source.control("target", 4, "a test")
+    assert source.give(setpoint(0.2)) == "" == source.control("target", 4, "a test")  # which changes nothing
+    until(lambda: source.shown.tick == 4, "the target")
+    assert source.shown.values[SETPOINT] == 0.1
+    assert source.control("target", 6, "a test") == "" == source.give(setpoint(0.3))
+    assert source.control("target", 9, "a test") == ""  # before the line is at 6
+    until(lambda: source.shown.tick == 9, "the last target")
+    assert {tick for tick, _ in seen} <= {0, 4, 6, 9}
+    assert {value for tick, value in seen if tick == 6} <= {0.2}
+    assert source.shown.values[SETPOINT] == 0.3
+    assert "expected at most 10, the end of the run" in source.control("target", 11, "a test")
+    assert "expected run/target_tick alone" in source.control("pause", 0, "a test")
+    assert source.control("target", 10, "a test") == ""
+    until(lambda: source.shown.run.state == ENDED, "the end")
+    assert source.shown.tick == 10
+    source.close()
+    with open_bag(tmp_path / "bag") as bag:
+        acted = [(frame.tick, frame.data.values) for frame in bag.outcomes() if frame.data.names == (SETPOINT,)]
+    assert acted == [(0, (0.1,)), (4, (0.2,)), (6, (0.3,))]
+    assert replay(tmp_path / "bag").difference is None
 
 
 def test_the_end_of_the_scene_is_shown_and_a_reset_leads_on(served: Served) -> None:

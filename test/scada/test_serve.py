@@ -6,12 +6,11 @@ import os
 import re
 import signal
 import socket
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from scada.served import Served
 from scada.waiting import PATIENCE, until
 
 from conveyor_sim.bag.reader import open_bag
@@ -24,57 +23,6 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 from pymodbus.client import ModbusTcpClient
 
 SCENE = "scenarios/zoned_line"
-COMMAND = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "serve"]
-
-
-class Served:
-    """One `conveyor-sim serve`."""
-
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        self._log = folder / "log"
-        with self._log.open("w") as log:
-            self.process = subprocess.Popen(
-                [*COMMAND, *arguments],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                text=True,
-            )
-
-    @property
-    def told(self) -> str:
-        return self._log.read_text()
-
-    @property
-    def port(self) -> int:
-        """Of Modbus, once it listens."""
-        pattern = r"modbus://127\.0\.0\.1:(\d+)"
-        until(lambda: re.search(pattern, self.told) or self.process.poll() is not None, "the server")
-        found = re.search(pattern, self.told)
-        assert found, self.told
-        return int(found.group(1))
-
-    def end(self, number: int = signal.SIGINT) -> str:
-        """What it printed, after a signal."""
-        self.process.send_signal(number)
-        return self.process.communicate(timeout=PATIENCE)[0]
-
-
-@pytest.fixture
-def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
-    """Starts it in a folder of its own; what is left of it is ended."""
-    started: list[Served] = []
-
-    def start(*arguments: str) -> Served:
-        started.append(Served(tmp_path, *arguments))
-        return started[-1]
-
-    yield start
-    for one in started:
-        if one.process.poll() is None:
-            one.process.kill()
-            one.process.wait()
 
 
 def speed_of(client: ModbusTcpClient) -> float | None:
@@ -86,18 +34,18 @@ def speed_of(client: ModbusTcpClient) -> float | None:
     return None if answer.isError() else float(client.convert_from_registers(answer.registers, client.DATATYPE.FLOAT32))
 
 
-def command(client: ModbusTcpClient, value: float) -> None:
+def give(client: ModbusTcpClient, value: float) -> None:
     answer = client.write_registers(0, client.convert_to_registers(value, client.DATATYPE.FLOAT32))
     assert not answer.isError(), answer
 
 
 def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
-    serve: Callable[..., Served], tmp_path: Path
+    command: Callable[..., Served], tmp_path: Path
 ) -> None:
-    served = serve(SCENE, "--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--out", "bag")
+    served = command(SCENE, "--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--out", "bag")
     with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
-        command(client, 0.25)
+        give(client, 0.25)
         until(lambda: speed_of(client) == 0.25, "the speed")
     assert "clients can read all, and write as controller" in served.told
     out = served.end()
@@ -112,12 +60,12 @@ def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
     assert len(writers) == 1 and next(iter(writers)).startswith("modbus 127.0.0.1:")
 
 
-def test_a_recording_is_served(serve: Callable[..., Served], tmp_path: Path) -> None:
-    first = serve(SCENE, "--modbus", "0", "--out", "bag", "--duration", "2", "--real-time-factor", "0")
+def test_a_recording_is_served(command: Callable[..., Served], tmp_path: Path) -> None:
+    first = command(SCENE, "--modbus", "0", "--out", "bag", "--duration", "2", "--real-time-factor", "0")
     with ModbusTcpClient("127.0.0.1", port=first.port, timeout=20) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
     assert "recorded to bag" in first.end()
-    second = serve("bag", "--modbus", "0", "--loop")
+    second = command("bag", "--modbus", "0", "--loop")
     with ModbusTcpClient("127.0.0.1", port=second.port, timeout=20) as client:
         until(lambda: speed_of(client) == 0.5, "the recording")
         assert client.write_coil(0, True).exception_code == 1
@@ -126,9 +74,9 @@ def test_a_recording_is_served(serve: Callable[..., Served], tmp_path: Path) -> 
 
 
 def test_a_server_that_is_killed_leaves_a_whole_recording_and_its_port(
-    serve: Callable[..., Served], tmp_path: Path
+    command: Callable[..., Served], tmp_path: Path
 ) -> None:
-    served = serve(SCENE, "--modbus", "0", "--out", "bag")
+    served = command(SCENE, "--modbus", "0", "--out", "bag")
     port = served.port
     with ModbusTcpClient("127.0.0.1", port=port, timeout=2, retries=0) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
@@ -143,12 +91,12 @@ def test_a_server_that_is_killed_leaves_a_whole_recording_and_its_port(
             return True
 
         until(is_whole, "the end of the recording by the process that simulates")
-        serve(SCENE, "--modbus", str(port), "--no-record")
+        command(SCENE, "--modbus", str(port), "--no-record")
         until(lambda: speed_of(client) == 0.5, "the other server")
 
 
-def test_the_process_that_simulates_may_die(serve: Callable[..., Served], tmp_path: Path) -> None:
-    served = serve(SCENE, "--modbus", "0", "--out", "bag")
+def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_path: Path) -> None:
+    served = command(SCENE, "--modbus", "0", "--out", "bag")
     with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
         tasks = Path(f"/proc/{served.process.pid}/task").glob("*/children")
@@ -180,8 +128,8 @@ def test_the_process_that_simulates_may_die(serve: Callable[..., Served], tmp_pa
         ),
     ],
 )
-def test_what_can_not_be_is_one_sentence(serve: Callable[..., Served], arguments: list[str], sentence: str) -> None:
-    served = serve(*arguments)
+def test_what_can_not_be_is_one_sentence(command: Callable[..., Served], arguments: list[str], sentence: str) -> None:
+    served = command(*arguments)
     served.process.communicate(timeout=PATIENCE)
     assert served.process.returncode == 1
     (error,) = [line for line in served.told.splitlines() if line.startswith("Error: ")]
@@ -189,10 +137,10 @@ def test_what_can_not_be_is_one_sentence(serve: Callable[..., Served], arguments
     assert "Traceback" not in served.told
 
 
-def test_a_port_that_is_taken_leaves_nothing_behind(serve: Callable[..., Served], tmp_path: Path) -> None:
+def test_a_port_that_is_taken_leaves_nothing_behind(command: Callable[..., Served], tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        served = serve(SCENE, "--modbus", str(port))
+        served = command(SCENE, "--modbus", str(port))
         served.process.communicate(timeout=PATIENCE)
     assert served.process.returncode == 1
     assert f"Error: modbus: 127.0.0.1:{port} can't be listened on" in served.told

@@ -17,7 +17,7 @@ from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.scada.hands import is_mode, objection
-from conveyor_sim.scada.handshake import TARGET
+from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET
 from conveyor_sim.scada.opcua.nodes import name_of
 from conveyor_sim.scada.opcua.values import type_of
 from conveyor_sim.scada.source import OPCUA, Control, TagSource
@@ -29,9 +29,6 @@ TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
 
 MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
 """Who may pause a run, have it go on, and so on."""
-
-MAY_GO_ON: tuple[WriterKind, ...] = ("controller", "test")
-"""Who may say how far a line in lockstep goes."""
 
 
 @dataclass
