@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, read_rows
+from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, VERSION, read_rows
 from conveyor_sim.studies.row import Row
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.version import __version__
