@@ -19,7 +19,7 @@ with while_importing():
     from conveyor_sim.cli.run import run
     from conveyor_sim.cli.scenes import check, explain, tags
     from conveyor_sim.cli.serve import serve
-    from conveyor_sim.cli.studies import sweep
+    from conveyor_sim.cli.studies import study_, sweep
     from conveyor_sim.cli.user import user
     from conveyor_sim.cli.view import view
     from conveyor_sim.errors import ConveyorError
@@ -59,6 +59,6 @@ def main(context: click.Context) -> None:
 
 for command in (
     check, tags, explain, run, serve, attach, user, accuracy, recover, replay, events, report, plot, view,
-    sweep,
+    sweep, study_,
 ):  # fmt: skip
     main.add_command(command)

@@ -110,3 +110,32 @@ def _alone(setup: Setup, given: tuple[str, ...], seed: int, record: Path | None)
         click.echo(f"{name}: {value!r}")
     if record is not None:
         click.echo(f"recorded to {record}")
+
+
+@click.command("study")
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: `pictures` beside it).")
+@click.option("--sobol", is_flag=True, help="Sobol indices, too, of a study with design: saltelli.")
+@click.option("--no-pictures", is_flag=True, help="Print only.")
+def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> None:
+    """Print and draw what a study has found.
+
+    RESULTS is its folder, finished or not, or its Parquet file.
+    """
+    with collected_later():
+        from conveyor_sim.runs.report import plot_function
+        from conveyor_sim.studies.effects import indices, interactions, main_effects, maps
+        from conveyor_sim.studies.results import read_results
+        from conveyor_sim.studies.table import points_table
+
+    found = read_results(results)
+    if not any(row.status == "finished" for row in found.rows):
+        raise ConveyorError(f"{results}: none of its {len(found.rows)} runs has finished, expected one at least")
+    show(points_table(found.rows, found.units))
+    plot_study = None if no_pictures else plot_function("plot_study")
+    shares = indices(found) if sobol else []
+    if plot_study is not None:
+        pairs = {metric: panels for metric in found.units if (panels := interactions(found, metric))}
+        place = out or (results if results.is_dir() else results.parent) / "pictures"
+        for picture in plot_study(found.name, main_effects(found), pairs, maps(found), shares, place):
+            click.echo(picture)

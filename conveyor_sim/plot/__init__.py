@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from conveyor_sim.accuracy.results import Study
     from conveyor_sim.observe.production import Production
+    from conveyor_sim.plot.responses import Indices, Map, Response
     from conveyor_sim.scene import Scene
 
-__all__ = ["plot_accuracy", "plot_bag", "plot_production", "plot_scene"]
+__all__ = ["plot_accuracy", "plot_bag", "plot_production", "plot_scene", "plot_study"]
 
 # Each imports what it draws with: a process that draws a recording needs no kernels, which studies do.
 
@@ -95,3 +96,30 @@ def plot_scene(scene: Scene, path: str | Path) -> Path:
     stem = path.with_suffix("") if path.suffix in (".png", ".svg") else path
     with style.look():
         return style.save(scene_figure(Plant.of(scene), Frame.start_of(scene), scene.name), stem)[0]
+
+
+def plot_study(
+    name: str,
+    effects: Sequence[Sequence[Sequence[Response]]],
+    interactions: Mapping[str, Sequence[Sequence[Sequence[Response]]]],
+    maps: Mapping[str, Map],
+    indices: Sequence[Indices],
+    out_dir: str | Path,
+) -> list[Path]:
+    """Draw what a study found; returns the files written.
+
+    `response` shows each metric over each parameter, `interactions_<metric>` over each pair of them, `map_<metric>`
+    over both of two, `indices` the Sobol indices; a picture of nothing is left out.
+    Raises ConveyorError if the files can't be written.
+    """
+    from conveyor_sim.plot import style
+    from conveyor_sim.plot.responses import indices_figure, map_figure, responses_figure
+
+    with style.look():
+        figures = {"response": responses_figure(effects, name)}
+        for metric, panels in interactions.items():
+            figures[f"interactions_{metric}"] = responses_figure(panels, f"{name}: interactions")
+        figures |= {f"map_{metric}": map_figure(found, name) for metric, found in maps.items()}
+        if indices:
+            figures["indices"] = indices_figure(indices, f"{name}: Sobol indices")
+        return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]

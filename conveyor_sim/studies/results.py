@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_sim.errors import StudyError
+from conveyor_sim.scene import parse_overrides
 from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, VERSION, read_rows
 from conveyor_sim.studies.row import Row
 from conveyor_sim.support.files import FileError, write_file
@@ -37,6 +38,11 @@ class Results:
     parameters: Sequence[str]
     versions: Mapping[str, str]
     rows: Sequence[Row]
+
+    @property
+    def name(self) -> str:
+        """Of the study."""
+        return str(parse_overrides(self.study).get("name", ""))
 
     def command(self, row: Row) -> str:
         """What makes a run again, alone."""

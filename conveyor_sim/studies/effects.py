@@ -1,0 +1,150 @@
+"""Metrics against parameters: means over seeds and points, main effects, interactions, Sobol indices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from conveyor_sim.errors import StudyError
+from conveyor_sim.plot.responses import Indices, Map, Response, level_text
+from conveyor_sim.scene import parse_overrides
+from conveyor_sim.statistics.intervals import mean_interval
+from conveyor_sim.studies.design import salib_problem
+from conveyor_sim.studies.results import Results
+from conveyor_sim.studies.row import Row
+
+MOST_LEVELS = 40
+"""Of a parameter; with more its points lie anywhere, and none is run at the same value as another."""
+
+
+def main_effects(results: Results) -> list[list[list[Response]]]:
+    """By metric, then by parameter: the mean at each of its levels, over all else."""
+    return [[[response(results, parameter, metric)] for parameter in results.parameters] for metric in results.units]
+
+
+def interactions(results: Results, metric: str) -> list[list[list[Response]]]:
+    """A row a pair of parameters: the metric over the first one, a line for each level of the other, and vice versa."""
+    panels = []
+    for pair in combinations(_levelled(results), 2):
+        panels.append([_lines(results, metric, *pair), _lines(results, metric, *pair[::-1])])
+    return panels
+
+
+def maps(results: Results) -> dict[str, Map]:
+    """Of a study with two parameters that have levels: each metric over both."""
+    if len(results.parameters) != 2 or len(_levelled(results)) != 2:
+        return {}
+    one, other = results.parameters
+    levels = levels_of(results.rows, one), levels_of(results.rows, other)
+    found = {}
+    for metric in results.units:
+        cells = [
+            [_mean(_values(_at(_at(results.rows, one, level), other, also), metric)) for also in levels[1]]
+            for level in levels[0]
+        ]
+        found[metric] = Map((one, other), titled(results, metric), levels, np.array(cells))
+    return found
+
+
+def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] | None = None) -> Response:
+    """A metric over the levels of a parameter.
+
+    All points have the same seeds, so runs of one seed go together: its mean over the points at a level is one value,
+    and the interval rests on as many as there are seeds.
+    """
+    rows = results.rows if rows is None else rows
+    title = titled(results, metric)
+    if parameter not in _levelled(results):
+        points = sorted({row.point: row.parameters[parameter] for row in rows}.items(), key=lambda pair: pair[1])
+        means = [_mean(_values([row for row in rows if row.point == point], metric)) for point, _ in points]
+        levels = [level for _, level in points]
+        return Response(parameter, title, levels, np.array(means), np.full(len(means), math.nan), scattered=True)
+    levels = levels_of(rows, parameter)
+    means, halves = [], []
+    for level in levels:
+        by_seed: dict[int, list[float]] = {}
+        for row in _at(rows, parameter, level):
+            if row.status == "finished" and math.isfinite(row.metrics[metric]):
+                by_seed.setdefault(row.seed, []).append(row.metrics[metric])
+        values = [_mean(found) for found in by_seed.values()]
+        means.append(_mean(values))
+        halves.append(mean_interval(values).half_width if len(values) > 1 else math.nan)
+    return Response(parameter, title, levels, np.array(means), np.array(halves))
+
+
+def indices(results: Results) -> list[Indices]:
+    """First and total Sobol indices of each metric (Saltelli 2010, Jansen 1999, as SALib has them).
+
+    Raises StudyError for a study of another design, with runs missing, or without SALib.
+    """
+    study = parse_overrides(results.study)
+    if study.get("design") != "saltelli":
+        raise StudyError("Sobol indices: the study's design is another, expected design: saltelli")
+    if find_spec("SALib") is None:
+        raise StudyError("Sobol indices: SALib is not installed, expected it (pip install 'conveyor_sim[studies]')")
+    from SALib.analyze import sobol
+
+    names = list(results.parameters)
+    points = int(study["points"]) * (len(names) + 2)
+    found = []
+    for metric in results.units:
+        by_point: dict[int, list[Row]] = {}
+        for row in results.rows:
+            by_point.setdefault(row.point, []).append(row)
+        outcome = np.array([_mean(_values(by_point.get(point, []), metric)) for point in range(points)])
+        if missing := int(np.count_nonzero(~np.isfinite(outcome))):
+            raise StudyError(f"Sobol indices: {missing} of {points} points have no {metric}, expected one of each")
+        if outcome.std() == 0.0:
+            continue  # nothing to share out
+        shares = sobol.analyze(salib_problem(names), outcome, calc_second_order=False, seed=0)
+        columns = [np.asarray(shares[key]) for key in ("S1", "S1_conf", "ST", "ST_conf")]
+        found.append(Indices(titled(results, metric), names, *columns))
+    return found
+
+
+def titled(results: Results, metric: str) -> str:
+    """A metric with its unit."""
+    unit = results.units[metric]
+    return metric if unit in ("", "1") else f"{metric} ({unit})"
+
+
+def levels_of(rows: Iterable[Row], parameter: str) -> list[Any]:
+    """Numbers in rising order; with texts among them in the order of the points."""
+    found = list(dict.fromkeys(row.parameters[parameter] for row in sorted(rows, key=lambda row: row.point)))
+    numbers = all(isinstance(level, (int, float)) and not isinstance(level, bool) for level in found)
+    return sorted(found) if numbers else found
+
+
+def _levelled(results: Results) -> list[str]:
+    """The parameters at whose values several points were run, or that have few."""
+    points = len({row.point for row in results.rows})
+    levels = {name: len(levels_of(results.rows, name)) for name in results.parameters}
+    few = len(results.parameters) == 1
+    return [name for name, count in levels.items() if count <= MOST_LEVELS and (few or count < points)]
+
+
+def _lines(results: Results, metric: str, across: str, other: str) -> list[Response]:
+    lines = []
+    for level in levels_of(results.rows, other):
+        found = response(results, across, metric, _at(results.rows, other, level))
+        label = f"{other} {level_text(level)}"
+        lines.append(Response(across, found.metric, found.levels, found.mean, found.half_width, label))
+    return lines
+
+
+def _at(rows: Iterable[Row], parameter: str, level: Any) -> list[Row]:
+    return [row for row in rows if row.parameters[parameter] == level]
+
+
+def _values(rows: Iterable[Row], metric: str) -> list[float]:
+    return [row.metrics[metric] for row in rows if row.status == "finished"]
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if math.isfinite(value)]
+    return math.fsum(known) / len(known) if known else math.nan
