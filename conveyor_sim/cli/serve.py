@@ -36,6 +36,16 @@ OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables", "lockst
 TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
 OF_BAG = ("loop",)
 
+OF_FACES = (
+    "modbus_role",
+    "modbus_map",
+    "users",
+    "anonymous",
+    "opcua_certificates",
+    "opcua_history",
+    "web_certificates",
+)
+
 _WHERE = {
     **dict.fromkeys(OF_SCENE, "it with a scene only"),
     "loop": "it with a bag only",
@@ -48,13 +58,27 @@ _WHERE = {
 @click.argument("what", required=False, metavar="[SCENE|BAG]")
 @click.option("--node", is_flag=False, flag_value="", metavar="[NAMESPACE]", help="Serve the line of a ROS 2 node.")
 @click.option("--opcua", type=PORT, is_flag=False, flag_value=4840, help="Serve OPC UA on this port.")
-@click.option("--opcua-users", type=click.Path(path_type=Path), help="File of its users, who may do more than read.")
 @click.option("--opcua-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
-@click.option("--opcua-anonymous/--no-opcua-anonymous", default=True, help="Whether all may read (default: they may).")
 @click.option("--opcua-history", multiple=True, metavar="PATTERN", help="Tags to keep values of: 'belts/*/speed'.")
 @click.option("--modbus", type=PORT, is_flag=False, flag_value=5020, help="Serve Modbus TCP on this port.")
 @click.option("--modbus-role", type=click.Choice(["controller", "operator"]), help="As what its clients may write.")
 @click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")
+@click.option("--web", type=PORT, is_flag=False, flag_value=8080, help="Serve a page for browsers on this port.")
+@click.option("--web-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
+@click.option(
+    "--users",
+    "--opcua-users",
+    "users",
+    type=click.Path(path_type=Path),
+    help="File of those who may do more than read by OPC UA and on the page.",
+)
+@click.option(
+    "--anonymous/--no-anonymous",
+    "--opcua-anonymous/--no-opcua-anonymous",
+    "anonymous",
+    default=True,
+    help="Whether all may read there (default: they may).",
+)
 @click.option("--bind", default="127.0.0.1", help="Address to listen on, for other machines (default: this one only).")
 @click.option("--stamps", type=click.Choice(["wall", "simulated"]), default="wall", help="What times of values are.")
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
@@ -72,11 +96,11 @@ _WHERE = {
 @click.option("--threads", type=click.IntRange(1), help="Of SCENE: threads to step with.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
-    """Serve a line to SCADA systems, HMIs and PLCs.
+    """Serve a line to SCADA systems, HMIs, PLCs and browsers.
 
     SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node it is the
-    line that a running node simulates. Without the option of any protocol, all that are installed are served, each on
-    its port. Ctrl-C ends it.
+    line that a running node simulates. Without --opcua, --modbus and --web, OPC UA and Modbus are served, each on its
+    port. Ctrl-C ends it.
     """
     with collected_later():
         from conveyor_sim.scada.face import Settings, require_free
@@ -85,19 +109,18 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     chosen = [(kind, port) for kind in FACES if (port := given[kind.name]) is not None]
-    chosen = chosen or [(kind, kind.port) for kind in FACES if kind.installed]
+    chosen = chosen or [(kind, kind.port) for kind in FACES if kind.by_default and kind.installed]
     for kind, _ in chosen or [(FACES[0], 0)]:
         kind.require()
     for kind, port in chosen:
         require_free(kind.name, bind, port)  # not only once everything has been compiled
-    of_faces = ("modbus_role", "modbus_map", "opcua_users", "opcua_anonymous", "opcua_certificates", "opcua_history")
-    settings = Settings(bind, stamps, **{name: given[name] for name in of_faces})
+    settings = Settings(bind, stamps, **{name: given[name] for name in OF_FACES})
     with ExitStack() as stack:
         if (what is None) == (node is None):
             raise ConveyorError("serve: expected one of SCENE, BAG and --node")
         if what is None:
             _require_not_given("--node", (*OF_SCENE, *OF_BAG, "real_time_factor"))
-            source: Source = stack.enter_context(_node(node or "", console))
+            source: Source = stack.enter_context(_node(node or "", console, given["web"] is not None))
         elif _is_bag(what):
             _require_not_given(what, (*OF_SCENE, "modbus_role"))
             source = stack.enter_context(_bag(Path(what), console, given["real_time_factor"], given["loop"]))
@@ -122,7 +145,7 @@ def _is_bag(what: str) -> bool:
 
 def _require_lockstep(settings: Settings) -> None:
     _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
-    if settings.modbus_role != "controller" and settings.opcua_users is None:
+    if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
             "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or --opcua-users "
             "with a controller"
@@ -175,8 +198,8 @@ def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagSource:
 
 
 @contextmanager
-def _node(namespace: str, console: Console) -> Iterator[NodeSource]:
-    """A node's line, once its tags are known."""
+def _node(namespace: str, console: Console, drawn: bool) -> Iterator[NodeSource]:
+    """A node's line, once its tags are known. drawn: whether a page shows it."""
     try:
         from conveyor_sim.ros.node_source import NodeSource
     except ImportError as error:
@@ -184,7 +207,7 @@ def _node(namespace: str, console: Console) -> Iterator[NodeSource]:
             f"serve --node: {error}, expected ROS 2 with rclpy and conveyor_msgs: source it, or run in the environment "
             "that `make` sets up"
         ) from error
-    with NodeSource(console.print, namespace) as source:
+    with NodeSource(console.print, namespace, drawn) as source:
         with console.status("waiting for the line of a node, and for its first tick"):
             while not source.wait(LOOK):
                 pass

@@ -1,4 +1,4 @@
-"""The command user: an entry in the file of those who may do more than read over OPC UA."""
+"""The command user: an entry in the file of those who may do more than read by OPC UA and on the page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROLES = ("viewer", "operator", "engineer", "controller", "test")
 def user(file: Path, name: str, role: Role, password: str) -> None:
     """Add a user to FILE, or give NAME another role and password.
 
-    FILE is for `conveyor-sim serve --opcua-users`. It has hashes of passwords; a line that is deleted is a user less.
+    FILE is for `conveyor-sim serve --users`. It has hashes of passwords; a line that is deleted is a user less.
     """
     from conveyor_sim.scada.users import keep_user, new_user
 

@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any
 
 from conveyor_msgs import srv
@@ -24,7 +25,7 @@ from conveyor_sim.ros.direct import Aside, WaitSet, take_message
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.scada.source import MOST_WAITING, Control
-from conveyor_sim.scada.view import HEARD, View, ViewError
+from conveyor_sim.scada.view import DRAWN, HEARD, View, ViewError
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LOOK = 1.0
@@ -39,8 +40,9 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
 
     controls: frozenset[Control] = frozenset({"pause", "resume", "step", "reset"})
 
-    def __init__(self, say: Callable[[str], object], namespace: str = "") -> None:
+    def __init__(self, say: Callable[[str], object], namespace: str = "", drawn: bool = False) -> None:
         """say: called with a sentence for people, by a thread of this source. namespace: of the node.
+        drawn: whether a page shows it, for which the node has more to publish.
 
         Raises ConveyorError if ROS can't start.
         """
@@ -61,7 +63,7 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
                     callback_group=Aside(),
                     raw=True,
                 )
-                for name in HEARD
+                for name in (*HEARD, *(DRAWN if drawn else ()))
             }
             self._alive_client = self._node.create_client(srv.GetSimulationState, "get_simulation_state")
             self._operate = self._node.create_client(srv.Operate, "operate")
@@ -191,8 +193,12 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
                 taken.append(message[0])
             for data in taken if name == "events" else taken[-1:]:
                 came = True
+                decode = partial(typestore().deserialize_cdr, data, TOPICS[name].type)
+                if name in DRAWN:
+                    self.keep(name, decode)
+                    continue
                 try:
-                    self.take(name, typestore().deserialize_cdr(data, TOPICS[name].type))
+                    self.take(name, decode())
                 except ViewError as error:
                     strange = error
         while self._refusals:

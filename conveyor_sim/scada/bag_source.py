@@ -17,7 +17,7 @@ from conveyor_sim.live.calls import Calls
 from conveyor_sim.live.playback import Message, Playback
 from conveyor_sim.live.player import Player
 from conveyor_sim.scada.source import Control
-from conveyor_sim.scada.view import HEARD, View
+from conveyor_sim.scada.view import DRAWN, HEARD, View
 from conveyor_sim.support.printable import SENTENCE, printable
 
 SHORTEST = 0.005
@@ -27,6 +27,7 @@ SHORTEST = 0.005
 class BagSource(View, AbstractContextManager["BagSource"]):
     """Played from its start until close(). Only what is played of it is read, by its index."""
 
+    takes_inputs = False
     controls: frozenset[Control] = frozenset({"pause", "resume", "seek", "speed", "loop"})
 
     def __init__(
@@ -47,7 +48,7 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         try:
             if not self._bag.counts.get("signals"):
                 raise BagError(f"{path}: holds no message of topic signals, expected some: tags are read from them")
-            playback = Playback(self._bag, HEARD)
+            playback = Playback(self._bag, (*HEARD, *DRAWN))
             self._player = Player(playback, speed, start=None, paused=paused, publish=self._keep, beat=_nothing)
             self._player.seek(self._player.span[0])
             self._bring()
@@ -153,6 +154,8 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         for topic in HEARD:
             if topic in states and topic != "run_state":  # a playback's own, whatever was recorded
                 self.take(topic, self._bag.decode(topic, states[topic]))
+        for topic in states.keys() & set(DRAWN):
+            self.keep(topic, partial(self._bag.decode, topic, states[topic]))
         for data in events:
             self.take("events", self._bag.decode("events", data))
         self.state_run(run)

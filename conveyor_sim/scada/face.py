@@ -33,14 +33,16 @@ class Settings:
     """In which Modbus clients write; None: they may not."""
     modbus_map: Path | None = None
     """File that keeps the map of addresses; None: made of the tags, and not kept."""
-    opcua_users: Path | None = None
-    """File of those who may do more than read; None: nobody may."""
-    opcua_anonymous: bool = True
-    """Whether clients that give no name may read."""
+    users: Path | None = None
+    """File of those who may do more than read by OPC UA and on the page; None: nobody may."""
+    anonymous: bool = True
+    """Whether clients that give no name may read there."""
     opcua_certificates: Path | None = None
     """Folder of the server's certificate and key; None: that of this user."""
     opcua_history: Sequence[str] = ()
     """Patterns of the tags whose last values it keeps."""
+    web_certificates: Path | None = None
+    """Folder of the certificate and key of the page; None: where it needs them, those of the OPC UA face."""
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-from conveyor_sim.scada.face import Face, FaceError, Settings
-from conveyor_sim.scada.source import MODBUS, OPCUA, TagSource
+from conveyor_sim.scada.face import HERE, Face, FaceError, Settings
+from conveyor_sim.scada.source import MODBUS, OPCUA, WEB, TagSource
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,8 @@ class Kind:
     """A face on a port, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
     """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
+    by_default: bool = True
+    """Whether it is served where none is named."""
 
     @property
     def installed(self) -> bool:
@@ -57,8 +59,8 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
 
     return OpcUaServer(
         source,
-        {} if settings.opcua_users is None else read_users(settings.opcua_users),
-        anonymous=settings.opcua_anonymous,
+        {} if settings.users is None else read_users(settings.users),
+        anonymous=settings.anonymous,
         stamps=settings.stamps,
         certificates=settings.opcua_certificates,
         history=settings.opcua_history,
@@ -67,12 +69,32 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
     )
 
 
-def _opcua_exposes(settings: Settings) -> str:
-    readers = "read all" if settings.opcua_anonymous else "read nothing without a name and password"
-    return f"{readers}, and write only as one of the users" if settings.opcua_users else f"{readers}, and write nothing"
+def _web(source: TagSource, port: int, settings: Settings) -> Face:
+    from conveyor_sim.scada.users import read_users
+    from conveyor_sim.scada.view import View
+    from conveyor_sim.scada.web.server import WebServer
+    from conveyor_sim.scada.web.tls import server_context
+
+    if not isinstance(source, View):
+        raise FaceError("web: the line of a test has no page, expected a scene, a recording or a node")
+    secured = settings.host != HERE or settings.web_certificates is not None
+    return WebServer(
+        source,
+        {} if settings.users is None else read_users(settings.users),
+        anonymous=settings.anonymous,
+        secured=server_context(settings.web_certificates, settings.opcua_certificates) if secured else None,
+        host=settings.host,
+        port=port,
+    )
+
+
+def _users_can(settings: Settings) -> str:
+    readers = "read all" if settings.anonymous else "read nothing without a name and password"
+    return f"{readers}, and write only as one of the users" if settings.users else f"{readers}, and write nothing"
 
 
 FACES: tuple[Kind, ...] = (
-    Kind(OPCUA, 4840, "asyncua", _opcua, _opcua_exposes),
+    Kind(OPCUA, 4840, "asyncua", _opcua, _users_can),
     Kind(MODBUS, 5020, "pymodbus", _modbus, _modbus_exposes),
+    Kind(WEB, 8080, "aiohttp", _web, _users_can, by_default=False),
 )

@@ -6,8 +6,15 @@ from fnmatch import fnmatchcase
 
 from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, stops
 from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scada.source import TagSource
+
+TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
+"""States of a run in which nothing that is given would ever act."""
+
+MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
+"""Who may pause a run, have it go on, and so on."""
 
 
 def is_mode(tag: Tag) -> bool:

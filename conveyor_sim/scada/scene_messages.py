@@ -53,6 +53,12 @@ class Go(NamedTuple):
     inputs: Sequence[Input]
 
 
+class Watch(NamedTuple):
+    """Sent to the process: whether what is drawn is to be copied, too."""
+
+    on: bool
+
+
 class Copy(NamedTuple):
     """Sent by the process: serialized messages, and how far it is with inputs."""
 
@@ -63,6 +69,8 @@ class Copy(NamedTuple):
     """Inputs that have reached the stepper so far."""
     waiting: int
     """Of these, those that no tick has taken yet."""
+    at: float
+    """Wall time of what it shows, s since 1970."""
 
 
 class Note(NamedTuple):

@@ -29,17 +29,27 @@ from conveyor_sim.live.session import Session
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.runs.compilation import Cancelled, Compilation
 from conveyor_sim.scada.handshake import HANDSHAKE
-from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task, Watch
 from conveyor_sim.scada.source import MOST_EVENTS, Control
-from conveyor_sim.scada.view import HEARD
+from conveyor_sim.scada.view import DRAWN, HEARD
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.stop_request import StopRequest
+from conveyor_sim.view.watch import with_forces
 
 SHORTEST = 0.005
 """s of wall time between two copies: twice as often as a line in real time has ticks."""
 
 LIFE_SIGN = 0.5
 """s of wall time after which a copy is sent though nothing is new, as long as the stepping thread is alive."""
+
+PICTURES = 0.02
+"""s of wall time from one picture to the next, at least, while somebody looks."""
+
+SHARE = 0.05
+"""Of the stepping thread's time that pictures take, at most."""
+
+TAKEN = frozenset({"bottles", "contacts", "belts"})
+"""Of DRAWN, what a picture is taken of, whatever the scene's rates; the others come as they are output."""
 
 MOST_NOTES = 100
 
@@ -52,12 +62,15 @@ class Copies:
     def __init__(self, pipe: Connection, shortest: float) -> None:
         """It sends from now on. shortest: s of wall time between two copies, in which it makes one of many."""
         self._pipe, self._shortest = pipe, shortest
+        self.watched = False
+        """Whether somebody looks at what is drawn."""
         self._now: dict[str, bytes] = {}
         self._now_events: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._states: dict[str, bytes] = {}
         self._events: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._others: deque[Note | Failed] = deque(maxlen=MOST_NOTES)
         self._counts = (0, 0)
+        self._at = 0.0
         self._new = self._closed = False
         self._sent = 0.0  # s of wall time
         self._wake = threading.Condition()
@@ -66,7 +79,12 @@ class Copies:
 
     def wants(self, topic: str) -> bool:
         """What faces show; signals are theirs at every tick, whatever the scene's rate."""
-        return topic in HEARD and topic != "signals"
+        return (topic in HEARD and topic != "signals") or (self.watched and topic in DRAWN and topic not in TAKEN)
+
+    @property
+    def sent(self) -> bool:
+        """Whether nothing waits to be sent."""
+        return not self._new
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Keep one message until its tick is whole. By the stepping thread."""
@@ -84,7 +102,7 @@ class Copies:
             if self._now or self._now_events or counts != self._counts or now > self._sent + LIFE_SIGN:
                 self._states |= self._now
                 self._events += self._now_events
-                self._counts, self._new = counts, True
+                self._counts, self._new, self._at = counts, True, time.time()
                 self._wake.notify()
         self._now = {}
         self._now_events.clear()
@@ -117,7 +135,7 @@ class Copies:
                         self._wake.wait()
                     done = self._closed
                     others = list(self._others)
-                    copy = Copy(self._states, list(self._events), *self._counts)
+                    copy = Copy(self._states, list(self._events), *self._counts, self._at)
                     self._states, self._new, self._sent = {}, False, time.monotonic()
                     self._events.clear()
                     self._others.clear()
@@ -155,7 +173,8 @@ class _Process:
         self._handed = 0
         self._goals: deque[Go] = deque()
         self._goal: Go | None = None  # where the line is on its way to
-        self._shown = ("", -1)  # run and tick of the signals that were copied last
+        self._shown = self._pictured = ("", -1)  # run and tick of the signals, and the picture, that were copied last
+        self._next_picture = 0.0  # s of wall time
 
     def run(self) -> None:
         """Until somebody asks for the end."""
@@ -204,7 +223,22 @@ class _Process:
             self._shown = now
             header = Header(simulation.tick, simulation.stamp_ns, FRAME)
             self._copies.write("signals", TOPICS["signals"].pack(simulation.line.signals(), header), header.stamp_ns)
+        if self._copies.watched and self._pictured != now and self._copies.sent:
+            self._take_picture(simulation, now)
         self._copies.cut(self._handed, stepper.inbox.counts.waiting)
+
+    def _take_picture(self, simulation: Simulation, now: tuple[str, int]) -> None:
+        """If it is time for one: what is drawn, as topics have it."""
+        began = time.monotonic()
+        if began < self._next_picture:
+            return
+        self._pictured = now
+        contacts = simulation.contacts()
+        bottles = with_forces(simulation.bottles(), contacts)
+        header = Header(simulation.tick, simulation.stamp_ns, FRAME)
+        for topic, columns in (("bottles", bottles), ("contacts", contacts), ("belts", simulation.belts())):
+            self._copies.write(topic, TOPICS[topic].pack(columns, header), header.stamp_ns)
+        self._next_picture = began + max(PICTURES, (time.monotonic() - began) / SHARE)
 
     def _fail(self, error: Exception) -> None:
         text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
@@ -221,7 +255,11 @@ class _Process:
         time.sleep(PATIENCE)
         os._exit(1)
 
-    def _do(self, request: Give | Go | Ask) -> None:
+    def _do(self, request: Give | Go | Ask | Watch) -> None:
+        if isinstance(request, Watch):
+            self._pictured = ("", -1)
+            self._copies.watched = request.on
+            return
         stepper = self._stepper
         if stepper is None:  # nobody knows the line yet
             return

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
+from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -22,9 +23,9 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.scada.handshake import TARGET, problem
-from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task, Watch
 from conveyor_sim.scada.source import MOST_WAITING, Control
-from conveyor_sim.scada.view import HEARD, View
+from conveyor_sim.scada.view import DRAWN, HEARD, View
 
 RUNNING_FREE: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
 IN_LOCKSTEP: frozenset[Control] = frozenset({"target"})
@@ -56,7 +57,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         self._given = self._handed = self._waiting = 0
         self._target = 0  # in lockstep: up to which tick it goes
         self._set: list[Input] = []  # that acts with the next target
-        self._requests: SimpleQueue[Task | Give | Go | Ask | None] = SimpleQueue()
+        self._requests: SimpleQueue[Task | Give | Go | Ask | Watch | None] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._thread = threading.Thread(target=self._supervise, name="scene", daemon=True)
@@ -157,6 +158,10 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _watched(self, on: bool) -> None:
+        with self._lock:
+            self._requests.put(Watch(on))
+
     def _end_process(self) -> None:
         with self._lock:
             process = self._process
@@ -203,6 +208,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 self._set.clear()
                 self._requests = SimpleQueue()
                 self._requests.put(replace(self._task, number=len(self.recordings)))
+                self._requests.put(Watch(self._watchers > 0))
                 # A session of its own: Ctrl-C at the terminal is this process's affair.
                 self._process = process = subprocess.Popen(
                     [sys.executable, "-c", CODE.format(path=sys.path), str(there.fileno())],
@@ -247,13 +253,16 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         for topic in HEARD:
             if (data := copy.states.get(topic)) is not None:
                 self.take(topic, _decoded(topic, data))
+        for topic in DRAWN:
+            if (data := copy.states.get(topic)) is not None:
+                self.keep(topic, partial(_decoded, topic, data))
         for data in copy.events:
             self.take("events", _decoded("events", data))
         with self._lock:
             self._handed, self._waiting = copy.handed, copy.waiting
         self._begun = self._begun or bool(copy.states)
         if copy.states or copy.events or self.shown.lost:
-            self.show()
+            self.show(copy.at)
 
 
 def _decoded(topic: str, data: bytes) -> Any:

@@ -23,10 +23,13 @@ MODBUS = "modbus"
 OPCUA = "opcua"
 """Source of inputs that come by OPC UA."""
 
+WEB = "web"
+"""Source of inputs that come by the page."""
+
 PLC = "plc"
 """Source of what a PLC commands whose client the line is."""
 
-FACES = (MODBUS, OPCUA, PLC)
+FACES = (MODBUS, OPCUA, WEB, PLC)
 """Sources of inputs that SCADA clients give."""
 
 MOST_WAITING = 1000

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
 
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.topics import TOPICS
@@ -19,10 +22,13 @@ from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
 from conveyor_sim.observe.read_back import ReadBackColumns
-from conveyor_sim.scada.source import About, Listeners, RecentEvents, Shown
+from conveyor_sim.scada.source import About, Listeners, RecentEvents, Shown, TagSource
 
 HEARD = ("line", "run_state", "signals", "events", "readback", "alarm_states")
 """Topics that it takes."""
+
+DRAWN = ("bottles", "contacts", "belts", "counters", "rail_wear")
+"""Topics that only a page shows; it decodes them if somebody looks."""
 
 NOTHING = "nothing has been heard of the line yet"
 
@@ -31,14 +37,48 @@ class ViewError(ConveyorError):
     """A line that can't be shown."""
 
 
+@dataclass(frozen=True)
+class Picture:
+    """What can be drawn of a line, as it was last."""
+
+    line: Any
+    """The decoded message of topic line."""
+    tick: int
+    at: float
+    """Wall time of the tick, s since 1970."""
+    signals: NDArray[Any]
+    """As controllers read them."""
+    forced: NDArray[Any]
+    """Indices of those that are forced."""
+    drawn: Mapping[str, Callable[[], Any]]
+    """What decodes the last message of each of DRAWN that there is; another one is another message."""
+
+
+class PictureSource(TagSource, Protocol):
+    """A source that can be drawn."""
+
+    takes_inputs: bool
+
+    @property
+    def picture(self) -> Picture:
+        """What is drawn of the line as it was last."""
+
+    def watch(self) -> Callable[[], None]:
+        """Have DRAWN be there, too, from now on; what is returned ends that."""
+
+
 class View:
     """The half of a TagSource that is read. One thread tells it what came, any may look.
 
     What is taken is shown all at once, by `show`. Time may go back, and another run of the same line may begin.
     """
 
+    takes_inputs = True
+    """Whether anything that is given may ever act."""
     _run_id: str
     _tick: int
+    _line: Any
+    _drawn: dict[str, Callable[[], Any]]
     _run: RunState
     _image: Image | None
     _read_back: ReadBackColumns | None
@@ -57,6 +97,8 @@ class View:
         self._known = threading.Event()
         self._strange = False  # whether it has become another line
         self._shown = Shown(0, {}, lost=NOTHING)
+        self._picture: Picture | None = None
+        self._watchers = 0
         self._forget("")
 
     @property
@@ -70,6 +112,18 @@ class View:
     def shown(self) -> Shown:
         """The line as it was last."""
         return self._shown
+
+    @property
+    def picture(self) -> Picture:
+        """The same, for a page. RuntimeError before it is known."""
+        if self._picture is None:
+            raise RuntimeError("nothing has been shown yet")
+        return self._picture
+
+    def watch(self) -> Callable[[], None]:
+        """Have DRAWN be there, too, from now on, if that costs anything; what is returned ends that."""
+        self._count_watchers(1)
+        return lambda: self._count_watchers(-1)
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events were heard of, and those after so many."""
@@ -114,6 +168,10 @@ class View:
             case "events":
                 self._take_events(TOPICS[topic].unpack(message))
 
+    def keep(self, topic: str, decode: Callable[[], Any]) -> None:
+        """What decodes a message of one of DRAWN, in any thread."""
+        self._drawn[topic] = decode
+
     def state_run(self, run: RunState) -> None:
         """What the run is doing, where no message says so."""
         self._run = run
@@ -122,13 +180,18 @@ class View:
         """Something else follows than what would have: time has been gone through."""
         self._forget(self._run_id)
 
-    def show(self) -> None:
-        """Show what was taken, which is here again if it was lost; nothing before there are signals."""
+    def show(self, at: float | None = None) -> None:
+        """Show what was taken, which is here again if it was lost; nothing before there are signals.
+
+        at: wall time of its tick, s since 1970; None: now.
+        """
         if self._about is None or self._image is None:
             return
         names, values = self._signal_names, self._image.values
         shown = dict(zip(names, values.tolist(), strict=False))
         shown |= zip(self._command_names, self._commands(), strict=False)
+        now = time.time() if at is None else at
+        self._picture = Picture(self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn))
         self._shown = Shown(
             self._tick,
             shown,
@@ -153,9 +216,19 @@ class View:
         """Something happened that no message tells of."""
         self._events.add([event])
 
+    def _count_watchers(self, more: int) -> None:
+        """Of one thread."""
+        before, self._watchers = self._watchers, self._watchers + more
+        if (before > 0) != (self._watchers > 0):
+            self._watched(self._watchers > 0)
+
+    def _watched(self, on: bool) -> None:
+        """Somebody looks, or nobody any more."""
+
     def _forget(self, run_id: str) -> None:
         self._run_id = run_id
         self._tick = 0
+        self._drawn = {}
         self._run = RunState(RUNNING)
         self._image = self._read_back = self._alarms = None
         self._owner = ""
@@ -172,7 +245,7 @@ class View:
             )
         if message.run_id != self._run_id or self._about is None:
             self._forget(message.run_id)
-        self._about = about
+        self._about, self._line = about, message
         initial = {tag.name: tag.initial for tag in about.tags}
         self._initial = [initial.get(name, 0.0) for name in message.command_names]
         self._signal_names, self._command_names = tuple(message.signal_names), tuple(message.command_names)

@@ -14,21 +14,14 @@ from asyncua.crypto.permission_rules import User, UserRole
 from conveyor_sim.line.authority import MAY, MODES
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
-from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.scada.hands import is_mode, objection
+from conveyor_sim.scada.hands import MAY_CONTROL, TAKES_NO_INPUT, is_mode, objection
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET
 from conveyor_sim.scada.opcua.nodes import name_of
 from conveyor_sim.scada.opcua.values import type_of
 from conveyor_sim.scada.source import OPCUA, Control, TagSource
 
 Codes = ua.StatusCodes
-
-TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
-"""States of a run in which nothing that is given would ever act."""
-
-MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
-"""Who may pause a run, have it go on, and so on."""
 
 
 @dataclass

@@ -1,5 +1,6 @@
 // The alarm list: what is not normal now, the first-out marked; a click jumps to where and when it came.
 
+import { controlsOfAlarm } from "./controls.js";
 import { element, seconds } from "./dom.js";
 import { ALARM_STATES } from "./story.js";
 
@@ -21,7 +22,7 @@ export class Alarms {
         element("span", { class: "icon", "aria-hidden": "true" }, alarm.stands ? (alarm.alarm_class === "message" ? "●" : "▲") : "○"),
         element("span", { class: "what" }, element("b", {}, alarm.id), ` ${alarm.text}`,
           element("small", {}, `${ALARM_STATES[alarm.state]}${alarm.by ? ` by ${alarm.by}` : ""} · since ${seconds(alarm.since)} · priority ${alarm.priority}`)),
-        alarm.firstOut ? element("span", { class: "badge" }, "first out") : null)));
+        alarm.firstOut ? element("span", { class: "badge" }, "first out") : null), controlsOfAlarm(alarm, this.view)));
     this.list.replaceChildren(...(rows.length ? rows : [element("li", { class: "muted" }, "All alarms are normal.")]));
     this.count = alarms.filter((alarm) => alarm.stands).length;
     this.view.badge("alarms", this.count);

@@ -1,5 +1,6 @@
 // Faceplates: all tags of a device as they are now; a click on a tag puts it on the trends.
 
+import { controlsOf } from "./controls.js";
 import { element, seconds, shown } from "./dom.js";
 
 const ORDER = ["status", "actual", "counter", "alarm", "command", "setpoint", "fault"];
@@ -25,7 +26,7 @@ export class Faceplate {
     this.cells = [];
     const groups = ORDER.filter((role) => tags.some((tag) => tag.role === role)).map((role) => element("div", {},
       element("h3", {}, TITLES[role]),
-      element("table", {}, ...tags.filter((tag) => tag.role === role).map((tag) => this._row(tag, device)))));
+      element("table", {}, ...tags.filter((tag) => tag.role === role).flatMap((tag) => this._row(tag, device)))));
     this.body.replaceChildren(element("p", { class: "muted" }, tags[0]?.class?.replace("_", " ") ?? ""), ...groups);
     this.draw();
   }
@@ -36,7 +37,9 @@ export class Faceplate {
     this.cells.push({ tag, signal, command, value, note });
     const name = tag.name.slice(device.length + 1) || tag.name;
     const head = signal === undefined ? name : element("button", { class: "link", title: "Put on the trends", onclick: () => this.view.trends.add(tag.name) }, name);
-    return element("tr", { title: tag.description ?? "" }, element("th", { scope: "row" }, head, note), value);
+    const watch = signal === undefined || !this.view.watch ? "" : element("button", { class: "quiet", title: "Put on the watch table", "aria-label": `Watch ${tag.name}`, onclick: () => this.view.watch.add(tag.name) }, "◎");
+    const row = element("tr", { title: tag.description ?? "" }, element("th", { scope: "row" }, head, watch, note), value), hands = controlsOf(tag, this.view);
+    return hands ? [row, element("tr", { class: "hands" }, element("td", { colspan: "2" }, hands))] : [row];
   }
 
   draw() {

@@ -8,11 +8,15 @@ import { Camera } from "./camera.js";
 import { Clock, SPEEDS } from "./clock.js";
 import { COLOURINGS, SCALES, colourings, isDark } from "./colours.js";
 import { Compare } from "./compare.js";
+import { Desk } from "./desk.js";
 import { deviceOf, middle } from "./devices.js";
 import { byId, element, seconds } from "./dom.js";
 import { Events } from "./events.js";
 import { Faceplate } from "./faceplate.js";
 import { listenToKeys } from "./keys.js";
+import { Line } from "./live.js";
+import { LiveClock } from "./live_clock.js";
+import { LiveRecording } from "./live_recording.js";
 import { Plan } from "./plan.js";
 import { Recording } from "./recording.js";
 import { Scrubber } from "./scrubber.js";
@@ -21,21 +25,26 @@ import { Story } from "./story.js";
 import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
+import { Watch } from "./watch.js";
 import { WEARS, Wear } from "./wear.js";
 
 const MEASURED = 5000; // forces of a block that its scale is made from
+const MOST_EVENTS = 5000; // of a line that runs; then those before what can still be seen are forgotten
 const BEFORE = 2; // s before the first difference, where a comparison opens
 const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
 
 class View {
-  // other: a recording that is shown beside it, and its story; else null.
-  constructor(recording, story, other) {
-    Object.assign(this, { recording, story, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
+  // other: a recording that is shown beside it, and its story; else null. line: if it runs, and what is known of it (of
+  // a message "begin").
+  constructor(recording, story, other, line = null, about = null) {
+    Object.assign(this, { recording, story, line, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
     this.rival = null; // what is shown beside this
     this.fastest = 0.1;
     this.strongest = 1;
-    this.oldest = Math.max(1, Math.min(60, recording.end - recording.start));
-    this.clock = new Clock(recording, other?.recording);
+    this.oldest = line ? 60 : Math.max(1, Math.min(60, recording.end - recording.start));
+    this.clock = line ? new LiveClock(recording) : new Clock(recording, other?.recording);
+    this.desk = line ? new Desk(this, about) : null;
+    this.watch = line ? new Watch(this) : null;
     this.camera = new Camera(boundsOf([recording, other?.recording]));
     this.wear = new Wear(this);
     this.plan = new Plan(byId("plan"), this);
@@ -51,9 +60,9 @@ class View {
     this.alarms = new Alarms(this);
     this.bars = new Bars(this);
     this.events = new Events(this);
-    const line = { title: "Line", parts: [this.bars, new Tiles(this)] };
-    const panels = { line, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [this.events] },
-      device: { title: "Device", parts: [this.faceplate] }, bottle: { title: "Bottle", parts: [new Bottle(this)] } };
+    const production = { title: "Line", parts: [this.bars, new Tiles(this)] };
+    const panels = { line: production, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [this.events] },
+      device: { title: "Device", parts: [this.faceplate] }, ...(line ? { watch: { title: "Watch", parts: [this.watch] } } : {}), bottle: { title: "Bottle", parts: [new Bottle(this)] } };
     this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : "line");
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
     for (const one of this.clock.all) {
@@ -87,6 +96,30 @@ class View {
     this.touch();
   }
 
+  // What a line that runs shows, and what happens on it.
+  receive() {
+    const { line, recording, story } = this;
+    line.addEventListener("frame", ({ detail }) => {
+      recording.append(detail);
+      this.measure(detail.block);
+    });
+    line.addEventListener("story", ({ detail }) => {
+      if (story.events.length > MOST_EVENTS) story.forget(recording.start);
+      this.toldMore(detail);
+      this.desk.happened(detail.events);
+    });
+    line.addEventListener("begin", ({ detail }) => {
+      if (still(detail.head) !== still(recording.head)) location.reload();
+      recording.begin(detail.head);
+      story.begin(detail.head);
+      this.toldMore(detail.story);
+      this.desk.status = detail.status;
+      this.desk.connection();
+      if (this.clock.live) this.clock.follow();
+      else this.clock.seek(this.clock.time);
+    });
+  }
+
   // The choice of heat maps is there if the recording has any.
   worn() {
     byId("worn").hidden = !this.story.data.wear.length;
@@ -101,16 +134,19 @@ class View {
   // Scales that only grow, so that a colour means the same from frame to frame.
   _measure() {
     for (const block of this.clock.all.flatMap(({ blocks }) => [...blocks.values()])) {
-      if (block.measured) continue;
-      block.measured = true;
-      for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
-      const every = Math.ceil(block.contacts.reduce((sum, { force }) => sum + force.length, 0) / MEASURED);
-      const forces = block.contacts.flatMap(({ force }) => Array.from(force).filter((_, i) => i % every === 0)).sort((a, b) => a - b);
-      const strong = forces[Math.floor(0.99 * forces.length)] ?? 0;
-      this.strongest = Math.max(this.strongestSeen ?? 1, strong);
-      this.strongestSeen = this.strongest;
+      if (!block.measured) this.measure(block);
     }
     this.legend();
+  }
+
+  measure(block) {
+    block.measured = true;
+    for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
+    const every = Math.ceil(block.contacts.reduce((sum, { force }) => sum + force.length, 0) / MEASURED);
+    const forces = block.contacts.flatMap(({ force }) => Array.from(force).filter((_, i) => i % every === 0)).sort((a, b) => a - b);
+    const strong = forces[Math.floor(0.99 * forces.length)] ?? 0;
+    this.strongest = Math.max(this.strongestSeen ?? 1, strong);
+    this.strongestSeen = this.strongest;
   }
 
   // Time stands at a frame of the recording, once that is there.
@@ -257,11 +293,13 @@ class View {
     play.textContent = clock.playing ? "❚❚" : "▶";
     play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
     byId("speed").value = clock.speed;
+    this.desk?.drawn(now);
     byId("plan").dataset.camera = [camera.x, camera.y, camera.scale, camera.width, camera.height].join(" ");
     byId("plan").dataset.frame = this.plan.frame ? this.plan.frame.time.toFixed(6) : "";
     document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
     if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
     this.panelsDrawn = now;
+    if (this.line) byId("end").textContent = seconds(this.recording.end);
     this.alarms.draw();
     this.tabs.draw();
     this.trends.draw();
@@ -273,6 +311,9 @@ class View {
     if (bottle && (bottle.x !== this.camera.x || bottle.y !== this.camera.y)) this.camera.centre(bottle.x, bottle.y);
   }
 }
+
+// What must be the same of a line for a page of it to go on.
+const still = (head) => JSON.stringify({ ...head, run: "", seed: 0, times: null, forced: null });
 
 function boundsOf(recordings) {
   const points = recordings.filter(Boolean).flatMap(({ head }) => [...head.belts.flatMap(({ outline }) => outline), ...head.rails.flat(), ...head.marks.flatMap(({ points: all }) => all)]);
@@ -357,19 +398,28 @@ async function compare(view, source, { stretches }) {
   document.body.dataset.compared = "yes";
 }
 
+// A line that runs, or what is known of one that did.
 async function start() {
-  const source = openSource(), { recording, story } = await opened(source), { head } = recording, parts = head.times.stories;
-  const behind = { bytes: (name) => source.bytes(`other/${name}`) }, other = head.compared ? await opened(behind) : null;
-  const view = new View(recording, story, other);
-  wire(view);
-  view.resize();
-  const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
-  if (failure) {
-    view.say(failure.text);
-    view.clock.seek(Math.max(recording.start, failure.time - 5));
+  if (!document.querySelector("meta[name=line]")) {
+    await startRecording();
+    return;
   }
-  await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
-  view.snap();
+  const line = new Line();
+  byId("notice").textContent = "Waiting for the line.";
+  line.addEventListener("begin", ({ detail }) => {
+    byId("notice").textContent = "";
+    const story = new Story(detail.head), recording = new LiveRecording(detail.head);
+    story.add(detail.story);
+    const view = new View(recording, story, null, line, detail);
+    wire(view);
+    view.resize();
+    view.receive();
+    document.body.dataset.told = "yes";
+    run(view);
+  }, { once: true });
+}
+
+function run(view) {
   let before = performance.now();
   const loop = (now) => {
     view.clock.advance(Math.min(0.25, (now - before) / 1000));
@@ -382,6 +432,22 @@ async function start() {
     requestAnimationFrame(loop);
   };
   requestAnimationFrame(loop);
+}
+
+async function startRecording() {
+  const source = openSource(), { recording, story } = await opened(source), { head } = recording, parts = head.times.stories;
+  const behind = { bytes: (name) => source.bytes(`other/${name}`) }, other = head.compared ? await opened(behind) : null;
+  const view = new View(recording, story, other);
+  wire(view);
+  view.resize();
+  const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
+  if (failure) {
+    view.say(failure.text);
+    view.clock.seek(Math.max(recording.start, failure.time - 5));
+  }
+  await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
+  view.snap();
+  run(view);
   // A long recording is gone through while one looks at it already.
   for (let part = 0; parts > 1 && part < parts; part++) {
     view.say(`reading what happened: ${Math.round((100 * part) / parts)} %`);

@@ -12,7 +12,7 @@ export class Recording extends EventTarget {
     this.source = source;
     this.head = head;
     const { first, last, block, blocks } = head.times;
-    this.start = first * head.tick;
+    this.start = this.began = first * head.tick;
     this.end = last * head.tick;
     this.length = block * head.tick; // of a block
     this.count = blocks;

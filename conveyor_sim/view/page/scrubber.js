@@ -13,9 +13,6 @@ export class Scrubber {
     this.canvas = this.box.querySelector("canvas");
     this.tip = element("div", { class: "tip", role: "tooltip", hidden: true });
     this.box.append(this.tip);
-    const { recording } = view.clock;
-    this.box.setAttribute("aria-valuemin", recording.start.toFixed(2));
-    this.box.setAttribute("aria-valuemax", recording.end.toFixed(2));
     this.dragging = false;
     this.box.addEventListener("pointerdown", (event) => {
       this.box.setPointerCapture(event.pointerId);
@@ -87,6 +84,8 @@ export class Scrubber {
     context.lineWidth = 2;
     context.strokeStyle = colours.halo;
     context.stroke();
+    this.box.setAttribute("aria-valuemin", recording.start.toFixed(2));
+    this.box.setAttribute("aria-valuemax", recording.end.toFixed(2));
     this.box.setAttribute("aria-valuenow", clock.time.toFixed(2));
     this.box.setAttribute("aria-valuetext", seconds(clock.time));
   }

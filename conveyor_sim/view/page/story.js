@@ -15,10 +15,18 @@ const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
 
 export const stateName = (number) => STATE_NAMES[number] ?? `state ${number}`;
 
+const HOLDS = /^(machine_state|signal_|fault_)/;
+const OF_ONE = new Set(["alarm_changes", "readback"]); // whose second entry says of what they are
+const timeOf = (row) => row.at ?? row[0];
 const LISTS = ["alarm_changes", "readback", "counters", "runs", "wear"];
 
 export class Story {
   constructor(head) {
+    this.begin(head);
+  }
+
+  // Nothing has happened yet.
+  begin(head) {
     this.head = head;
     this.differences = []; // from another recording: marks
     this.data = { events: {}, alarms: {} };
@@ -32,6 +40,22 @@ export class Story {
     for (const list of LISTS) this.data[list] = this.data[list].concat(data[list]);
     Object.assign(this.data.alarms, data.alarms);
     if (data.bins) this.data.bins = data.bins;
+    this.build();
+  }
+
+  // Give up what was before a time, but for what still held then.
+  forget(before) {
+    const { data } = this, { events } = data, last = new Map();
+    const keep = (events.at ?? []).map((at) => at >= before);
+    keep.forEach((kept, i) => {
+      if (!kept && HOLDS.test(events.kind[i])) last.set(`${events.kind[i].split("_")[0]} ${events.name[i]}`, i);
+    });
+    for (const i of last.values()) keep[i] = true;
+    for (const [name, column] of Object.entries(events)) events[name] = column.filter((_, i) => keep[i]);
+    for (const list of LISTS) {
+      const now = new Map(data[list].filter((row) => timeOf(row) < before).map((row) => [OF_ONE.has(list) ? row[1] : "", row]));
+      data[list] = [...now.values(), ...data[list].filter((row) => timeOf(row) >= before)];
+    }
     this.build();
   }
 

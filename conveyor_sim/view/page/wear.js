@@ -22,7 +22,7 @@ export class Wear {
   // The scale is that of the end, so that a colour means the same all the time.
   scale() {
     const { story, recording } = this.view, { bins, wear } = story.data, last = wear[wear.length - 1];
-    return last ? Math.max(1e-9, ...bins.x.map((_, i) => WEARS[this.shown].of(last, i, bins, recording.start))) : 1e-9;
+    return last ? Math.max(1e-9, ...bins.x.map((_, i) => WEARS[this.shown].of(last, i, bins, recording.began))) : 1e-9;
   }
 
   draw(context, camera) {
@@ -33,7 +33,7 @@ export class Wear {
     context.lineCap = "butt";
     context.lineWidth = Math.max(6, 0.02 * camera.scale);
     bins.x.forEach((x, i) => {
-      const share = wanted.of(row, i, bins, recording.start) / this.most;
+      const share = wanted.of(row, i, bins, recording.began) / this.most;
       if (share <= 0.01) return;
       context.beginPath();
       for (const side of [-1, 0, 1]) {

@@ -1,0 +1,226 @@
+"""`WebServer`: a line as a page in the browser, by HTTP and one websocket for each that looks."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import ssl
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+from urllib.parse import urlsplit
+
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
+from conveyor_sim.scada.source import WEB
+from conveyor_sim.scada.users import User, authenticate
+from conveyor_sim.scada.view import PictureSource
+from conveyor_sim.scada.web.commands import NOBODY, Commands, Person
+from conveyor_sim.scada.web.feed import Feed, text_message
+from conveyor_sim.scada.web.viewer import Viewer
+from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
+
+MOST_VIEWERS = 64
+"""Pages that look at once; one more is told so."""
+
+LONGEST_REQUEST = 16_384
+"""Bytes that a page sends at once, at most; who sends more is cut off."""
+
+PACE = 0.005
+"""s of wall time that each request of a page takes, at least."""
+
+WRONG_PASSWORD = 1.0
+"""s of wall time that a page waits for the answer to a wrong one."""
+
+HEARTBEAT = 20.0
+"""s of wall time after which a page is gone that has not answered."""
+
+_NAMES = (HERE, "localhost", "[::1]")
+"""Of this machine, for itself."""
+
+_LIVE = '<meta name="line" content="live">'
+"""In the page: by it the page knows that it shows a line that runs."""
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class WebServer:
+    """Serves one source: a Face."""
+
+    def __init__(
+        self,
+        source: PictureSource,
+        users: Mapping[str, User] | None = None,
+        *,
+        anonymous: bool = True,
+        secured: ssl.SSLContext | None = None,
+        host: str = HERE,
+        port: int = 0,
+    ) -> None:
+        """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
+        TLS; None: plain, which is for this machine only. port: 0 for any that is free.
+        """
+        self._source, self._users, self._anonymous, self._secured = source, dict(users or {}), anonymous, secured
+        self._at = host, port
+        self._commands = Commands(source)
+        self._feed = Feed(
+            source, users=bool(self._users), takes=source.takes_inputs, controls=sorted(self._commands.controls)
+        )
+        self._files = page_files()
+        self._runner: web.AppRunner | None = None
+        self._sockets: set[web.WebSocketResponse] = set()
+        self._password = asyncio.Lock()
+
+    @property
+    def port(self) -> int:
+        """On which it listens. RuntimeError before `start`."""
+        if self._runner is None or not self._runner.addresses:
+            raise RuntimeError("the server was not started")
+        return int(self._runner.addresses[0][1])
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        host, port = self._at
+        where = f"[{host}]" if ":" in host else host
+        return f"http{'s' if self._secured else ''}://{where}:{port if self._runner is None else self.port}/"
+
+    def status(self) -> Status:
+        """Pages that look; what was passed on to the line for them, and what was not."""
+        longest, self._feed.longest = self._feed.longest, 0.0
+        return Status(len(self._sockets), 0, self._commands.writes, self._commands.refused, longest)
+
+    async def start(self) -> None:
+        """Listen. Raises FaceError if that is not possible."""
+        for name in ("aiohttp.server", "aiohttp.web", "aiohttp.access"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+        host, port = self._at
+        require_free(WEB, host, port)
+        app = web.Application(client_max_size=LONGEST_REQUEST, middlewares=[self._guard])
+        app.router.add_get("/live", self._live)
+        app.router.add_get("/{path:.*}", self._file)
+        runner = web.AppRunner(
+            app, handle_signals=False, access_log=None, keepalive_timeout=HEARTBEAT, shutdown_timeout=1.0
+        )
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, host, port, ssl_context=self._secured).start()
+        except OSError as error:
+            await runner.cleanup()
+            raise FaceError(
+                f"web: {host}:{port} can't be listened on ({error.strerror}), expected a free port"
+            ) from error
+        self._runner = runner
+
+    async def stop(self) -> None:
+        """End all connections."""
+        runner, self._runner = self._runner, None
+        for socket in [*self._sockets]:
+            await socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends")
+        self._feed.close()
+        if runner is not None:
+            await runner.cleanup()
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse who asks by a name that is not ours: a page of somebody else's, whose name was made to lead here."""
+        name = request.host.rpartition(":")[0] if request.host.rpartition("]")[2] else request.host
+        if self._at[0] == HERE and name not in _NAMES:
+            return web.Response(status=403, text=f"expected to be asked for as {HERE}", headers=HEADERS)
+        return await handler(request)
+
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        path = request.match_info["path"] or "index.html"
+        kind = self._files.get(path)
+        if kind is None:
+            return web.Response(status=404, text="there is no such file", headers=HEADERS)
+        content = (PAGE / path).read_text(encoding="utf-8")
+        if path == "index.html":
+            content = content.replace("<!--policy-->", _LIVE)
+        return web.Response(text=content, content_type=kind, charset="utf-8", headers=HEADERS)
+
+    async def _live(self, request: web.Request) -> web.StreamResponse:
+        origin = urlsplit(request.headers.get("Origin", ""))
+        if (origin.scheme, origin.netloc) != ("https" if self._secured else "http", request.host):
+            return web.Response(status=403, text="expected a page of this server", headers=HEADERS)
+        if len(self._sockets) >= MOST_VIEWERS:
+            return web.Response(status=503, text=f"{MOST_VIEWERS} pages look already", headers=HEADERS)
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False)
+        self._sockets.add(socket)
+        viewer = Viewer(socket)
+        sending = None
+        try:
+            await socket.prepare(request)
+            sending = asyncio.create_task(viewer.send())
+            await self._answer_all(socket, viewer)
+        except ConnectionError:
+            pass
+        finally:
+            self._sockets.discard(socket)
+            self._feed.leave(viewer)
+            if sending is not None:
+                sending.cancel()
+                await asyncio.gather(sending, return_exceptions=True)
+        return socket
+
+    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer) -> None:
+        """Until the connection ends."""
+        person = NOBODY
+        if self._anonymous:
+            self._feed.join(viewer)
+        else:
+            viewer.tell(text_message("locked"))
+        async for message in socket:
+            if message.type is not WSMsgType.TEXT:
+                break
+            request = _request(message.data)
+            if request is None:
+                break
+            match request.get("do"):
+                case "saw":
+                    viewer.saw()
+                    continue
+                case "ping":
+                    viewer.tell(text_message("pong", sent=request.get("sent"), now=time.time()))
+                case "sign_in":
+                    person = await self._sign_in(request)
+                    if not self._anonymous and person.name:
+                        self._feed.join(viewer)
+                    refused = "" if person.name else "name or password are wrong"
+                    viewer.tell(_reply(request, refused, person))
+                case "sign_out":
+                    person = NOBODY
+                    if not self._anonymous:
+                        self._feed.leave(viewer)
+                    viewer.tell(_reply(request, "", person))
+                case _:
+                    viewer.tell(_reply(request, self._commands.do(person, request), person))
+            await asyncio.sleep(PACE)
+
+    async def _sign_in(self, request: Mapping[str, Any]) -> Person:
+        name, password = request.get("name"), request.get("password")
+        user = None
+        if isinstance(name, str) and isinstance(password, str):
+            async with self._password:  # one at a time: it takes a processor for as long as that is
+                user = await asyncio.to_thread(authenticate, self._users, name, password)
+        if user is None or not isinstance(name, str):
+            await asyncio.sleep(WRONG_PASSWORD)
+            return NOBODY
+        return Person(name, user.role, user.kind)
+
+
+def _request(data: str) -> dict[str, Any] | None:
+    """What a page asks for; None: that is none."""
+    try:
+        request = json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+    return request if isinstance(request, dict) else None
+
+
+def _reply(request: Mapping[str, Any], refused: str, person: Person) -> bytes:
+    number = request.get("id")
+    who = {"name": person.name, "role": person.role}
+    return text_message("reply", id=number if isinstance(number, int) else None, refused=refused, person=who)

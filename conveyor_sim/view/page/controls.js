@@ -1,0 +1,47 @@
+// What a tag is given by hand: fields and buttons for commands, modes, faults and forces.
+
+import { element } from "./dom.js";
+
+const MODES = { 1: "Automatic", 2: "Maintenance", 3: "Manual" };
+
+function textsOf(tag) {
+  return Array.from((tag.texts ?? "").matchAll(/(-?\d+) (.*?)(?=, -?\d+ |$)/g), ([, number, text]) => [number, text]);
+}
+
+// A field for a value of a tag; give is called with a number.
+export function field(tag, label, give, texts = textsOf(tag)) {
+  const send = () => {
+    if (input.value !== "") give(+input.value);
+  };
+  const choices = tag.kind === "bool" ? [["1", "on"], ["0", "off"]] : texts;
+  const input = choices.length
+    ? element("select", { "aria-label": `${label} ${tag.name}` }, ...choices.map(([value, text]) => element("option", { value }, text)))
+    : element("input", { type: "number", step: tag.kind === "number" ? "any" : "1", "aria-label": `${label} ${tag.name}`, placeholder: limits(tag), onkeydown: (event) => event.key === "Enter" && send() });
+  return element("span", { class: "field" }, input, element("button", { onclick: send, "aria-label": `${label} ${tag.name} now` }, label));
+}
+
+function limits(tag) {
+  return Number.isFinite(tag.min) && Number.isFinite(tag.max) ? `${tag.min} to ${tag.max}` : "";
+}
+
+// What a faceplate offers for a tag of a line that runs; null: nothing.
+export function controlsOf(tag, view) {
+  const { desk } = view;
+  if (!desk?.commands) return null;
+  if (tag.role === "command" || tag.role === "setpoint") return field(tag, "Set", (value) => desk.ask("set", [tag.name], [value]));
+  if (tag.role === "fault") return field(tag, "Inject", (value) => desk.ask("inject", [tag.name], [value]));
+  if (tag.device && tag.name === `${tag.device}/mode`) return field(tag, "Set", (value) => desk.ask("mode", [tag.device], [value]), Object.entries(MODES));
+  return null;
+}
+
+const CAN = { acknowledge: [1, 3, 4], reset: [5], shelve: [1, 2, 3, 4, 5], unshelve: [6] };
+const WORDS = { acknowledge: "Acknowledge", reset: "Reset", shelve: "Shelve 1 min", unshelve: "Unshelve" };
+const SHELVED = 60; // s
+
+// The same for an alarm in a state.
+export function controlsOfAlarm(alarm, view) {
+  if (!view.desk?.commands) return null;
+  const buttons = Object.keys(CAN).filter((what) => CAN[what].includes(alarm.state)).map((what) => element("button",
+    { "aria-label": `${WORDS[what]} ${alarm.id}`, onclick: () => view.desk.ask(what, [alarm.id], what === "shelve" ? [SHELVED] : []) }, WORDS[what]));
+  return buttons.length ? element("div", { class: "choices" }, ...buttons) : null;
+}

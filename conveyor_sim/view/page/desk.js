@@ -1,0 +1,121 @@
+// The bar of a line that runs: whether it is there, how late the picture is, its run, and who sits here.
+
+import { byId, element, seconds } from "./dom.js";
+import { wallTime } from "./live.js";
+
+const TOLD = 500; // ms between two latencies that are shown
+const REMEMBERED = 20; // s in which a refusal by the line is one of what was asked for here
+
+export class Desk {
+  constructor(view, about) {
+    Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, given: new Map() });
+    const { line } = view;
+    this.link = element("span", { id: "link", role: "status" });
+    this.late = element("span", { id: "latency", title: "From the tick of the line to its picture here" });
+    this.run = element("span", { id: "run" });
+    this.buttons = new Map();
+    const can = about.users ? about.controls : [];
+    const controls = [["pause", "Pause the line", []], ["resume", "Let it go on", []], ["step", "One tick", [1]], ["reset", "Begin anew", []]]
+      .filter(([what]) => can.includes(what)).map(([what, label, values]) => {
+        const button = element("button", { onclick: () => this.ask("control", [what], values) }, label);
+        this.buttons.set(what, button);
+        return button;
+      });
+    this.now = element("button", { id: "follow_now", title: "Show what is now (End)", onclick: () => view.clock.follow() }, "Now");
+    this.who = element("span", { id: "who" });
+    this.sign = element("button", { id: "sign", onclick: () => this._sign() }, "Sign in");
+    this.dialog = this._dialog();
+    byId("desk").replaceChildren(this.link, this.late, this.now, this.run, ...controls, element("span", { class: "gap" }), this.who, ...(about.users ? [this.sign] : []));
+    byId("desk").hidden = false;
+    line.addEventListener("connection", () => this.connection());
+    line.addEventListener("status", ({ detail }) => { this.status = detail.status; this.connection(); });
+    line.addEventListener("frame", ({ detail }) => { this.at = detail.at; });
+    this.connection();
+  }
+
+  // Whether anything can be commanded from here, by whoever signs in.
+  get commands() {
+    return this.about.users && this.about.takes;
+  }
+
+  connection() {
+    const { line } = this.view, { lost, run, reason } = this.status;
+    const state = !line.connected ? "broken" : lost ? "lost" : "live";
+    document.body.dataset.link = state;
+    this.link.textContent = { broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
+    this.link.className = state;
+    this.run.textContent = state === "live" ? `${run}${reason ? `: ${reason}` : ""}` : "";
+    this.buttons.get("pause")?.toggleAttribute("hidden", run === "paused");
+    for (const what of ["resume", "step"]) this.buttons.get(what)?.toggleAttribute("hidden", run !== "paused");
+    const { name, role } = line.person;
+    this.who.textContent = name ? `${name} (${role})` : "";
+    this.sign.textContent = name ? "Sign out" : "Sign in";
+    document.body.dataset.person = name;
+    this.view.touch();
+  }
+
+  // Called after each picture.
+  drawn(now) {
+    const { clock } = this.view;
+    this.now.setAttribute("aria-pressed", clock.live);
+    if (clock.live && this.at && this.at !== this.shown) {
+      this.shown = this.at;
+      const late = wallTime() + this.view.line.offset - this.at;
+      this.latency = this.latency ? 0.9 * this.latency + 0.1 * late : late;
+    }
+    if (now - this.told < TOLD) return;
+    this.told = now;
+    const text = clock.live ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : `${seconds(this.view.recording.end - clock.time, 1)} ago`;
+    if (this.late.textContent !== text) this.late.textContent = text;
+  }
+
+  // Ask the line for something; why it can't be is shown. Whether it was taken.
+  async ask(what, names, values = []) {
+    for (const [text, time] of this.given) if (wallTime() > time + REMEMBERED) this.given.delete(text);
+    this.given.set(names.join(", "), wallTime());
+    const { refused } = await this.view.line.ask({ do: what, names, values });
+    this.view.say(refused ? `Refused: ${refused}` : "");
+    if (!refused) byId("said").textContent = `${what} ${names.join(", ")} given`;
+    return !refused;
+  }
+
+  // What the line itself has refused, a tick later.
+  happened({ kind = [], name = [], text = [] }) {
+    kind.forEach((one, i) => {
+      if (one === "command_refused" && this.given.has(name[i])) this.view.say(`Refused: ${text[i]}`);
+    });
+  }
+
+  _dialog() {
+    this.name = element("input", { autocomplete: "username", required: true, maxlength: "40" });
+    this.password = element("input", { type: "password", autocomplete: "current-password", required: true, maxlength: "200" });
+    this.wrong = element("p", { class: "wrong", role: "alert" });
+    const dialog = element("dialog", { id: "signing", "aria-label": "Sign in" }, element("h2", {}, "Sign in"),
+      element("form", { onsubmit: (event) => this._signIn(event) }, element("label", {}, "Name", this.name), element("label", {}, "Password", this.password),
+        this.wrong, element("div", { class: "choices" }, element("button", { class: "main" }, "Sign in"), element("button", { type: "button", onclick: () => dialog.close() }, "Cancel"))));
+    document.body.append(dialog);
+    return dialog;
+  }
+
+  async _sign() {
+    const { line } = this.view;
+    if (line.person.name) {
+      await line.ask({ do: "sign_out" });
+      this.connection();
+      return;
+    }
+    this.wrong.textContent = "";
+    this.dialog.showModal();
+  }
+
+  async _signIn(event) {
+    event.preventDefault();
+    this.wrong.textContent = "…";
+    const { refused } = await this.view.line.ask({ do: "sign_in", name: this.name.value, password: this.password.value });
+    this.password.value = "";
+    this.wrong.textContent = refused ?? "";
+    if (refused) return;
+    this.dialog.close();
+    this.connection();
+  }
+}

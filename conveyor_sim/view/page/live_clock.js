@@ -1,0 +1,56 @@
+// The time that is shown of a line that runs: now, unless somebody looks back.
+
+import { Clock } from "./clock.js";
+
+const NEAR = 1e-6; // s
+
+export class LiveClock extends Clock {
+  constructor(recording) {
+    super(recording);
+    this.follow();
+  }
+
+  // Show what is now, from now on.
+  follow() {
+    this.live = this.playing = true;
+    this.time = this.recording.end;
+    this._changed();
+  }
+
+  seek(time) {
+    if (time >= this.recording.end - NEAR) {
+      this.follow();
+      return;
+    }
+    if (this.live) this.playing = this.live = false;
+    super.seek(time);
+  }
+
+  play() {
+    this.playing = true;
+    this._changed();
+  }
+
+  pause() {
+    this.live = false;
+    super.pause();
+  }
+
+  step(frames) {
+    this.live = false;
+    return super.step(frames);
+  }
+
+  advance(seconds) {
+    const { recording } = this;
+    if (!this.live) {
+      if (this.time < recording.start) this.time = recording.start; // the rest is forgotten
+      const wasPlaying = this.playing;
+      super.advance(seconds);
+      if (wasPlaying && !this.playing) this.follow();
+    } else if (this.time !== recording.end) {
+      this.time = recording.end;
+      this._changed();
+    }
+  }
+}
