@@ -3,7 +3,9 @@
 A file of JSON lines. The first holds the scene; a run that began from a checkpoint has a copy of it beside the file.
 `{"tick": t, "inputs": [[source, writer, writer_kind, operation, names, values, texts], ...]}` gives what is applied at
 t and at every tick after it, until the next such line. `{"tick": t, "hash": h}` says that t was reached, with that
-state; with `"failed": true` the guard stopped the run there.
+state; with `"failed": true` the guard stopped the run there. `{"tick": t, "variables": [[place, value], ...]}` says
+which of a controller's recorded variables have changed at its scan; `"names": [...]` in such a line, which these are
+from then on.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +27,7 @@ FILE_NAME = "inputs.jsonl"
 START_NAME = "start.npz"
 """The checkpoint from which a run began, beside its inputs, and in the folder of a bag."""
 
-FORMAT = 2
+FORMAT = 3
 """Raised by one whenever the layout of the file changes."""
 
 FLUSH_INTERVAL = 1.0
@@ -48,6 +51,8 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
         self._flush_at = self._next + self._interval
         self._last = _NONE
         self._failed = False
+        self._names: Sequence[str] = ()
+        self._values: Sequence[float] = ()
         scene = simulation.scene
         header = {
             "format": FORMAT,
@@ -80,6 +85,23 @@ class InputLog(contextlib.AbstractContextManager["InputLog"]):
             self._write({"tick": tick, "inputs": waiting})
             self._last = now
         self._next = tick + 1
+
+    def note_variables(self, names: Sequence[str], values: Sequence[float]) -> None:
+        """Note a controller's variables after its scan at the present tick, if any are recorded.
+
+        Raises BagError if it can't be written.
+        """
+        if not names:
+            return
+        line: dict[str, Any] = {"tick": self._sim.tick}
+        if names != self._names:
+            line["names"] = self._names = names
+            line["variables"] = list(enumerate(values))
+        else:
+            both = enumerate(zip(self._values, values, strict=True))
+            line["variables"] = [(place, now) for place, (before, now) in both if now != before]
+        self._values = values
+        self._write(line)
 
     def after_tick(self) -> None:
         """A tick has passed. Raises BagError if what came so far can't be written."""

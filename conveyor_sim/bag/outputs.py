@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
+from conveyor_sim.observe.variables import VariableColumns
 
 if TYPE_CHECKING:
     from conveyor_sim.line.inputs import CommandOutcome
@@ -80,6 +83,12 @@ class Outputs:
         if run != self._run:
             self._run = run
             self._hand_out("run_state", OUTPUTS["run_state"], self._header(self._sim.tick), _itself, run)
+
+    def show_variables(self, names: Sequence[str], values: Sequence[float]) -> None:
+        """Writes what a controller's variables are after its scan at the present tick, if any are to be recorded."""
+        if names:
+            columns = VariableColumns(names, np.asarray(values, np.float64))
+            self._hand_out("variables", OUTPUTS["variables"], self._header(self._sim.tick), _itself, columns)
 
     def _write_eyes(self) -> None:
         eyes, row = self._sim.line.photo_eyes(), TOPICS["photo_eyes/<eye>"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,9 @@ from conveyor_sim.support.printable import SENTENCE, printable
 MOST = 512 * MB
 """Bytes of a file of inputs."""
 
+Watcher = Callable[[Simulation, Mapping[str, float]], None]
+"""Called with a simulation and the variables of its controller that are recorded."""
+
 
 @dataclass(frozen=True)
 class Rerun:
@@ -38,6 +41,16 @@ class Rerun:
 
 
 @dataclass(frozen=True)
+class _Changed:
+    """What a scan made of a controller's variables that are recorded."""
+
+    names: tuple[str, ...] | None
+    """None: the same as before."""
+    values: list[tuple[int, float]]
+    """Places and values of those that changed."""
+
+
+@dataclass(frozen=True)
 class _Run:
     """What a file of inputs says."""
 
@@ -46,6 +59,8 @@ class _Run:
     environment: list[str]
     inputs: dict[int, list[Input]]
     """By the tick from which on they are applied."""
+    variables: dict[int, _Changed]
+    """By the tick of the scan."""
     hashes: dict[int, int]
     last: int
     """The tick that was reached at least."""
@@ -56,15 +71,15 @@ def rerun(
     folder: Path,
     bag: Path,
     progress: Callable[[float, float], None] | None = None,
-    watch: Callable[[Simulation], None] | None = None,
+    watch: Watcher | None = None,
 ) -> Rerun:
     """Simulate a run again with the inputs in a folder, and record it to another folder, new or empty.
 
     A copy of the checkpoint from which the run began, if it did, is put into the bag's folder: a replay needs it.
-    progress(done, total) is called with simulated times, s; watch with the simulation at its start and after each tick,
-    to look at. Raises BagError for inputs that are missing, damaged or
-    still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not sound. What ends
-    it early leaves no bag.
+    progress(done, total) is called with simulated times, s; watch at the start and after each tick, with the
+    simulation, to look at, and the recorded variables of its controller. Raises BagError for inputs that are missing,
+    damaged or still being written, and if the bag can't be recorded; CheckpointError for a checkpoint that is not
+    sound. What ends it early leaves no bag.
     """
     path = folder / FILE_NAME
     run = _read(path)
@@ -97,7 +112,7 @@ def _simulate(
     simulation: Simulation,
     recorder: Recorder,
     progress: Callable[[float, float], None] | None,
-    watch: Callable[[Simulation], None] | None,
+    watch: Watcher | None,
 ) -> str:
     """Run to the end; where it departs from the states that were noted, in words."""
     outputs = Outputs(simulation, [recorder], run_id=uuid.uuid4().hex)
@@ -106,8 +121,17 @@ def _simulate(
     total = run.last * simulation.model.tick_ns * 1e-9
     applied: list[Input] = []
     departure = _departure(run, simulation)
-    if watch is not None:
-        watch(simulation)
+    variables: dict[str, float] = {}
+
+    def show() -> None:
+        nonlocal variables
+        if (scanned := run.variables.get(simulation.tick)) is not None:
+            variables = _after(variables, scanned)
+            outputs.show_variables(tuple(variables), tuple(variables.values()))
+        if watch is not None:
+            watch(simulation, variables)
+
+    show()
     while simulation.tick < run.last or run.failed:
         applied = run.inputs.get(simulation.tick, applied)
         for given in applied:
@@ -120,8 +144,7 @@ def _simulate(
             expected = run.failed and simulation.tick == run.last
             return departure or ("" if expected else f"the run stops at {simulation.time:.2f} s ({error})")
         outputs.after_tick()
-        if watch is not None:
-            watch(simulation)
+        show()
         departure = departure or _departure(run, simulation)
         if simulation.tick > run.last:
             return departure or f"the run goes on after {total:.2f} s, where it stopped"
@@ -129,6 +152,14 @@ def _simulate(
             progress(simulation.time, total)
     outputs.show_run(RunState(ENDED))
     return departure
+
+
+def _after(variables: dict[str, float], scanned: _Changed) -> dict[str, float]:
+    """Variables by name after a scan."""
+    names = tuple(variables) if scanned.names is None else scanned.names
+    now = dict(variables) if scanned.names is None else dict.fromkeys(names, 0.0)
+    now.update((names[place], value) for place, value in scanned.values)
+    return now
 
 
 def _departure(run: _Run, simulation: Simulation) -> str:
@@ -152,7 +183,9 @@ def _read(path: Path) -> _Run:
     except FileError as error:
         raise BagError(f"{path}: {error}, expected the inputs of a run") from error
     inputs: dict[int, list[Input]] = {}
+    variables: dict[int, _Changed] = {}
     hashes: dict[int, int] = {}
+    known: tuple[str, ...] = ()
     last, failed = 0, False
     lines = text.split("\n")[:-1]
     try:
@@ -170,12 +203,16 @@ def _read(path: Path) -> _Run:
             last = tick
             if "inputs" in entry:
                 inputs[tick] = [_input(*given) for given in entry["inputs"]]
+            elif "variables" in entry:
+                names = tuple(str(name) for name in entry["names"]) if "names" in entry else None
+                known = known if names is None else names
+                variables[tick] = _Changed(names, [(range(len(known))[at], float(to)) for at, to in entry["variables"]])
             else:
                 hashes[tick] = int(entry["hash"])
                 failed = bool(entry.get("failed"))
     except (IndexError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise BagError(f"{path}: is damaged ({printable(error)}), expected the inputs of a run") from error
-    return _Run(scene, from_checkpoint, environment, inputs, hashes, last, failed)
+    return _Run(scene, from_checkpoint, environment, inputs, variables, hashes, last, failed)
 
 
 def _input(source: Any, writer: Any, kind: Any, operation: Any, names: Any, values: Any, texts: Any) -> Input:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.bag import messages
+from conveyor_sim.bag.entries import bin_name, bottle_name, command_name, contact_name
 from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header, Outcome
 from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
@@ -19,6 +20,7 @@ from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColu
 from conveyor_sim.observe.events import EventColumns, event_columns
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.observe.read_back import ReadBackColumns
+from conveyor_sim.observe.variables import VariableColumns
 from conveyor_sim.scene.marks import marks_of
 
 if TYPE_CHECKING:
@@ -91,6 +93,8 @@ class Topic:
     """By a replay."""
     subscribed: bool = False
     """Whether it is sent to the line, and not by it."""
+    by_controller: bool = False
+    """Whether it comes from a controller beside the line, and not from the node."""
 
     @property
     def each_counts(self) -> bool:
@@ -116,27 +120,6 @@ class Topic:
 def to_columns(kind: Callable[..., Any], message: Any) -> Any:
     """The dataclass that a message holds field by field."""
     return kind(**{field.name: getattr(message, field.name) for field in fields(kind)})  # type: ignore[arg-type]
-
-
-def _bottle_name(line: Any, message: Any, index: int) -> str:
-    return f"bottle {message.id[index]}"
-
-
-def _contact_name(line: Any, message: Any, index: int) -> str:
-    other = int(message.b[index])
-    if message.kind[index] == 0:
-        return f"the contact of bottles {message.a[index]} and {other}"
-    rail = line.rails[other] if other < len(line.rails) else other
-    return f"the contact of bottle {message.a[index]} and rail {rail}"
-
-
-def _command_name(line: Any, message: Any, index: int) -> str:
-    names = line.command_names
-    return f"command {names[index]}" if index < len(names) else ""  # of the writers there may be more
-
-
-def _bin_name(line: Any, message: Any, index: int) -> str:
-    return f"rail {line.rails[message.rail[index]]} at ({message.x[index]:.4g}, {message.y[index]:.4g}) m"
 
 
 _MOTION = {"x": 1e-6, "y": 1e-6, "theta": 1e-5, "vx": 1e-4, "vy": 1e-4, "omega": 1e-3}
@@ -198,7 +181,7 @@ _ROWS = (
         rate="bottles",
         state=lambda now: now.bottles,
         columns=BottleColumns,
-        compare=Compare(_bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
+        compare=Compare(bottle_name, "id", {**_MOTION, "peak_force": 1e-2, "impulse": 1e-4}),
     ),
     Topic(
         "poses",
@@ -224,7 +207,7 @@ _ROWS = (
         rate="contacts",
         state=lambda now: now.sim.contacts(),
         columns=ContactColumns,
-        compare=Compare(_contact_name, "a"),
+        compare=Compare(contact_name, "a"),
     ),
     Topic(
         "belts",
@@ -270,7 +253,7 @@ _ROWS = (
         rate="damage",
         state=lambda now: now.sim.damage(),
         columns=DamageColumns,
-        compare=Compare(_bottle_name, "id"),
+        compare=Compare(bottle_name, "id"),
     ),
     Topic(
         "rail_wear",
@@ -280,7 +263,7 @@ _ROWS = (
         rate="damage",
         state=lambda now: now.sim.rail_wear(),
         columns=RailWearColumns,
-        compare=Compare(_bin_name),
+        compare=Compare(bin_name),
     ),
     Topic(
         "events",
@@ -300,7 +283,7 @@ _ROWS = (
         LATCHED,
         state=lambda now: now.sim.line.read_back.changes(),
         columns=ReadBackColumns,
-        compare=Compare(_command_name, within={"value": 1e-9}),
+        compare=Compare(command_name, within={"value": 1e-9}),
     ),
     Topic(
         "alarm_states",
@@ -311,6 +294,15 @@ _ROWS = (
         state=lambda now: now.sim.line.alarms.changes(),
         columns=AlarmColumns,
         compare=Compare(lambda line, message, index: f"alarm {message.id[index]}"),
+    ),
+    Topic(
+        "variables",
+        "conveyor_msgs/msg/Variables",
+        "a PLC program's variables that were to be [recorded](structured_text.md#variables-in-recordings); as a node, "
+        "by `controller_node`",
+        "each scan of the program",
+        columns=VariableColumns,
+        by_controller=True,
     ),
     Topic(
         "run_state",
@@ -337,6 +329,7 @@ _ROWS = (
         "latched, when one comes or goes",
         ALARMS,
         recorded=False,
+        by_controller=True,
     ),
     Topic(
         "/clock",

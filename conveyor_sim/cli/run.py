@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     "--out", "--record", "out", type=click.Path(path_type=Path), help="Folder to record to (default: runs/<UTC time>)."
 )
 @click.option("--duration", type=float, help="Simulated time in s, instead of the scene's.")
-@click.option("--controller", help="Has it scan at every tick: program.st, file.py:factory or module:factory.")
+@click.option("--controller", help="Scans at every tick: program.st, library.so, file.py:factory or module:factory.")
+@click.option("--parameters", default="", help="The controller's, by name: a mapping in YAML, or a .yaml file.")
+@click.option(
+    "--record-variables", "variables", multiple=True, help="The controller's: main/state, main/*; repeatable."
+)
 @click.option("--no-record", is_flag=True, help="Simulate only; nothing is written.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing; `conveyor-sim plot` does, any time later.")
 @click.option("--threads", type=click.IntRange(1), help="Threads to step with (default: as many as prove fastest).")
@@ -32,6 +36,8 @@ def run(
     out: Path | None,
     duration: float | None,
     controller: str | None,
+    parameters: str,
+    variables: tuple[str, ...],
     no_record: bool,
     no_pictures: bool,
     threads: int | None,
@@ -53,7 +59,10 @@ def run(
         from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path
 
-    controls = None if controller is None else _controller(controller)
+    for option, given in (("--parameters", parameters), ("--record-variables", variables)):
+        if given and controller is None:
+            raise ConveyorError(f"{option}: given without --controller, expected both or neither")
+    controls = None if controller is None else _controller(controller, parameters)
     loaded = load_scene(scene_path(scene), {} if duration is None else {"duration": duration}, outside_tables)
     model = build_model(loaded)
     click.echo(setting_line(model))
@@ -66,7 +75,7 @@ def run(
             drawing.get_ready()
     Compilation(loaded, say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
-        done = run_scene(loaded, folder, bar.update, threads, controls)
+        done = run_scene(loaded, folder, bar.update, threads, controls, variables)
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:
@@ -75,11 +84,12 @@ def run(
         report(done.bag, done.wall, drawing, done.spent)
 
 
-def _controller(reference: str) -> Controller:
+def _controller(reference: str, parameters: str) -> Controller:
     from conveyor_sim.control.scan import ControlError
+    from conveyor_sim.runs.controller_parameters import controller_parameters
     from conveyor_sim.st.load import load
 
     try:
-        return load(reference)
+        return load(reference, controller_parameters(parameters, "--parameters"))
     except ControlError as error:
         raise ConveyorError(str(error)) from error

@@ -34,7 +34,10 @@ def load(reference: str, parameters: Mapping[str, object] | None = None) -> Cont
     except TypeError as error:
         expected = ", ".join(map(str, inspect.signature(factory).parameters.values())) or "none"
         raise ControlError(f"controller {reference!r}: {error}; its parameters are {expected}") from None
-    controller: Controller = factory(**parameters)
+    try:
+        controller: Controller = factory(**parameters)
+    except (TypeError, ValueError) as error:
+        raise ControlError(f"controller {reference!r}: {error}; its parameters were {dict(parameters)}") from error
     if not callable(getattr(controller, "scan", None)):
         kind = type(controller).__name__
         raise ControlError(f"controller {reference!r}: made a {kind}, expected an object with scan(inputs)")

@@ -63,7 +63,8 @@ class Inputs(Mapping[str, float]):
 class Controller(Protocol):
     """Anything with a scan. One with an attribute `declared_alarms` (a sequence of Alarm) says by it what its alarms
     are; the others are as by default. One with a method `bind` is given the line's tags (`line_tags.py`) before its
-    first scan; one with an attribute `variables` (a mapping of numbers by name) shows these to a test's conditions.
+    first scan; one with an attribute `variables` (a mapping of numbers by name) shows these to a test's conditions, and
+    by an attribute `record` (patterns) says which of them are recorded (`recorded.py`).
     """
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
@@ -135,6 +136,11 @@ class _Together:
         """Those of all of them."""
         return _variables(self.controllers)
 
+    @property
+    def record(self) -> tuple[str, ...]:
+        """The patterns of all of them."""
+        return _record(self.controllers)
+
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
         given_by: dict[str, Controller] = {}
@@ -170,6 +176,11 @@ class _Priority:
         """Those of all of them."""
         return _variables(self.controllers)
 
+    @property
+    def record(self) -> tuple[str, ...]:
+        """The patterns of all of them."""
+        return _record(self.controllers)
+
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         merged: dict[str, float] = {}
         for answer in [controller.scan(inputs) for controller in self.controllers]:
@@ -181,6 +192,10 @@ class _Priority:
 def _variables(controllers: Iterable[Controller]) -> Mapping[str, float]:
     shown: Any = [getattr(controller, "variables", {}) for controller in controllers]
     return ChainMap(*shown)  # read only, and read when it is asked for
+
+
+def _record(controllers: Iterable[Controller]) -> tuple[str, ...]:
+    return tuple(pattern for controller in controllers for pattern in getattr(controller, "record", ()))
 
 
 def together(*controllers: Controller) -> Controller:

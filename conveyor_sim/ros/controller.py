@@ -17,12 +17,14 @@ from conveyor_msgs.srv import Lockstep
 from rclpy.node import Node
 
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs, declared_alarms
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.lockstep_client import LockstepClient
 from conveyor_sim.ros.publishers import ros_qos
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.ros.variables import Variables
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.support.stop_request import StopRequest
@@ -44,15 +46,17 @@ class Scanner:
     too.
     """
 
-    def __init__(self, controller: Controller, line: Any, alarms: Alarms) -> None:
+    def __init__(self, controller: Controller, line: Any, alarms: Alarms, variables: Variables) -> None:
         """line: conveyor_msgs/Line."""
         self._controller = controller
         self._names: Sequence[str] = line.signal_names
         self._tick_ns: int = line.tick_ns
         self._alarms = alarms
+        self._variables = variables
         self._changes = AlarmChanges()
         try:
             self._declared = declared_alarms(controller)
+            self._recorded = Recorded(controller)
         except ControlError as error:
             raise ConveyorError(str(error)) from error
 
@@ -73,7 +77,9 @@ class Scanner:
             )
         except ControlError as error:
             raise ConveyorError(f"scan at tick {tick}: {error}") from error
-        self._alarms.tell(_alarms(answer), max(1, tick * self._tick_ns))
+        stamp_ns = max(1, tick * self._tick_ns)
+        self._alarms.tell(_alarms(answer), stamp_ns)
+        self._variables.tell(self._recorded.names, self._recorded.values(), tick, stamp_ns)
         commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
         return {**commands, **self._changes.of(answer)}
 
@@ -106,6 +112,7 @@ class ControllerRun:
         self._line: Any = None
         self._has_line = threading.Event()
         self._alarms = Alarms(node)
+        self._variables = Variables(node)
         node.create_subscription(Line, "line", self._on_line, ros_qos(TOPICS["line"].qos))
         self._lockstep = LockstepClient(node)
         self._spinner = Spinner(died=self._died)
@@ -166,7 +173,7 @@ class ControllerRun:
             time.sleep(LOOK)
 
     def _scanner(self, line: Any) -> Scanner:
-        return Scanner(self._make(line), line, self._alarms)
+        return Scanner(self._make(line), line, self._alarms, self._variables)
 
     def _left(self, line: Any, response: Any) -> bool:
         """Whether the simulation is in another run than that of `line`; if so, returns once its line has come."""

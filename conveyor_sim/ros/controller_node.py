@@ -22,7 +22,7 @@ with while_importing():
     from conveyor_sim.ros.context import new_node, running_ros
     from conveyor_sim.ros.controller import ControllerRun, Stopped
     from conveyor_sim.ros.declared import Entry, declare_table
-    from conveyor_sim.scene.yaml_lines import Document
+    from conveyor_sim.runs.controller_parameters import controller_parameters
     from conveyor_sim.st.load import load
     from conveyor_sim.support.printable import printable_lines
     from conveyor_sim.support.stop_request import StopRequest
@@ -31,8 +31,8 @@ NAME = "controller"
 MODES = ("lockstep", "free")
 
 PARAMETERS = (
-    Entry("controller", "", "program.st, module:factory or file.py:factory."),
-    Entry("parameters", "", "The factory's parameters by name, as a YAML mapping; of a program tags, modbus_map."),
+    Entry("controller", "", "program.st, library.so, module:factory or file.py:factory."),
+    Entry("parameters", "", "The factory's or program's parameters by name: a YAML mapping, or a file of one."),
     Entry("mode", "lockstep", "lockstep: the simulation waits for every scan; free: it does not."),
     Entry("scan_ticks", 1, "Ticks from one scan to the next.", 1, 10**6),
     Entry("run_id", NAME, "Name under which it owns the simulation in lockstep; the same after a restart."),
@@ -46,7 +46,7 @@ def run(stop: StopRequest) -> None:
     given = declare_table(node, PARAMETERS)
     if given["mode"] not in MODES:
         raise ConveyorError(f"parameter mode: {given['mode']!r} given, expected {' or '.join(MODES)}")
-    parameters = _mapping(given["parameters"])
+    parameters = controller_parameters(given["parameters"], "parameter parameters")
 
     def make(line: Any) -> Controller:
         try:
@@ -69,14 +69,6 @@ def run(stop: StopRequest) -> None:
             controller.run_free()
         else:
             controller.run_lockstep()
-
-
-def _mapping(text: str) -> dict[str, object]:
-    """What a YAML text says; "" is nothing. Raises ConveyorError."""
-    data = Document(text, "parameter parameters").data if text.strip() else {}
-    if not isinstance(data, dict):
-        raise ConveyorError(f"parameter parameters: {text!r} given, expected a mapping in YAML")
-    return data
 
 
 def main() -> None:

@@ -90,7 +90,8 @@ class SimNode:
         self._scene = load_scene(scene_path(self._given.scene), self._given.overrides(), self._given.outside_tables)
         if self._given.record is not None:
             require_recordable(self._given.record)
-        topics = {**OUTPUTS, **photo_eye_topics(self._scene.photo_eyes)}
+        own = {name: row for name, row in OUTPUTS.items() if not row.by_controller}
+        topics = {**own, **photo_eye_topics(self._scene.photo_eyes)}
         with one_sentence():  # names may have been remapped to one that is taken
             self._sink = RosSink(node, self._distro, {"markers": RateCap(self._given.marker_rate)}, topics)
         self._compilation = Compilation(self._scene, node.get_logger().info)

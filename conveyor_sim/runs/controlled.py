@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.control.line_tags import LineTags, bind
+from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
@@ -15,38 +17,49 @@ SOURCE = "controller"
 
 
 class Controlled:
-    """A simulation with a controller: `before_tick`, then the tick, then `after_tick` with what became of inputs."""
+    """A simulation with a controller: `scan`, `give`, then the tick, then `after_tick` with what became of inputs."""
 
-    def __init__(self, simulation: Simulation, controller: Controller) -> None:
-        """Raises ConveyorError for a controller that does not fit the line."""
+    def __init__(self, simulation: Simulation, controller: Controller, record: Sequence[str] = ()) -> None:
+        """record: patterns of its variables that are recorded, beside those that it has itself (`Recorded`).
+
+        Raises ConveyorError for a controller that does not fit the line, and for such a pattern.
+        """
         self._simulation, self._controller = simulation, controller
         self._names = simulation.process_image.signal_names
         self._changes = AlarmChanges()
+        self._answer: Mapping[str, float] = {}
         image = simulation.process_image
         kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
         try:
             bind(controller, LineTags(*kinds))
             declared = declared_alarms(controller)
+            self._recorded = Recorded(controller, record)
         except ControlError as error:
             raise ConveyorError(str(error)) from error
         if declared:
             ids, texts = tuple(one.id for one in declared), tuple(one.as_text() for one in declared)
             simulation.give(Input(SOURCE, type(controller).__name__, "controller", DECLARE, ids, (), texts))
 
-    def before_tick(self) -> None:
-        """One scan, and its commands. Raises ConveyorError for one that can't go on."""
+    def scan(self) -> None:
+        """One scan at the present tick. Raises ConveyorError for one that can't go on."""
         simulation = self._simulation
         signals = dict(zip(self._names, simulation.signals().tolist(), strict=True))
-        inputs = Inputs(signals, simulation.time, simulation.tick, simulation.scene.tick)
         try:
-            answer = self._controller.scan(inputs)
+            self._answer = self._controller.scan(
+                Inputs(signals, simulation.time, simulation.tick, simulation.scene.tick)
+            )
         except ControlError as error:
             raise ConveyorError(f"at {simulation.time:.2f} s: {error}") from error
+
+    def give(self, outputs: Outputs) -> None:
+        """Its commands to the line, its variables to the outputs."""
+        outputs.show_variables(self._recorded.names, self._recorded.values())
+        answer = self._answer
         commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
         commands |= self._changes.of(answer)
         if commands:
             names, values = tuple(commands), tuple(commands.values())
-            simulation.command(names, values, SOURCE, writer=type(self._controller).__name__)
+            self._simulation.command(names, values, SOURCE, writer=type(self._controller).__name__)
 
     def after_tick(self, outcomes: Sequence[CommandOutcome]) -> None:
         """Raises CommandError for a command that was refused."""

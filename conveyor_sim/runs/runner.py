@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from pathlib import Path
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
-from conveyor_sim.errors import SimulationError
+from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.runs.controlled import Controlled
 from conveyor_sim.runs.force_check import PeakWatch
@@ -53,28 +53,31 @@ def run_scene(
     progress: Callable[[float], None] | None = None,
     threads: int | None = None,
     controller: Controller | None = None,
+    record: Sequence[str] = (),
 ) -> Run:
     """Runs a scene for its duration and records it to the folder `bag`, if given.
 
     progress(simulated time, s) is called after every tick. threads: to step with, None has them chosen.
-    controller: scans at every tick. Ctrl-C ends the run at the next tick, with a whole bag; a second one ends the
-    process.
+    controller: scans at every tick. record: patterns of its variables that are recorded (`control/recorded.py`). Ctrl-C
+    ends the run at the next tick, with a whole bag; a second one ends the process.
     Raises SceneError, SimulationError, BagError if the recording can't be written, and ConveyorError for a controller
-    that can't go on.
+    that can't go on; one that can't begin leaves no recording.
     """
     simulation = Simulation(scene, threads)
+    controlled = None if controller is None else Controlled(simulation, controller, record)
+    if controlled is not None:
+        controlled.scan()
     recorder = Recorder(bag) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         peaks = PeakWatch(simulation)
-        controlled = None if controller is None else Controlled(simulation, controller)
         stepping, start = 0.0, time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             began = time.perf_counter()
             if controlled is not None:
-                controlled.before_tick()
+                controlled.give(outputs)
             try:
                 simulation.advance(1)
             except SimulationError as error:
@@ -84,7 +87,13 @@ def run_scene(
             stepping += time.perf_counter() - began
             outcomes = outputs.after_tick()
             if controlled is not None:
-                controlled.after_tick(outcomes)
+                try:
+                    controlled.after_tick(outcomes)
+                    if simulation.tick < scene.duration_ticks:
+                        controlled.scan()
+                except ConveyorError as error:
+                    outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
+                    raise
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.st.compile import compile_file
 from conveyor_sim.st.errors import StructuredTextError
 from conveyor_sim.st.mapping import Addresses, Mapped, mapped, read_addresses
 from conveyor_sim.st.program import BUDGET, Program, python_value
-from conveyor_sim.st.variables import Variable
-
-PREFIX = "plc/"
-"""What names of variables begin with among a line's signals."""
+from conveyor_sim.st.variables import Variable, load
 
 _NS = 1e9
 
@@ -32,16 +30,20 @@ class StructuredText:
         modbus_map: str | PathLike[str] | None = None,
         budget: int = BUDGET,
         trace: bool = False,
+        record: str | Iterable[str] = (),
     ) -> None:
         """path: of the program. tags: by variable ("main/speed"), over what the program says itself. modbus_map: the
         file that located variables (AT %IX0.0) are looked up in. budget: rounds of loops and calls of a task in one
-        scan, beyond which the watchdog stops it. trace: `last_written` knows who wrote; a scan takes longer.
+        scan, beyond which the watchdog stops it. trace: `last_written` knows who wrote; a scan takes longer. record:
+        patterns of variables that are recorded ("main/*", `control/recorded.py`).
 
         Raises StructuredTextError, a ControlError, for a program that can't be, and MapError for such a map.
         """
         self._tags = dict(tags or {})
         self._addresses: Addresses = {} if modbus_map is None else read_addresses(Path(modbus_map))
         self.program = Program(compile_file(Path(path), trace), budget)
+        self.record = patterns(record)
+        """Of variables that are recorded."""
         self.mapping: Mapped | None = None
         """Set by `bind`, before the first scan."""
         self._ins: list[tuple[Variable, str]] = []
@@ -98,11 +100,17 @@ class StructuredText:
 
     def force(self, name: str, value: float) -> None:
         """Hold a variable (plc/main/speed) at a value, before and after each scan. Raises StructuredTextError."""
-        self._forced[name] = python_value(self._variable(name).type, value)
+        kind = self._variable(name).type
+        try:
+            if kind.base.kind == "string":
+                raise StructuredTextError(f"found {kind.name}, expected a variable that holds a number")
+            self._forced[_plain(name)] = python_value(kind, value)
+        except (StructuredTextError, ValueError, OverflowError) as error:
+            raise StructuredTextError(f"{self.program.compiled.file}: {name}: {error}") from None
 
     def unforce(self, name: str) -> None:
         """Let go of it."""
-        self._forced.pop(name, None)
+        self._forced.pop(_plain(name), None)
 
     def last_written(self, name: str) -> str:
         """File, line and column of the statement that wrote a variable last; "" if none did.
@@ -118,12 +126,14 @@ class StructuredText:
             self._take()
 
     def snapshot(self) -> dict[str, Any]:
-        """All that changes, as plain data."""
-        return self.program.snapshot()
+        """All that changes, and what is forced, as plain data."""
+        return {**self.program.snapshot(), "forced": dict(self._forced)}
 
     def restore(self, data: Mapping[str, Any]) -> None:
         """Go on from a snapshot. Raises StructuredTextError for one of another program."""
         self.program.restore(data)
+        forced = data.get("forced", {})
+        self._forced = {str(name): load(self._variable(name).read(), value) for name, value in forced.items()}
         if self.mapping is not None:
             self._take()
 
@@ -132,10 +142,15 @@ class StructuredText:
             self._variable(name).write(value)
 
     def _variable(self, name: str) -> Variable:
-        found = self.program.variables.get(name.removeprefix(PREFIX).lower())
+        found = self.program.variables.get(_plain(name))
         if found is None:
             raise StructuredTextError(f"{name}: no such variable in {self.program.compiled.file}")
         return found
+
+
+def _plain(name: str) -> str:
+    """A variable's name as the program has it."""
+    return name.lower().removeprefix(PREFIX)
 
 
 class _Shown(Mapping[str, float]):

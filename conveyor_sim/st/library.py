@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
 
 PATIENCE = 60.0
@@ -29,12 +30,22 @@ class CompiledProgram:
     Two share nothing, whatever variables the library keeps outside of its instances.
     """
 
-    def __init__(self, path: str | PathLike[str], tags: Mapping[str, str], *, patience: float = PATIENCE) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        tags: Mapping[str, str],
+        *,
+        patience: float = PATIENCE,
+        record: str | Iterable[str] = (),
+    ) -> None:
         """path: of the library. tags: by variable, as the library names it. patience: s of wall time for a scan.
+        record: patterns of variables that are recorded, of those with tags ("*", `control/recorded.py`).
 
         Raises ControlError for a library that can't be loaded.
         """
         self._path, self._tags, self._patience = Path(path), dict(tags), patience
+        self.record = patterns(record)
+        """Of variables that are recorded."""
         if not self._path.is_file():
             raise ControlError(f"{path}: no such file, expected a shared library")
         if not self._tags:
@@ -63,7 +74,8 @@ class CompiledProgram:
             (self._outs if out else self._ins).append(tag)
             variables.append((name, int(out)))
         self._call("bind", variables)
-        self._names = {tag: f"plc/{name}" for name, tag in self._tags.items()}
+        self._names = {tag: f"{PREFIX}{name}" for name, tag in self._tags.items()}
+        self._shown = dict.fromkeys(self._names.values(), 0.0)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Commands and alarms. Raises ControlError if the program stops, crashes, or does not end its scan."""
@@ -77,7 +89,7 @@ class CompiledProgram:
 
     @property
     def variables(self) -> Mapping[str, float]:
-        """Those that have tags, as plc/<name>, of the last scan."""
+        """Those that have tags, as plc/<name>, of the last scan; before the first 0."""
         return self._shown
 
     def snapshot(self) -> dict[str, Any]:

@@ -84,7 +84,7 @@ def keep_page(scenario: Scenario, bag: Path, path: Path, watch: Watch) -> Path:
     Raises BagError, and ConveyorError if the file can't be written.
     """
     failure = Failure(scenario.time, scenario.failure or "the test failed")
-    known = scenario.simulation.process_image.signal_names
+    known = {*scenario.simulation.process_image.signal_names, *watch.variables}
     trends = [name for name in traced(scenario) if name in known]
     return write_page(bag, path, failures=[failure], watch=watch, trends=trends)
 

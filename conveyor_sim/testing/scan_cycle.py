@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.memory import restore, snapshot
+from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.simulation import Simulation
@@ -43,6 +44,8 @@ class ScanCycle:
         self._plc: AttachedPlc | ServedPlc | None = None
         self._answer: Mapping[str, float] = {}
         self._changes = AlarmChanges()
+        self.recorded = Recorded(None)
+        """The controller's variables that are recorded."""
         self.read: dict[str, None] = {}
         """Names of the signals that were read, in the order of the first reading."""
         # Those of a controller before a checkpoint: one that is attached now and does not have them clears them.
@@ -69,6 +72,7 @@ class ScanCycle:
         image = self._simulation.process_image
         kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
         bind(controller, LineTags(*kinds))
+        self.recorded = Recorded(controller)
         self._controller = controller
         if declared := declared_alarms(controller):
             ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
@@ -127,6 +131,7 @@ class ScanCycle:
             if outsider is not None:
                 outsider.close()
         self._node = self._plc = None
+        self.recorded = Recorded(None)
 
     def answers_for(self, outcome: CommandOutcome) -> bool:
         """Whether that was of the PLC which is attached, and not of another client of a server."""

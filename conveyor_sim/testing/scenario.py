@@ -85,6 +85,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self._outputs.start()
         self._outputs.show_run(RunState(RUNNING))
         self._inputs = None if inputs is None else InputLog(inputs, self.simulation, began)
+        self._noting = [self._outputs.show_variables, *([self._inputs.note_variables] if self._inputs else [])]
         self._cycle = ScanCycle(self.simulation, self._give)
         self._alarms: dict[str, float] = {}
         self._standing: list[Assertion] = []
@@ -321,10 +322,8 @@ class Scenario(AbstractContextManager["Scenario"]):
     def _fail(self, assertion: Assertion, head: str, present: Present) -> NoReturn:
         __tracebackhide__ = True
         self.failed, self.failure = assertion, head
-        raise AssertionError(f"{head}; the signals that it reads:\n{self._values(present)}")
-
-    def _values(self, present: Present) -> str:
-        return values(present.read, present, self.history.unit, self.simulation.line.forcing.names)
+        shown = values(present.read, present, self.history.unit, self.simulation.line.forcing.names)
+        raise AssertionError(f"{head}; the signals that it reads:\n{shown}")
 
     def _step(self) -> None:
         __tracebackhide__ = True
@@ -380,6 +379,8 @@ class Scenario(AbstractContextManager["Scenario"]):
 
     def _scan(self) -> None:
         said = self._cycle.scan(self._present(self._signals))
+        for note in self._noting:
+            note(self._cycle.recorded.names, self._cycle.recorded.values())
         # The line is given them as the next tick begins; until then they are there, and don't stand.
         if new := {name: 0.0 for name in said if name not in self._alarms}:
             self._alarms |= new

@@ -48,7 +48,7 @@ class Content:
     belts: list[tuple[int, Floats]] = field(default_factory=list)
     """Ticks and actual speeds, m/s."""
     signals: list[tuple[int, Floats]] = field(default_factory=list)
-    """Ticks and values; of forced ones what is read."""
+    """Ticks and values, of forced ones what is read; then those of a controller's variables, from when there are."""
 
 
 def pack(content: Content, start: int) -> bytes:
@@ -131,7 +131,8 @@ def _columns(rows: Sequence[tuple[int, Floats]], start: int) -> list[Integers]:
     ticks = np.array([tick for tick, _ in rows], dtype=np.int64)
     if not rows:
         return [ticks] * 4
-    table = np.stack([values for _, values in rows])
+    wide = max(len(values) for _, values in rows)
+    table = np.stack([np.pad(values, (0, wide - len(values)), constant_values=np.nan) for _, values in rows])
     strange = ~np.isfinite(table) | (np.abs(table) >= -UNKNOWN)
     table = np.where(strange, UNKNOWN, table).astype(np.int64)
     steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), np.int64))

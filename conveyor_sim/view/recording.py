@@ -9,9 +9,10 @@ from typing import Any
 
 from conveyor_sim.bag.messages import to_image
 from conveyor_sim.bag.reader import Bag
+from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.view.block import SECONDS, block_ticks, pack
-from conveyor_sim.view.content import DRAWN, Collector
+from conveyor_sim.view.content import DRAWN, VARIABLES, Collector
 from conveyor_sim.view.head import head
 from conveyor_sim.view.stamps import Stamps
 from conveyor_sim.view.story import TOPICS_READ, Story
@@ -43,6 +44,8 @@ class Recording:
             bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
         )
         self._stamps = Stamps(bag, (*DRAWN, *TOPICS_READ))
+        is_ours = bag.types.get(VARIABLES) == TOPICS[VARIABLES].type
+        self._variables: list[str] = next((list(one.data.name) for one in bag.read(VARIABLES)), []) if is_ours else []
         self._began = self.first = int(bag.line.tick)
         self.last = max(self.first, self._stamps.last)
         self._block_ticks = block_ticks(self._tick_ns, detail.block)
@@ -76,14 +79,17 @@ class Recording:
             "stories": self.stories,
         }
         forced: list[int] = next((to_image(frame.data).forced.tolist() for frame in self._bag.messages("signals")), [])
-        return {**head(self._bag.line, self._scene), "times": times, "forced": forced}
+        shown = head(self._bag.line, self._scene)
+        shown["signals"] += self._variables
+        return {**shown, "times": times, "forced": forced}
 
     def block(self, number: int) -> bytes:
         """A block, from 0 on, as `block.pack` writes it."""
         start = self.first + number * self._block_ticks
         gaps = {name: max(1, round(1e9 / getattr(self._detail, name) / self._tick_ns)) for name in DRAWN}
-        collector = Collector(self._bag, start, gaps)
-        for topic, tick, raw in self._stamps.messages(DRAWN, start, min(start + self._block_ticks, self.last + 1)):
+        collector = Collector(self._bag, start, gaps, self._variables)
+        topics = (*DRAWN, VARIABLES) if self._variables else DRAWN
+        for topic, tick, raw in self._stamps.messages(topics, start, min(start + self._block_ticks, self.last + 1)):
             collector.add(topic, tick, raw)
         return pack(collector.content, start)
 

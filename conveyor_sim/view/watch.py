@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections import deque
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,10 @@ FRAMES, CONTACTS = 25.0, 12.5
 
 
 class Watch:
-    """Called with the simulation at its start and after every tick; only looks, and keeps deflated blocks."""
+    """Called with the simulation at its start and after every tick; only looks, and keeps deflated blocks.
+
+    The controller's recorded variables are further columns of the signals, those that there were at first.
+    """
 
     def __init__(self, last: float) -> None:
         """last: s that are kept, at least."""
@@ -28,6 +32,8 @@ class Watch:
         self._content = Content()
         self._start = -1
         self._block = 1
+        self.variables: tuple[str, ...] = ()
+        """Names of the controller's variables."""
         self.end = -1
         """The last tick that was seen; -1: none."""
 
@@ -40,7 +46,7 @@ class Watch:
         """The blocks, deflated, the last one up to now."""
         return [*self._kept, _deflated(self._content, self._start)]
 
-    def __call__(self, simulation: Simulation) -> None:
+    def __call__(self, simulation: Simulation, variables: Mapping[str, float]) -> None:
         """Look at the present tick."""
         tick, seconds = simulation.tick, simulation.model.tick_ns * 1e-9
         if self._start < 0:
@@ -60,7 +66,9 @@ class Watch:
         if (tick - self._start) % max(every, round(1.0 / CONTACTS / seconds)) == 0:
             self._content.contacts.append((tick, contacts))
         self._content.belts.append((tick, simulation.belts().actual))
-        self._content.signals.append((tick, simulation.signals()))
+        self.variables = self.variables or tuple(variables)
+        shown = [variables.get(name, np.nan) for name in self.variables]
+        self._content.signals.append((tick, np.concatenate([simulation.signals(), shown])))
 
 
 def with_forces(bottles: BottleColumns, contacts: ContactColumns) -> BottleColumns:

@@ -61,6 +61,7 @@ def test_rates_are_those_of_the_scene(scene: Scene) -> None:
         "readback": 3,
         "alarm_states": 1,
         "run_state": 0,
+        "variables": 0,
         "plant": 1,
         "outcomes": 4,
         "bottles": every_other_tick,
@@ -79,7 +80,7 @@ def test_an_output_that_is_switched_off_is_not_written() -> None:
     scene = load_scene(SMALL_LINE, {"outputs": {"poses": 0, "contacts": 0}})
     sink = Collector(set(OUTPUTS))
     run(scene, [sink], 10)
-    off = {"poses", "markers", "contacts", "run_state"}  # the last is said by whoever steps it
+    off = {"poses", "markers", "contacts", "run_state", "variables"}  # the last two are said by whoever steps it
     assert {topic for topic, _, _ in sink.taken} == set(OUTPUTS) - SILENT - off
 
 

@@ -41,7 +41,7 @@ COUNTS = {
     "/counters": 2,
     "/events": 8,
 }
-SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events", "/run_state"), 0)
+SILENT = dict.fromkeys(("/guard", "/ledger", "/damage", "/rail_wear", "/damage_events", "/run_state", "/variables"), 0)
 """Nothing was to be told, nothing asked for."""
 
 

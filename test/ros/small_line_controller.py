@@ -15,10 +15,13 @@ class TableFull:
 
     def __init__(self, high: float) -> None:
         self.high = high
+        self.variables = {"count/bottles": 0.0}
+        self.record = ("count/*",)
         self.declared_alarms = (Alarm("table full", f"{high:g} bottles on the table", "error", tag=BOTTLES),)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """The alarm."""
+        self.variables = {"count/bottles": inputs[BOTTLES]}
         return {"alarms/table full": float(inputs[BOTTLES] >= self.high)}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conveyor_msgs.msg import CommandOutcome, Signals
+from conveyor_msgs.msg import CommandOutcome, Signals, Variables
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, halted, until
@@ -118,6 +118,9 @@ def test_running_free_it_commands_as_signals_arrive(
         until(lambda: any(runs(outcome) for outcome in outcomes.messages), "a command")
         assert {(outcome.source, outcome.accepted) for outcome in outcomes.messages} == {("commands", True)}
         until(lambda: signals.messages[-1].values[0] == 0.7, "the feeder at its speed")
+        with client.listen(Variables, "variables") as variables:
+            until(lambda: variables.messages, "the controller's variables")
+    assert all(message.name == ["count/bottles"] and message.value[0] > 0 for message in variables.messages)
     node.stop()
 
 

@@ -59,7 +59,7 @@ def test_parameters_of_a_program_are_tags_and_a_map(tmp_path: Path) -> None:
     program = tmp_path / "p.st"
     program.write_text("PROGRAM p VAR x : INT; END_VAR ; END_PROGRAM")
     load(str(program), {"tags": {"p/x": "zones/z/bottles"}})
-    with pytest.raises(ControlError, match="expected none, tags"):
+    with pytest.raises(ControlError, match="speed: 1 given, expected tags"):
         load(str(program), {"speed": 1})
     for nowhere in ("nowhere.st", "nowhere.so"):
         with pytest.raises(ControlError, match="no such file"):

@@ -177,7 +177,7 @@ def test_of_another_version_the_versions_are_named(tmp_path: Path) -> None:
     [
         (lambda lines: [], "is damaged"),
         (lambda lines: ["{", *lines[1:]], "is damaged"),
-        (lambda lines: [lines[0].replace('"format": 2', '"format": 1'), *lines[1:]], "format 1 of inputs, expected 2"),
+        (lambda lines: [lines[0].replace('"format": 3', '"format": 1'), *lines[1:]], "format 1 of inputs, expected 3"),
         (lambda lines: [*lines, '{"tick": 50, "hash": 1}'], r"is damaged \(ticks out of order\)"),
         (
             lambda lines: [*lines, '{"tick": 1000, "inputs": [["watchdog", "watchdog", "line", "set", [], [], []]]}'],
