@@ -17,7 +17,7 @@ SOURCE = "controller"
 
 
 class Controlled:
-    """A simulation with a controller: `scan`, `give`, then the tick, then `after_tick` with what became of inputs."""
+    """A simulation with a controller: `before_tick`, then the tick, then `after_tick` with what became of inputs."""
 
     def __init__(self, simulation: Simulation, controller: Controller, record: Sequence[str] = ()) -> None:
         """record: patterns of its variables that are recorded, beside those that it has itself (`Recorded`).
@@ -28,6 +28,7 @@ class Controlled:
         self._names = simulation.process_image.signal_names
         self._changes = AlarmChanges()
         self._answer: Mapping[str, float] = {}
+        self._scanned = -1
         image = simulation.process_image
         kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
         try:
@@ -41,8 +42,11 @@ class Controlled:
             simulation.give(Input(SOURCE, type(controller).__name__, "controller", DECLARE, ids, (), texts))
 
     def scan(self) -> None:
-        """One scan at the present tick. Raises ConveyorError for one that can't go on."""
+        """One scan at the present tick, if there was none. Raises ConveyorError for one that can't go on."""
         simulation = self._simulation
+        if self._scanned == simulation.tick:
+            return
+        self._scanned = simulation.tick
         signals = dict(zip(self._names, simulation.signals().tolist(), strict=True))
         try:
             self._answer = self._controller.scan(
@@ -51,9 +55,11 @@ class Controlled:
         except ControlError as error:
             raise ConveyorError(f"at {simulation.time:.2f} s: {error}") from error
 
-    def give(self, outputs: Outputs) -> None:
-        """Its commands to the line, its variables to the outputs."""
-        outputs.show_variables(self._recorded.names, self._recorded.values())
+    def before_tick(self, outputs: Outputs | None) -> None:
+        """One scan, its commands to the line, its variables to the outputs. Raises as `scan`."""
+        self.scan()
+        if outputs is not None:
+            outputs.show_variables(self._recorded.names, self._recorded.values())
         answer = self._answer
         commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
         commands |= self._changes.of(answer)

@@ -76,24 +76,21 @@ def run_scene(
         stepping, start = 0.0, time.monotonic()
         while simulation.tick < scene.duration_ticks and not stop.is_set():
             began = time.perf_counter()
-            if controlled is not None:
-                controlled.give(outputs)
             try:
+                if controlled is not None:
+                    controlled.before_tick(outputs)
                 simulation.advance(1)
             except SimulationError as error:
                 outputs.after_failure()
                 outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
                 raise keep_stopped(simulation, bag, error) from error
+            except ConveyorError as error:  # of the controller
+                outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
+                raise
             stepping += time.perf_counter() - began
             outcomes = outputs.after_tick()
             if controlled is not None:
-                try:
-                    controlled.after_tick(outcomes)
-                    if simulation.tick < scene.duration_ticks:
-                        controlled.scan()
-                except ConveyorError as error:
-                    outputs.show_run(RunState(STOPPED, printable(error, SENTENCE)))
-                    raise
+                controlled.after_tick(outcomes)
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)

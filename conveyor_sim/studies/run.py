@@ -148,7 +148,7 @@ def _started(scene: Scene, start: Path | bytes | None) -> Simulation:
 
 def _tick(simulation: Simulation, controlled: Controlled | None, outputs: Outputs | None) -> None:
     if controlled is not None:
-        controlled.before_tick()
+        controlled.before_tick(outputs)
     simulation.advance(1)
     outcomes = simulation.take_outcomes() if outputs is None else outputs.after_tick()
     if controlled is not None:
