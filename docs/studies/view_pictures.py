@@ -1,90 +1,197 @@
-"""The pictures of the page in docs/ and README: python docs/studies/view_pictures.py, with playwright and Pillow."""
+"""The pictures of the page in docs/ and README: python docs/studies/view_pictures.py [NAME ...].
+
+Needs playwright, Pillow and Chromium, as the tests do. Without names all are made anew, in about three minutes.
+"""
 
 from __future__ import annotations
 
 import io
+import os
 import shutil
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
+from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
 from conveyor_sim.runs.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
-from conveyor_sim.view.one_file import write_page
+from conveyor_sim.view.one_file import Failure, write_page
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
-FRAME = 80
-"""ms of an animated picture: two frames of a page."""
+MOMENT = 80
+"""ms that a frame of a moving line stands: two frames of the page at 25 Hz."""
+QUALITY = 40
+"""Of WebP, for those."""
+FAILING = """
+from test_jam import check_wedge, too_late, wedged
+
+def test_a_wedged_pair_is_alarmed_within_5_s(line):
+    check_wedge(wedged(line, "abreast"), too_late())
+"""
+"""A test with a controller that raises its alarm too late."""
 
 sys.path.insert(0, str(ROOT / "test"))
+from view.conftest import BROWSERS  # noqa: E402
 from view.line import record  # noqa: E402
+from view.states import STATES, State, at  # noqa: E402
 
 
-def line(page: Any) -> None:
-    """The capper stands."""
-    page.focus("#scrubber")
-    for _ in range(16):
-        page.keyboard.press("ArrowRight")
+class Studio:
+    """A browser, and recordings that are made when a picture needs them."""
+
+    def __init__(self, browser: Any, folder: Path) -> None:
+        self._browser, self._folder = browser, folder
+
+    @contextmanager
+    def page(self, html: Path, size: tuple[int, int]) -> Iterator[Any]:
+        """A page, ready to be looked at."""
+        page = self._browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.goto(html.as_uri())
+        page.wait_for_selector("body[data-told]")
+        yield page
+        page.close()
+
+    def bag(self, name: str) -> Path:
+        """The line of the tests (`line`, `other`), or a shipped scene."""
+        bag = self._folder / "runs" / name
+        if not bag.exists():
+            bag.parent.mkdir(exist_ok=True)
+            if name in ("closes_at_6_s", "stays_open"):
+                record(bag, closes=name == "closes_at_6_s")
+            else:
+                run_scene(load_scene(scene_path(name)), bag)
+        return bag
+
+    def state(self, state: State) -> Path:
+        """The page of a state of the tests."""
+        html = self._folder / f"{state.of}.html"
+        failures = [Failure(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
+        other = self.bag("stays_open") if state.of == "pair" else None
+        return write_page(self.bag("closes_at_6_s"), html, failures=failures, other=other)
+
+    def shipped(self, scene: str) -> Path:
+        """The page of a shipped scene."""
+        return write_page(self.bag(scene), self._folder / f"{scene}.html")
+
+    def failure(self) -> Path:
+        """The page that pytest leaves of a test that fails."""
+        file = self._folder / "test_late.py"
+        file.write_text(FAILING)
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--line-failures", "left", file.name]
+        paths = os.pathsep.join([str(ROOT / "examples" / "scenarios"), str(ROOT)])
+        subprocess.run(command, cwd=self._folder, env={**os.environ, "PYTHONPATH": paths}, check=False)
+        return next(self._folder.glob("left/*/line.html"))
 
 
-def bottle(page: Any) -> None:
-    """The bottle that waits for it, dark."""
-    line(page)
-    page.click("#theme")
-    x, y, scale, width, height = map(float, page.get_attribute("#plan", "data-camera").split())
-    page.click("#plan", position={"x": width / 2 + (1.96 - x) * scale, "y": height / 2 + y * scale})
-    page.keyboard.press("f")
-    for _ in range(5):
-        page.keyboard.press("+")
-    page.select_option("#colour", "force")
+def still(name: str) -> Callable[[Studio], None]:
+    """A state of the tests."""
+
+    def make(studio: Studio) -> None:
+        state = STATES[name]
+        with studio.page(studio.state(state), state.size) as page:
+            if state.of == "pair":
+                page.wait_for_selector("body[data-compared]")
+            state.reach(page)
+            page.wait_for_timeout(500)
+            grab(page).save(IMAGES / f"{name}.webp", lossless=True, method=6)
+
+    return make
 
 
-PICTURES: dict[str, Callable[[Any], None]] = {"view_line": line, "view_bottle": bottle}
+def grab(page: Any, found: str = "body") -> Image.Image:
+    """What is to be seen now."""
+    page.wait_for_timeout(60)
+    return Image.open(io.BytesIO(page.locator(found).screenshot())).convert("RGB")
 
 
-def animate(page: Any, path: Path, start: str, frames: int) -> None:
-    """The plan alone from a tenth of the recording on, as it moves."""
-    page.click("#toggle_trends")
-    page.uncheck("#names")
-    page.select_option("#colour", "force")
-    page.keyboard.press(start)
-    pictures = []
-    for _ in range(frames):
-        page.wait_for_timeout(60)
-        pictures.append(Image.open(io.BytesIO(page.locator("#plan").screenshot())).convert("RGB"))
-        page.keyboard.press(".")
-        page.keyboard.press(".")
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=FRAME, loop=0, quality=40, method=6)
+def save(name: str, pictures: list[Image.Image], each: list[int] | int, **options: Any) -> None:
+    """An animated picture without end. each: ms."""
+    pictures[0].save(
+        IMAGES / f"{name}.webp", save_all=True, append_images=pictures[1:], duration=each, loop=0, method=6, **options
+    )
+
+
+def moving(name: str, scene: str, size: tuple[int, int], start: int, count: int, step: int) -> Callable[[Studio], None]:
+    """A shipped scene as it moves from a time (s) on, every so many frames of its page: the plan alone, with forces."""
+
+    def make(studio: Studio) -> None:
+        with studio.page(studio.shipped(scene), size) as page:
+            page.click("#toggle_trends")
+            page.uncheck("#names")
+            page.select_option("#colour", "force")
+            at(page, start)
+            pictures = []
+            for _ in range(count):
+                pictures.append(grab(page, "#plan"))
+                for _ in range(step):
+                    page.keyboard.press(".")
+        save(name, pictures, MOMENT, quality=QUALITY)
+
+    return make
+
+
+def scrubbed(studio: Studio) -> None:
+    """A failed test: its page, from the beginning to the failure by the scrubber, back, and on to it frame by frame."""
+    pictures, each = [], []
+    with studio.page(studio.failure(), (1024, 600)) as page:
+        page.select_option("#colour", "force")
+        box = page.locator("#scrubber").bounding_box()
+        y = box["y"] + box["height"] / 2
+
+        def show(share: float, time: int) -> None:
+            """Draw the scrubber to a share of the recording, and take a picture that stands for a time in ms."""
+            x = box["x"] + 8 + share * (box["width"] - 16)
+            page.mouse.move(x, y)
+            pictures.append(with_pointer(grab(page), x, y))
+            each.append(time)
+
+        page.mouse.move(box["x"] + 8, y)
+        page.mouse.down()
+        show(0.0, 1200)
+        for step in range(1, 41):
+            show(step / 40, 80)
+        each[-1] = 1500
+        for step in range(1, 9):
+            show(1.0 - 0.05 * step, 80)
+        for step in range(1, 9):
+            show(0.6 + 0.05 * step, 160)
+        each[-1] = 2500
+        page.mouse.up()
+    save("view_scrubbed", pictures, each, lossless=True)
+
+
+def with_pointer(picture: Image.Image, x: float, y: float) -> Image.Image:
+    """With the pointer of a mouse, which is in no picture of a browser."""
+    arrow = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]
+    ImageDraw.Draw(picture).polygon([(x + dx, y + dy) for dx, dy in arrow], fill="black", outline="white")
+    return picture
+
+
+PICTURES: dict[str, Callable[[Studio], None]] = {
+    **{name: still(name) for name in STATES},
+    "view_plant": moving("view_plant", "paper_plant", (1050, 460), 14, 45, 2),
+    "view_table": moving("view_table", "accumulation_table", (1050, 500), 1, 36, 1),
+    "view_scrubbed": scrubbed,
+}
 
 
 def main() -> None:
-    """Record, write the pages, and take their pictures."""
-    with tempfile.TemporaryDirectory() as name, sync_playwright() as driver:
-        folder = Path(name)
-        executable = shutil.which("chromium-headless-shell") or shutil.which("chromium")
+    """Make the pictures that are named, or all."""
+    names = sys.argv[1:] or list(PICTURES)
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        executable = next(filter(None, map(shutil.which, BROWSERS)))
         browser = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
-
-        def opened(bag: Path, width: int, height: int) -> Any:
-            page = browser.new_page(viewport={"width": width, "height": height})
-            page.goto(write_page(bag, bag.with_suffix(".html")).as_uri())
-            page.wait_for_selector("body[data-ready]")
-            return page
-
-        bag = record(folder / "line")
-        for picture, reach in PICTURES.items():
-            page = opened(bag, 1280, 720)
-            reach(page)
-            page.wait_for_timeout(500)
-            page.screenshot(path=IMAGES / f"{picture}.png")
-        run_scene(load_scene(scene_path("paper_plant")), folder / "plant")
-        animate(opened(folder / "plant", 1050, 460), IMAGES / "view_plant.webp", "7", 45)
+        studio = Studio(browser, Path(folder))
+        for name in names:
+            PICTURES[name](studio)
         browser.close()
 
 

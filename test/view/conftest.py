@@ -56,9 +56,9 @@ def page(browser: Any, html: Path) -> Iterator[Any]:
 
 
 @contextmanager
-def opened_page(browser: Any, html: Path) -> Iterator[Any]:
-    """As `page`, on some file."""
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, offline=True)
+def opened_page(browser: Any, html: Path, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
+    """As `page`, on some file, in a window of some size in px."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, offline=True)
     context.set_default_timeout(60_000)
     opened, wrong = context.new_page(), []
     opened.on("pageerror", lambda error: wrong.append(str(error)))
