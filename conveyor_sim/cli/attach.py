@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 
 from conveyor_sim.cli.output import OUTSIDE_TABLES, Number
-from conveyor_sim.cli.serve import scene_source, watch
+from conveyor_sim.cli.serve import scene_source, tell_end, watch
 from conveyor_sim.support.garbage import collected_later
 
 
@@ -42,11 +42,10 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     password = click.prompt("password", hide_input=True, err=True) if user else ""
     with ExitStack() as stack:
-        source = stack.enter_context(scene_source(scene, console, playing=False, **of_scene))
+        source = stack.enter_context(scene_source(scene, console, **of_scene))
         kind = of_plc(url, tags, user, password, period, console.print)
         with Serving(source, [(kind, 0)], Settings()) as serving:
-            source.control("resume", 0.0, "attach")
+            source.control("resume", 0.0, "")
             watch(serving, console, [f"{url} commands the line, and reads its signals"])
             summary = serving.summary()
-    bags = source.recordings
-    click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
+    tell_end(summary, source.recordings)

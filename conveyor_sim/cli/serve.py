@@ -11,7 +11,7 @@ import click
 from rich.console import Console
 
 from conveyor_sim.cli.output import OUTSIDE_TABLES, Number
-from conveyor_sim.errors import ConveyorError
+from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
 if TYPE_CHECKING:
@@ -115,6 +115,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     for kind, port in chosen:
         require_free(kind.name, bind, port)  # not only once everything has been compiled
     settings = Settings(bind, stamps, **{name: given[name] for name in OF_FACES})
+    paused: SceneSource | None = None
     with ExitStack() as stack:
         if (what is None) == (node is None):
             raise ConveyorError("serve: expected one of SCENE, BAG and --node")
@@ -128,13 +129,32 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             _require_not_given(what, OF_BAG)
             if given["lockstep"]:
                 _require_lockstep(settings)
-            source = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
+            paused = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
+            source = paused
         with Serving(source, chosen, settings) as serving:
             in_lockstep = [IN_LOCKSTEP] if given["lockstep"] else []
+            if paused is not None and not in_lockstep:
+                paused.control("resume", 0.0, "")
             watch(serving, console, [*serving.greeting, *in_lockstep])
             summary = serving.summary()
-    bags = getattr(source, "recordings", [])
-    click.echo(summary + (f"; recorded to {', '.join(map(str, bags))}" if bags else ""))
+    tell_end(summary, getattr(source, "recordings", []))
+
+
+def tell_end(summary: str, bags: Sequence[Path]) -> None:
+    """What was served, and where it is recorded. Raises BagError if a recording is not whole: the disk was full, ..."""
+    from conveyor_sim.bag.reader import open_bag
+
+    whole: list[str] = []
+    broken: list[str] = []
+    for bag in bags:
+        try:
+            open_bag(bag).close()
+            whole.append(str(bag))
+        except BagError as error:
+            broken.append(str(error))
+    click.echo(summary + (f"; recorded to {', '.join(whole)}" if whole else ""))
+    if broken:
+        raise BagError(f"not recorded up to the end: {'; '.join(broken)}")
 
 
 def _is_bag(what: str) -> bool:
@@ -147,8 +167,8 @@ def _require_lockstep(settings: Settings) -> None:
     _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
     if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
-            "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or --opcua-users "
-            "with a controller"
+            "--lockstep: nobody may say how far the line goes, expected --modbus-role controller, or --users with "
+            "a controller"
         )
 
 
@@ -170,25 +190,38 @@ def scene_source(
     real_time_factor: float,
     threads: int | None,
     outside_tables: bool,
-    playing: bool = True,
     lockstep: bool = False,
 ) -> Iterator[SceneSource]:
-    """A scene, once its tags are known. playing: whether it runs at once. lockstep: whether clients say how far."""
+    """A scene, paused, once its tags are known. lockstep: whether clients say how far it goes.
+
+    What goes wrong before its first tick leaves no recording.
+    """
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.scada.scene_messages import Task
     from conveyor_sim.scada.scene_source import SceneSource
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
+    from conveyor_sim.support.stop_request import StopRequest
 
     scene = load_scene(scene_path(what), {} if duration is None else {"duration": duration}, outside_tables)
-    folder = None
-    if not no_record:
-        folder = click.get_current_context().with_resource(run_folder(out))
-        require_recordable(folder)
-    with SceneSource(Task(scene, folder, 0, real_time_factor, threads, playing, lockstep), console.print) as source:
-        source.wait_for_line()
-        yield source
+    with ExitStack() as starting:
+        stop = starting.enter_context(StopRequest())  # an interrupt would be lost, or leave a folder behind
+        folder = None
+        if not no_record:
+            folder = click.get_current_context().with_resource(run_folder(out))
+            require_recordable(folder)
+        task = Task(scene, folder, 0, real_time_factor, threads, playing=False, lockstep=lockstep)
+        source = SceneSource(task, console.print)
+        try:
+            with source:
+                if not source.wait_for_line(lambda: stop.requested) or stop.requested:
+                    raise KeyboardInterrupt
+                starting.close()
+                yield source
+        except BaseException:
+            source.discard()
+            raise
 
 
 def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagSource:

@@ -81,11 +81,15 @@ class Face(Protocol):
 
 def require_free(face: str, host: str, port: int) -> None:
     """Raises FaceError, with the reason, which libraries don't tell, if a face of that name can't listen there."""
+    expected = "an address of this machine"
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.bind((host, 0))
+        expected = "a free port"
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((host, port))
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise FaceError(f"{face}: {host}:{port} can't be listened on ({reason}), expected a free port") from error
+        raise FaceError(f"{face}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error

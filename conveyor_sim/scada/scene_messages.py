@@ -44,6 +44,7 @@ class Ask(NamedTuple):
     what: Control
     value: float
     by: str
+    """Empty: nobody has to be told."""
 
 
 class Go(NamedTuple):

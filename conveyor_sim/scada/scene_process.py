@@ -285,7 +285,10 @@ class _Process:
         def done(future: Future[Any]) -> None:
             error = future.exception()
             told = f"{what}, asked for by {by}"
-            self._copies.tell(Note(told) if error is None else Note(f"{told}, refused: {error}", bad=True))
+            if error is not None:
+                self._copies.tell(Note(f"{told}, refused: {error}", bad=True))
+            elif by:
+                self._copies.tell(Note(told))
 
         stepper.call(todo[what]).add_done_callback(done)
 

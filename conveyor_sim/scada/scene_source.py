@@ -63,14 +63,17 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         self._thread = threading.Thread(target=self._supervise, name="scene", daemon=True)
         self._thread.start()
 
-    def wait_for_line(self) -> None:
-        """Return once its tags are known, which takes as long as its kernels take to compile.
+    def wait_for_line(self, given_up: Callable[[], bool] = lambda: False) -> bool:
+        """Return once its tags are known, which takes as long as its kernels take to compile; whether they are.
 
-        Raises ConveyorError if it comes to nothing.
+        given_up: asked now and then whether it is still waited for. Raises ConveyorError if it comes to nothing.
         """
         while not self.wait(LOOK):
             if self._failure:
                 raise ConveyorError(self._failure)
+            if given_up():
+                return False
+        return True
 
     @property
     def controls(self) -> frozenset[Control]:
@@ -130,6 +133,8 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         with self._lock:
             if self._requests.qsize() >= 2 * MOST_WAITING:  # beside inputs, which may wait as long as it is paused
                 return f"{MOST_WAITING} requests wait already"
+            if what in ("pause", "resume"):
+                self._task = replace(self._task, playing=what == "resume")  # of one that begins it anew, too
             self._requests.put(Ask(what, value, by))
         return ""
 
@@ -148,6 +153,13 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 self._requests.put(Go(self._target, tuple(self._set)))
                 self._set.clear()
         return ""
+
+    def discard(self) -> None:
+        """Leave no recording of a line that no tick has passed of. Once it is closed."""
+        for folder in self.recordings if self.shown.tick == 0 else ():
+            for file in folder.iterdir():
+                file.unlink()
+            folder.rmdir()
 
     def close(self) -> None:
         """End the simulation in order, and its recording."""

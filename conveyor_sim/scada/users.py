@@ -26,6 +26,10 @@ Role = Literal["viewer", "operator", "engineer", "controller", "test"]
 
 ROLES: tuple[Role, ...] = get_args(Role)
 
+MOST_WRONG, PERIOD = 10, 60.0
+"""Passwords for one name from one machine, and in how many s of wall time; more are refused unseen until then."""
+
+_LONGEST_NAME, _MOST_KEPT = 40, 1000
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,40}")
 _METHOD = "scrypt"
 _BYTES = 32
@@ -112,6 +116,33 @@ def authenticate(users: Mapping[str, User], name: str, password: str) -> User | 
     user = users.get(name, _NOBODY)
     given = _hash(password[: _LONGEST_PASSWORD + 1], user.salt)
     return user if hmac.compare_digest(given, user.hash) and user is not _NOBODY else None
+
+
+class Logins:
+    """Those who want to come in, and how often they were wrong lately: guessing passwords is to take years."""
+
+    def __init__(self, users: Mapping[str, User]) -> None:
+        """Nobody was wrong yet."""
+        self._users = users
+        self._wrong: dict[tuple[str, str], tuple[int, float]] = {}  # how often, and s when first, the latest at last
+
+    def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
+        """As `authenticate`; who was wrong too often is not even looked at. origin: the client's machine.
+        now: s of any steady clock.
+        """
+        who = (name[:_LONGEST_NAME], origin)
+        count, since = self._wrong.get(who, (0, now))
+        if now > since + PERIOD:
+            count, since = 0, now
+        if count >= MOST_WRONG:
+            return None
+        user = authenticate(self._users, name, password)
+        self._wrong.pop(who, None)
+        if user is None:
+            self._wrong[who] = count + 1, since
+            if len(self._wrong) > _MOST_KEPT:
+                del self._wrong[next(iter(self._wrong))]
+        return user
 
 
 def _hash(password: str, salt: bytes) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -16,13 +17,14 @@ COMMAND = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "s
 class Served:
     """One of them."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, **environment: str) -> None:
         """In a folder of its own."""
         self._log = folder / "log"
         with self._log.open("w") as log:
             self.process = subprocess.Popen(
                 [*COMMAND, *arguments],
                 cwd=folder,
+                env={**os.environ, **environment},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=log,
@@ -47,6 +49,13 @@ class Served:
     def port(self) -> int:
         """The same."""
         return int(self.address.rpartition(":")[2])
+
+    @property
+    def simulator(self) -> int:
+        """The process that simulates."""
+        tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        (pid,) = {pid for task in tasks for pid in task.read_text().split()}
+        return int(pid)
 
     def end(self, number: int = signal.SIGINT) -> str:
         """What it printed, after a signal."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import signal
 import socket
 from collections.abc import Callable
@@ -99,14 +100,36 @@ def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_
     served = command(SCENE, "--modbus", "0", "--out", "bag")
     with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
-        tasks = Path(f"/proc/{served.process.pid}/task").glob("*/children")
-        pids = {pid for task in tasks for pid in task.read_text().split()}
-        assert len(pids) == 1
-        os.kill(int(pids.pop()), signal.SIGKILL)
+        os.kill(served.simulator, signal.SIGKILL)
         until(lambda: speed_of(client) is None, "exception 11")
         until(lambda: speed_of(client) == 0.5, "another process")
     assert "was killed by signal 9; the scene begins anew" in served.told
-    assert "recorded to bag, bag_1" in served.end()
+    assert served.end().endswith("; recorded to bag_1\n")
+    assert served.process.returncode == 1 and "not recorded up to the end: bag: " in served.told
+
+
+def test_a_recording_that_a_full_disk_ended_is_said_at_the_end(command: Callable[..., Served], tmp_path: Path) -> None:
+    """By a limit of the size of files, which the system keeps as it does that of the disk."""
+    served = command(SCENE, "--modbus", "0", "--out", "bag")
+    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
+        until(lambda: speed_of(client) == 0.5, "the line")
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    resource.prlimit(served.simulator, resource.RLIMIT_FSIZE, (file.stat().st_size, file.stat().st_size))
+    until(lambda: "bag: recording stopped at" in served.told, "the full disk")
+    assert "recorded to" not in served.end()
+    assert served.process.returncode == 1
+    assert "Error: not recorded up to the end: bag: " in served.told and "conveyor-sim recover" in served.told
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_who_ends_it_while_it_compiles_finds_nothing_left(
+    command: Callable[..., Served], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, number: int
+) -> None:
+    served = command(SCENE, "--modbus", "0", NUMBA_CACHE_DIR=str(tmp_path_factory.mktemp("empty")))
+    until(lambda: "compiling the kernels" in served.told, "the compiler")
+    served.end(number)
+    assert served.process.returncode == 130 and "Traceback" not in served.told
+    assert {path.name for path in tmp_path.iterdir()} == {"log"}
 
 
 @pytest.mark.parametrize(
@@ -126,6 +149,8 @@ def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_
             [SCENE, "--modbus", "0", "--bind", "no.such.host.invalid"],
             "modbus: no.such.host.invalid:0 can't be listened on",
         ),
+        ([SCENE, "--modbus", "0", "--bind", "192.0.2.1"], "expected an address of this machine"),
+        ([SCENE, "--opcua", "0", "--bind", "192.0.2.1"], "expected an address of this machine"),
     ],
 )
 def test_what_can_not_be_is_one_sentence(command: Callable[..., Served], arguments: list[str], sentence: str) -> None:
@@ -135,6 +160,16 @@ def test_what_can_not_be_is_one_sentence(command: Callable[..., Served], argumen
     (error,) = [line for line in served.told.splitlines() if line.startswith("Error: ")]
     assert sentence in error
     assert "Traceback" not in served.told
+
+
+def test_a_history_of_no_tag_is_one_sentence_and_leaves_nothing(command: Callable[..., Served], tmp_path: Path) -> None:
+    """Tags are known once the scene is loaded, and its recording has begun."""
+    pytest.importorskip("asyncua", reason="asyncua is not installed: pip install conveyor-sim[scada]")
+    served = command(SCENE, "--opcua", "0", "--opcua-history", "belts/*/sped")
+    served.process.communicate(timeout=PATIENCE)
+    assert served.process.returncode == 1
+    assert "Error: opcua: history of belts/*/sped: fits no tag, expected a pattern such as" in served.told
+    assert {path.name for path in tmp_path.iterdir()} == {"log"}
 
 
 def test_a_port_that_is_taken_leaves_nothing_behind(command: Callable[..., Served], tmp_path: Path) -> None:

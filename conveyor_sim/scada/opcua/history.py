@@ -11,10 +11,24 @@ from asyncua import ua
 from asyncua.server.history import HistoryStorageInterface
 
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.opcua.nodes import NEVER, name_of
+from conveyor_sim.scada.opcua.tree import is_shown
+from conveyor_sim.support.printable import printable
 
 MOST_VALUES = 10_000
 """Of one tag, and in one answer."""
+
+
+def require_tags(patterns: Sequence[str], tags: Iterable[Tag]) -> None:
+    """Raises FaceError for a pattern that no tag with a variable fits."""
+    names = [tag.name for tag in tags if is_shown(tag)]
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise FaceError(
+                f"opcua: history of {printable(pattern)}: fits no tag, expected a pattern such as 'belts/*/speed'; "
+                "`conveyor-sim tags` lists what there is"
+            )
 
 
 class History(HistoryStorageInterface):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,24 +14,24 @@ from typing import Any
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
-from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status
+from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status, require_free
 from conveyor_sim.scada.opcua.certificates import default_folder, identity
 from conveyor_sim.scada.opcua.conditions import AlarmStates
 from conveyor_sim.scada.opcua.emitter import Emitter
-from conveyor_sim.scada.opcua.history import History
+from conveyor_sim.scada.opcua.history import History, require_tags
 from conveyor_sim.scada.opcua.line_events import LineEvents
 from conveyor_sim.scada.opcua.methods import Methods, add_methods
 from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.scada.opcua.packml import PackMl
 from conveyor_sim.scada.opcua.requests import Client, Requests, reader
 from conveyor_sim.scada.opcua.session import SafeServer
-from conveyor_sim.scada.opcua.transport import BoundedServer
+from conveyor_sim.scada.opcua.transport import BoundedServer, channel
 from conveyor_sim.scada.opcua.tree import add_line
 from conveyor_sim.scada.opcua.updates import Updates
 from conveyor_sim.scada.opcua.values import Clock
 from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
-from conveyor_sim.scada.source import TagSource
-from conveyor_sim.scada.users import User, authenticate
+from conveyor_sim.scada.source import OPCUA, TagSource
+from conveyor_sim.scada.users import Logins, User
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,
@@ -59,8 +60,11 @@ class OpcUaServer:
         """users: who may do more than read, by name. anonymous: whether those who give no name may read.
         stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
         history: patterns of the tags whose last values are kept. port: 0 for any that is free.
+
+        Raises FaceError for a pattern that no tag fits.
         """
-        self._source, self._users, self._anonymous, self._stamps = source, dict(users or {}), anonymous, stamps
+        require_tags(history, source.about.tags)
+        self._source, self._logins, self._anonymous, self._stamps = source, Logins(users or {}), anonymous, stamps
         self._certificates, self._history = certificates, history
         self._at = host, port
         self._requests = Requests(source)
@@ -99,15 +103,15 @@ class OpcUaServer:
         for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
+        require_free(OPCUA, host, port)
         with _without_collection():
             server = await self._empty()
             updates = await self._fill(server)
             await updates.bring_present()
         try:
             await server.listen(host, port)
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise FaceError(f"opcua: {host}:{port} can't be listened on ({reason}), expected a free port") from error
+        except OSError as error:  # it has been taken since
+            raise FaceError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
         self._server, self._updates = server, updates
         self._following = asyncio.create_task(updates.run())
         self._following.add_done_callback(self._ended)
@@ -171,7 +175,9 @@ class OpcUaServer:
         """Who begins a session; None: nobody who may. Called by the library."""
         if username is None:
             return reader() if self._anonymous else None
-        user = authenticate(self._users, username, password or "")
+        connection = channel.get()
+        origin = "" if connection is None else connection.origin
+        user = self._logins.enter(username, password or "", origin, time.monotonic())
         return None if user is None else Client(UserRole.User, username, user.kind)
 
 

@@ -50,6 +50,12 @@ class Connection(OPCUAProtocol):
         return session is not None and session.state.name != "Closed"
 
     @property
+    def origin(self) -> str:
+        """Address of the client's machine."""
+        peer = None if self.transport is None else self.transport.get_extra_info("peername")
+        return str(peer[0]) if peer else ""
+
+    @property
     def encrypts(self) -> bool:
         """Whether what comes here can't be read on the way."""
         policy = self.processor._connection.security_policy if self.processor else None

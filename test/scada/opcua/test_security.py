@@ -18,7 +18,17 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from conveyor_sim.scada.opcua.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
-from conveyor_sim.scada.users import UsersError, authenticate, line_of, new_user, read_users
+from conveyor_sim.scada.users import (
+    MOST_WRONG,
+    PERIOD,
+    Logins,
+    User,
+    UsersError,
+    authenticate,
+    line_of,
+    new_user,
+    read_users,
+)
 from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone, refused
 
 if TYPE_CHECKING:
@@ -261,6 +271,28 @@ def test_a_user_is_added_and_changed_by_a_command(tmp_path: Path) -> None:
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     wrong = subprocess.run([*command, "a:b", "--password", "x"], capture_output=True, text=True, check=False)
     assert wrong.returncode == 1 and "name: a:b given, expected 1 to 40 letters" in wrong.stderr
+
+
+def test_who_guesses_passwords_is_not_listened_to_for_a_minute() -> None:
+    logins = Logins({"jo": new_user("operator", "geheim"), "al": new_user("viewer", "offen")})
+    for guess in range(MOST_WRONG):
+        assert logins.enter("jo", f"guess {guess}", "10.0.0.7", 100.0 + guess) is None
+    assert logins.enter("jo", "geheim", "10.0.0.7", 110.0) is None
+    assert logins.enter("jo", "geheim", "10.0.0.8", 110.0)  # from elsewhere
+    assert logins.enter("al", "offen", "10.0.0.7", 110.0)  # somebody else
+    assert logins.enter("jo", "geheim", "10.0.0.7", 100.5 + PERIOD)
+    assert logins.enter("jo", "wrong", "10.0.0.7", 161.0) is None
+    assert logins.enter("jo", "geheim", "10.0.0.7", 162.0)
+
+
+def test_a_client_that_guesses_is_shut_out(serve: Serve, users: dict[str, User]) -> None:
+    line = serve(users={"operator": users["operator"]})
+    for guess in range(MOST_WRONG):
+        with refused(Codes.BadUserAccessDenied):
+            line.client("operator", password=f"guess {guess}")
+    with refused(Codes.BadUserAccessDenied):
+        line.client("operator")
+    assert line.client().get_node(f"ns=2;s={SETPOINT}").read_value() is not None
 
 
 async def _steal(address: str, tokens: Sequence[ua.NodeId]) -> None:
