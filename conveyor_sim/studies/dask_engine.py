@@ -76,12 +76,16 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
                     future.add_done_callback(done.put)
                 with suppress(Empty):
                     done.get(timeout=LOOK)
-                found = [(future, self._result(future)) for future in list(pending) if future.done()]
                 gone = client.status != "running"
             except _GONE:
-                found, gone = [], True
-            for future, result in found:
-                yield pending.pop(future), result
+                gone = True
+            for future in [future for future in pending if future.done()]:
+                try:
+                    result = self._result(future)
+                except _GONE:
+                    gone = True
+                else:
+                    yield pending.pop(future), result
             if gone:
                 todo += list(pending.values())[::-1]
                 pending = {}

@@ -53,7 +53,7 @@ def make_row(work: Work) -> Row:
         row = simulate(work, bag if wanted == "all" else None, clock)
     except Exception as error:  # of the functions and controllers of whoever wrote the study, too
         row = replace(row, error=_sentence(error))
-        if bag is not None and wanted == "failed" and isinstance(error, ConveyorError):
+        if bag is not None and wanted == "failed":
             with suppress(Exception):  # it fails again, in the same tick
                 simulate(work, bag, _Clock())
         if bag is not None and bag.exists():

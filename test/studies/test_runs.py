@@ -1,0 +1,207 @@
+"""A study from its file to its table: the same bits whoever makes the runs, in whatever order they are finished."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from studies.small import Here, setup_of
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.errors import StudyError
+from conveyor_sim.studies.alone import job_of, run_alone
+from conveyor_sim.studies.journal import read_rows
+from conveyor_sim.studies.results import read_results, run_command, write_parquet
+from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.run import Work, make_row, warm_start
+from conveyor_sim.studies.runs import Runs
+from conveyor_sim.studies.setup import Setup
+from conveyor_sim.studies.sweep import sweep
+
+METRICS = [
+    "efficiency",
+    "throughput",
+    "stops",
+    {"made": "throughput machines/first"},
+    {"queue": "mean belts/conveyor/bottles"},
+    {"most": "maximum belts/conveyor/bottles"},
+    {"fed": "change machines/first/produced"},
+    {"high": "quantile 0.9 belts/conveyor/bottles"},
+    {"mine": "code.py:fed"},
+    {"busiest": "code.py:Busiest"},
+]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Path, list[Row]]:
+    """A study that two processes have made."""
+    folder = tmp_path_factory.mktemp("study")
+    setup = setup_of(folder, metrics=METRICS, warm_up=0.4, duration=2.0, seeds=3)
+    told: list[tuple[int, int]] = []
+    with Runs(setup, folder / "out") as runs:
+        rows = sweep(runs, setup, lambda done, total, left, row: told.append((done, total)))
+    assert told == [(done, 6) for done in range(7)]
+    return setup, folder / "out", rows
+
+
+def test_there_is_a_row_for_each_point_and_seed(made: tuple[Setup, Path, list[Row]]) -> None:
+    _, folder, rows = made
+    assert [(row.point, row.seed, row.parameters["rate"]) for row in rows] == [
+        (point, seed, rate) for point, rate in enumerate((4.0, 6.0)) for seed in (1, 2, 3)
+    ]
+    assert [row.status for row in rows] == ["finished"] * 6, [row.error for row in rows]
+    assert rows == read_rows(folder)
+    for row in rows:
+        found = row.metrics
+        assert row.simulated == 2.0 and row.cpu > 0.0 and 0.0 < row.dt < 0.01
+        assert found["made"] == pytest.approx(found["fed"] / (1.6 / 60.0))
+        assert 0.0 < found["queue"] <= found["high"] <= found["most"] <= found["busiest"] == found["most"]
+        assert found["fed"] <= found["mine"] and found["stops"] >= 1.0
+
+
+def test_the_engine_and_the_order_change_no_bit(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+    setup, _, rows = made
+    with Runs(setup, tmp_path, Here(backwards=True)) as runs:
+        again = sweep(runs, setup)
+    assert [(row.key, row.metrics) for row in again] == [(row.key, row.metrics) for row in rows]
+
+
+def test_a_run_is_made_again_by_its_command(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+    setup, _, rows = made
+    command = run_command(setup.path, rows[4])
+    assert command == f"conveyor-sim sweep {setup.path} --set rate=6.0 --seed 2"
+    again = run_alone(setup, job_of(setup, ["rate=6.0"], 2), tmp_path / "bag")
+    assert again.metrics == rows[4].metrics
+    with open_bag(tmp_path / "bag") as bag:
+        assert bag.counts["counters"] > 0
+    for given in (["rate"], ["speed=1"], [], ["rate=[1"]):
+        with pytest.raises(StudyError, match="--set"):
+            job_of(setup, given, 2)
+
+
+def test_finished_runs_are_not_made_again(made: tuple[Setup, Path, list[Row]]) -> None:
+    setup, folder, rows = made
+    engine = Here()
+    with Runs(setup, folder, engine) as runs:
+        assert sweep(runs, setup) == rows
+        assert engine.made == 0
+        more = [Job(5, {"rate": 5.0}, 1), Job(0, {"rate": 4.0}, 1)]
+        found = runs.run(more)
+        assert engine.made == 1 and found[1] == rows[0] and found[0].parameters == {"rate": 5.0}
+        with pytest.raises(StudyError, match=r"point 0 was made with \{'rate': 4.0\}, not \{'rate': 9.0\}"):
+            runs.run([Job(0, {"rate": 9.0}, 1)])
+        with pytest.raises(StudyError, match="another process works on this study"):
+            Runs(setup, folder, Here())
+    (folder / "runs" / "point_5_seed_1.json").unlink()
+
+
+def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+    _, folder, rows = made
+    for other, what in (
+        (setup_of(tmp_path, metrics=METRICS, warm_up=0.2, duration=2.0), "another study"),
+        (setup_of(tmp_path, metrics=METRICS, warm_up=0.4, duration=2.0, seeds=1), ""),
+    ):
+        if what:
+            with pytest.raises(StudyError, match=what):
+                Runs(other, folder, Here())
+        else:  # fewer seeds
+            with Runs(other, folder, Here()) as runs:
+                assert sweep(runs, other) == [row for row in rows if row.seed == 1]
+
+
+def test_the_table_is_a_parquet_file(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    pytest.importorskip("duckdb")
+    setup, folder, rows = made
+    results = read_results(folder)
+    path = write_parquet(results, tmp_path / "results.parquet")
+    again = read_results(path)
+    assert (again.rows, again.units, again.study, again.path) == (rows, results.units, setup.source, setup.path)
+    assert results.units["throughput"] == "1/min" and results.units["queue"] == results.units["stops"] == "1"
+    for frame in (pandas.read_parquet(path), polars.read_parquet(path)):
+        assert list(frame["rate"]) == [row.parameters["rate"] for row in rows]
+        assert list(frame["queue"]) == [row.metrics["queue"] for row in rows]
+        assert list(frame["status"]) == ["finished"] * 6
+        assert list(frame["command"]) == [run_command(setup.path, row) for row in rows]
+    # In a process of its own, for it says much as it ends.
+    query = f"import duckdb; print(duckdb.sql(\"select sum(queue) from '{path}' where rate > 5\").fetchall())"
+    found = subprocess.run([sys.executable, "-c", query], capture_output=True, text=True, check=True)
+    assert float(found.stdout.strip("[](), \n")) == pytest.approx(sum(row.metrics["queue"] for row in rows[3:]))
+    from pyarrow import parquet
+
+    schema = parquet.read_schema(path)
+    assert json.loads(schema.metadata[b"conveyor_sim"])["study"] == setup.source
+    assert schema.field("throughput").metadata == {b"unit": b"1/min"}
+
+
+def test_batches_go_on_until_the_mean_is_known(tmp_path: Path) -> None:
+    until = {"metric": "queue", "half_width": 0.15}
+    setup = setup_of(tmp_path, duration=0.5, seeds={"until": until, "batch": 10, "most": 30})
+    from conveyor_sim.statistics.intervals import mean_interval
+
+    engine = Here()
+    with Runs(setup, tmp_path / "out", engine) as runs:
+        rows = sweep(runs, setup)
+    for point in (0, 1):
+        values = [row.metrics["queue"] for row in rows if row.point == point]
+        widths = {size: mean_interval(values[:size], 0.95).half_width for size in (10, 20, 30) if size <= len(values)}
+        assert len(values) in (10, 20, 30)
+        assert all(width > 0.15 for size, width in widths.items() if size < len(values))
+        assert widths[len(values)] <= 0.15 or len(values) == 30
+
+
+def test_a_run_that_fails_says_why_and_leaves_a_recording(tmp_path: Path) -> None:
+    parameters = {"until": {"controller": "until", "values": [0.3, 2.0]}}
+    setup = setup_of(
+        tmp_path, parameters=parameters, controller="code.py:Feeder", settings={"speed": 0.5}, duration=0.5, seeds=1
+    )
+    with Runs(setup, tmp_path / "out", Here()) as runs:
+        worn, good = sweep(runs, setup)
+    assert (worn.status, worn.error, worn.metrics) == ("failed", "ValueError: the feeder is worn out", {})
+    assert good.status == "finished" and not good.bag
+    with open_bag(tmp_path / "out" / worn.bag) as bag:
+        assert bag.counts["outcomes"] > 0
+    every = setup_of(
+        tmp_path, parameters=parameters, controller="code.py:Feeder", settings={"speed": 0.5}, duration=0.5, bags="all"
+    )
+    row = make_row(Work(every, Job(3, {"until": 2.0}, 1), None, tmp_path / "out"))
+    assert row.metrics == good.metrics and (tmp_path / "out" / row.bag).is_dir()
+
+
+def test_controllers_are_compared_from_one_warm_line_a_seed(tmp_path: Path) -> None:
+    study: dict[str, Any] = {
+        "parameters": {"speed": {"controller": "speed", "values": [0.5, 0.3]}},
+        "controller": "code.py:Feeder",
+        "settings": {"speed": 0.5},
+        "warm_start": 1.0,
+        "duration": 0.5,
+        "metrics": ["throughput", {"scans": "change machines/first/produced"}, {"all": "code.py:fed"}],
+    }
+    setup = setup_of(tmp_path, **study)
+    with Runs(setup, tmp_path / "out", Here()) as runs:
+        rows = sweep(runs, setup)
+    assert [row.status for row in rows] == ["finished"] * 4, [row.error for row in rows]
+    starts = sorted(path.name for path in (tmp_path / "out" / "warm_starts").iterdir())
+    assert starts == ["seed_1.npz", "seed_2.npz"]
+    # Bottles of the warm start are there, but not counted; with its own settings the run is as one without a stop.
+    plain = setup_of(tmp_path, **{**study, "warm_start": None, "warm_up": 1.0, "duration": 1.5})
+    for row in rows[:2]:
+        whole = make_row(Work(plain, Job(0, {"speed": 0.5}, row.seed)))
+        assert row.metrics == whole.metrics and row.simulated == 0.5
+    assert rows[0].metrics["all"] > rows[0].metrics["scans"]
+    # The checkpoint as bytes, as it travels to another machine, and as the run alone makes it.
+    content = warm_start(Work(setup, Job(0, {}, 1)))
+    assert make_row(Work(setup, Job(1, {"speed": 0.3}, 1), content)).metrics == rows[2].metrics
+    assert run_alone(setup, job_of(setup, ["speed=0.3"], 1), None).metrics == rows[2].metrics
+
+
+def test_code_that_changes_meanwhile_is_noticed(tmp_path: Path) -> None:
+    setup = setup_of(tmp_path)
+    (tmp_path / "code.py").write_text("line = None")
+    row = make_row(Work(setup, Job(0, {"rate": 4.0}, 1)))
+    assert row.status == "failed" and "code.py: has changed since the study was read" in row.error

@@ -1,0 +1,100 @@
+"""What is wrong with a study is said before it runs: file, line, field, value and what was expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from studies.small import setup_of, write_study
+
+from conveyor_sim.errors import StudyError
+from conveyor_sim.studies.check import check_study
+from conveyor_sim.studies.load import load_study
+
+UNTIL = {"metric": "stops", "half_width": 1.0}
+RATE = {"argument": "rate", "values": [4.0]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"seed": 2}, r"study.yaml:\d+: seed: no such field, did you mean seeds\?"),
+        ({"seeds": 0}, r"study.yaml:\d+: seeds.count: 0 given, expected a whole number, 1 or greater"),
+        ({"seeds": None}, r"seeds: missing, expected a whole number, 1 or greater, or a mapping"),
+        ({"seeds": {"first": 3}}, r"seeds: expected either count or until"),
+        (
+            {"seeds": {"until": {"metric": "stops", "half_width": 1.0}, "batch": 5}},
+            r"seeds.batch: 5 given, expected .*10",
+        ),
+        (
+            {"seeds": {"until": {"metric": "stop", "half_width": 1.0}}},
+            r"until.metric: \"stop\" given, expected one of thr",
+        ),
+        ({"scene": "push"}, r"study.yaml:1: expected either scene or function"),
+        ({"function": "code.py:lin"}, r"study.yaml:\d+: function: .*code.py has no function lin"),
+        ({"function": "other.py:line"}, r"function: .*other.py: No such file or directory, expected a Python file"),
+        ({"design": "random"}, r'design: "random" given, expected "grid", "list"'),
+        ({"design": "sobol"}, r"parameters.rate.values: given, expected low and high, as the design is sobol"),
+        ({"points": 3}, r"points: 3 given, expected none: a grid has them by values"),
+        ({"metrics": ["speed"]}, r'metrics.speed: "speed" given, expected efficiency, .* or file.py:function'),
+        ({"metrics": ["stops", "stops"]}, r"metrics: .*each name once"),
+        ({"metrics": [{"q": "quantile 2 x"}]}, r'metrics.q: "quantile 2 x" given, expected such as quantile 0.95'),
+        ({"metrics": [{"q": "mean"}]}, r'metrics.q: "mean" given, expected mean <tag>'),
+        ({"metrics": [{"wall": "stops"}]}, r"metrics.wall: given as a name, expected another"),
+        ({"parameters": {"x": {}}}, r"parameters.x: nothing given, expected one of field, controller and argument"),
+        ({"parameters": {"stops": RATE}}, r"parameters.stops: stops given as a name, expected another"),
+        ({"parameters": {"x": {"field": "belts..x", "values": [1]}}}, r'x.field: "belts..x" given, expected a path'),
+        ({"parameters": {"x": {"controller": "x", "values": [1]}}}, r"x.controller: given, expected controller beside"),
+        (
+            {"parameters": {"x": {"argument": "x", "low": 2.0, "high": 1.0}}},
+            r"x.high: 1 given, expected more than low, 2",
+        ),
+        ({"warm_start": 1.0}, r"parameters.rate: varies the line, expected a parameter of the controller"),
+    ],
+)
+def test_a_study_that_cannot_be(tmp_path: Path, changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(StudyError, match=said):
+        setup_of(tmp_path, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"parameters": {"v": {"field": "belts.conveyor.speed", "values": [0.1, "fast"]}}},
+            r'study.yaml:\d+: parameters.v.values\[1\]: "fast" given, but .*conveyor.speed: "fast" given, expected',
+        ),
+        (
+            {"parameters": {"v": {"field": "belts.convoyer.speed", "values": [0.1]}}},
+            r"function: belts.convoyer.speed: no belts.convoyer in the scene, did you mean conveyor\?",
+        ),
+        (
+            {"parameters": {"v": {"field": "base[3].friction", "values": [0.1]}}},
+            r"the scene has no such entry of a list",
+        ),
+        ({"parameters": {"v": {"argument": "v", "values": [0.1]}}}, r"unexpected keyword argument 'v'; its arguments"),
+        ({"controller": "code.py:Feeder"}, r"missing a required argument: 'speed'"),
+        ({"warm_up": 1.0}, r"warm_up: 1 given, expected less than a run takes \(s\)"),
+    ],
+)
+def test_a_line_that_cannot_be(tmp_path: Path, changes: dict[str, Any], said: str) -> None:
+    setup = setup_of(tmp_path, **changes)
+    with pytest.raises(StudyError, match=said):
+        check_study(setup)
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match=r"none.yaml: no such file, expected a study file"):
+        load_study(tmp_path / "none.yaml")
+    (tmp_path / "empty.yaml").touch()
+    with pytest.raises(StudyError, match=r"empty.yaml: the file is empty, expected a study"):
+        load_study(tmp_path / "empty.yaml")
+
+
+def test_scenes_are_found_beside_the_study_or_by_name(tmp_path: Path) -> None:
+    parameters = {"g": {"field": "gravity", "values": [9.8]}}
+    assert "name: two_bottles" in setup_of(tmp_path, function=None, scene="two_bottles", parameters=parameters).text
+    (tmp_path / "two_bottles").write_text(load_study(write_study(tmp_path)).source)  # which is no scene
+    with pytest.raises(Exception, match="two_bottles:"):
+        setup_of(tmp_path, function=None, scene="two_bottles", parameters=parameters)
