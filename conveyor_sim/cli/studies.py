@@ -127,11 +127,14 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
         from conveyor_sim.studies.effects import indices, interactions, main_effects, maps
         from conveyor_sim.studies.results import read_results
         from conveyor_sim.studies.table import points_table
+        from conveyor_sim.studies.verdict import verdicts
 
     found = read_results(results)
     if not any(row.status == "finished" for row in found.rows):
         raise ConveyorError(f"{results}: none of its {len(found.rows)} runs has finished, expected one at least")
     show(points_table(found.rows, found.units))
+    for sentence in verdicts(found):
+        click.echo(sentence)
     plot_study = None if no_pictures else plot_function("plot_study")
     shares = indices(found) if sobol else []
     if plot_study is not None:

@@ -1,0 +1,42 @@
+"""docs/studies.md is true: its study runs, and it leaves out no field and no metric."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from conveyor_sim.studies.check import check_study
+from conveyor_sim.studies.design import points_of
+from conveyor_sim.studies.load import load_study
+from conveyor_sim.studies.metrics import WORDS
+from conveyor_sim.studies.results import FIXED_UNITS
+from conveyor_sim.studies.study import RESERVED, Parameter, Seeds, Study, Until
+
+ROOT = Path(__file__).parent.parent.parent
+EXAMPLES = sorted((ROOT / "examples" / "studies").glob("*.yaml"))
+PAGE = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+def test_examples_can_be_run(path: Path) -> None:
+    setup = load_study(path)
+    check_study(setup)
+    assert points_of(setup.study)
+
+
+def test_the_first_study_is_the_example() -> None:
+    shown = re.search(r"```yaml\n# table_length.yaml\n(.*?)```", PAGE, re.DOTALL)
+    assert shown is not None
+    example = load_study(ROOT / "examples" / "studies" / "table_length.yaml").study
+    from ruamel.yaml import YAML
+
+    assert Study.model_validate(YAML(typ="safe").load(shown.group(1))) == example.model_copy(update={"description": ""})
+
+
+def test_every_field_metric_and_column_is_on_the_page() -> None:
+    text = re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL)
+    words = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", text))))
+    fields = {*Study.model_fields, *Parameter.model_fields, *Seeds.model_fields, *Until.model_fields}
+    assert {*fields, *WORDS, *RESERVED, *FIXED_UNITS} - {"optimise"} <= words
