@@ -19,6 +19,8 @@ from conveyor_sim.line.inputs import MODE
 from conveyor_sim.line.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scada.opcua.nodes import INDEX, Nodes, name_of, node_id
+from conveyor_sim.scada.opcua.packml_admin import A_MINUTE, Admin
+from conveyor_sim.scada.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.values import Clock, status_of
 from conveyor_sim.scada.source import Shown, TagSource
@@ -85,9 +87,6 @@ _STATES: Mapping[str, Mapping[State, tuple[str, int]]] = {
 _NONE = (ua.LocalizedText(None), ua.NodeId())
 """State of a state machine that is not active, and its id."""
 
-_A_MINUTE = 60.0
-"""PackML counts speed in packages a minute."""
-
 
 class PackMl:
     """Of one source."""
@@ -96,6 +95,7 @@ class PackMl:
         self._source, self._requests, self._clock = source, requests, clock
         self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
         self._machines = [tag.device for tag in source.about.tags if tag.name == f"{tag.device}/cntrl_cmd"]
+        self._admins = {machine: Admin(machine, self._tags, clock) for machine in self._machines}
         self._nodes: Nodes | None = None
         self._index = 0
         self._status = int(Codes.Good)
@@ -118,8 +118,9 @@ class PackMl:
                     target = ua.NodeId(method, self._index)
                     owner = node_id(f"{root}.{state_machine}")
                     nodes.refer(owner, target, ua.ObjectIds.HasComponent, ua.NodeClass.Method)
+            await self._admins[machine].add(server, root, self._index)
             rate = self._tags[f"{machine}/rate"]
-            span = ua.Variant(ua.Range(rate.low * _A_MINUTE, rate.high * _A_MINUTE))
+            span = ua.Variant(ua.Range(rate.low * A_MINUTE, rate.high * A_MINUTE))
             now = self._clock.simulated(0)
             for speed in ("MachSpeed", "CurMachSpeed"):
                 await nodes.write(f"{root}.Status.{speed}.EURange", span, now)
@@ -133,7 +134,8 @@ class PackMl:
             self._status = status
             self._written.clear()
         for machine in self._machines:
-            for name, value in self._values(machine, shown.values).items():
+            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(shown).items()}
+            for name, value in {**self._values(machine, shown.values), **admin}.items():
                 if self._written.get((machine, name)) != value:
                     self._written[machine, name] = value
                     inactive = value.Value in _NONE and status == Codes.Good
@@ -156,7 +158,7 @@ class PackMl:
             return _result(Codes.BadInvalidArgument)
         value = float(given[0])
         if name == "SetMachSpeed":
-            return _result(self._requests.write_together(client, [f"{machine}/rate"], [value / _A_MINUTE]))
+            return _result(self._requests.write_together(client, [f"{machine}/rate"], [value / A_MINUTE]))
         if value not in self._tags[f"{machine}/mode"].texts:
             return _result(Codes.BadInvalidArgument)
         return _result(self._requests.operate(client, MODE, (machine,), (value,)))
@@ -178,7 +180,7 @@ class PackMl:
             return ua.Variant(values.get(f"{machine}/{name}", 0.0) != 0.0, ua.VariantType.Boolean)
 
         def speed(name: str) -> ua.Variant:
-            return ua.Variant(values[f"{machine}/{name}"] * _A_MINUTE, ua.VariantType.Float)
+            return ua.Variant(values[f"{machine}/{name}"] * A_MINUTE, ua.VariantType.Float)
 
         found = {
             "Status.UnitModeCurrent": ua.Variant(int(values[f"{machine}/mode"]), ua.VariantType.Int32),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from asyncua import ua
 
+from conveyor_sim.line.alarms.alarm import AlarmState
 from conveyor_sim.line.packml import Command, State
 from conveyor_sim.scada.opcua.packml import NAMESPACE
 from test.scada.opcua.conftest import refused
@@ -84,6 +85,33 @@ def test_commands_are_methods(line: Line) -> None:
     assert [row[3] for row in line.outcomes()] == [
         (float(command),) for command in (Command.STOP, Command.RESET, Command.START, Command.ABORT, Command.CLEAR)
     ]
+
+
+def admin(line: Line, name: str) -> Any:
+    return child(line.open[0], "Admin", name).read_value()
+
+
+def test_admin_has_counts_the_stop_reason_and_alarms(line: Line) -> None:
+    line.client()
+    line.advance(300)
+    (count,) = admin(line, "ProdProcessedCount")
+    produced = line.source.shown.values["machines/filler/produced"]
+    assert (count.Count, count.AccCount, count.Name, count.Unit.UnitId) == (produced, produced, "bottles", 4404786)
+    assert produced > 0 and admin(line, "MachDesignSpeed") == pytest.approx(96.0)
+    assert (admin(line, "AlarmExtent"), admin(line, "Alarm")) == (0, [])
+    assert admin(line, "StopReason").Trigger is False
+    line.simulation.inject("machines/filler/stop", 1.0)
+    line.advance(3)
+    reason = admin(line, "StopReason")
+    shown = line.source.shown.values
+    assert (reason.ID, reason.Value) == (shown["machines/filler/stop_reason"],) * 2
+    assert (reason.Message, reason.Category, reason.Trigger) == ("fault stop", shown["machines/filler/category"], True)
+    assert reason.DateTime.timestamp() == pytest.approx(946684803.01, abs=0.02)
+    (alarm,) = admin(line, "Alarm")
+    assert (alarm.Value, alarm.Trigger, admin(line, "AlarmExtent")) == (AlarmState.UNACKNOWLEDGED, True, 1)
+    assert "filler" in alarm.Message and alarm.AckDateTime.year == 1601
+    packer = line.node("machines/packer/PackML.Admin.ProdConsumedCount").read_value()
+    assert packer[0].Count == shown["machines/packer/taken"]
 
 
 def test_mode_and_speed_are_set_by_methods(line: Line) -> None:
