@@ -53,6 +53,7 @@ class Changing:
     """A source whose tags change by themselves."""
 
     controls: frozenset[Control] = frozenset()
+    past = None
 
     def __init__(self) -> None:
         tags = [

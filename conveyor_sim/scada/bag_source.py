@@ -16,6 +16,7 @@ from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING, RunState
 from conveyor_sim.live.calls import Calls
 from conveyor_sim.live.playback import Message, Playback
 from conveyor_sim.live.player import Player
+from conveyor_sim.scada.past import Past
 from conveyor_sim.scada.source import Control
 from conveyor_sim.scada.view import DRAWN, HEARD, View
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -45,6 +46,7 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         self._shown_at = 0.0  # s of wall time
         self._calls = Calls()
         self._bag = open_bag(path)
+        self._past = Past(path)
         try:
             if not self._bag.counts.get("signals"):
                 raise BagError(f"{path}: holds no message of topic signals, expected some: tags are read from them")
@@ -54,9 +56,15 @@ class BagSource(View, AbstractContextManager["BagSource"]):
             self._bring()
         except BaseException:
             self._bag.close()
+            self._past.close()
             raise
         self._thread = threading.Thread(target=self._play, name="bag", daemon=True)
         self._thread.start()
+
+    @property
+    def past(self) -> Past:
+        """All that it holds."""
+        return self._past
 
     def give(self, given: Input) -> str:
         """Refused."""
@@ -79,6 +87,7 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         self._calls.end()
         self._thread.join()
         self._bag.close()
+        self._past.close()
 
     def __exit__(self, *_: object) -> None:
         self.close()

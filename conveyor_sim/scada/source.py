@@ -15,6 +15,7 @@ from conveyor_sim.observe.events import Event
 from conveyor_sim.observe.read_back import ReadBackColumns
 
 if TYPE_CHECKING:
+    from conveyor_sim.scada.past import Past
     from conveyor_sim.simulation import Simulation
 
 MODBUS = "modbus"
@@ -97,6 +98,10 @@ class TagSource(Protocol):
     @property
     def controls(self) -> frozenset[Control]:
         """What `control` can do here."""
+
+    @property
+    def past(self) -> Past | None:
+        """What its tags were before now; None: nobody knows but who has listened."""
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events there were so far, and those after so many; the oldest may be forgotten."""
@@ -187,6 +192,11 @@ class TickSource:
     def shown(self) -> Shown:
         """The line as it was at the end of the last tick."""
         return self._shown
+
+    @property
+    def past(self) -> Past | None:
+        """Nobody knows."""
+        return None
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events there were since this source began, and those after so many."""

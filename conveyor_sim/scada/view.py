@@ -22,6 +22,7 @@ from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
 from conveyor_sim.observe.read_back import ReadBackColumns
+from conveyor_sim.scada.past import Past
 from conveyor_sim.scada.source import About, Listeners, RecentEvents, Shown, TagSource
 
 HEARD = ("line", "run_state", "signals", "events", "readback", "alarm_states")
@@ -124,6 +125,11 @@ class View:
         """Have DRAWN be there, too, from now on, if that costs anything; what is returned ends that."""
         self._count_watchers(1)
         return lambda: self._count_watchers(-1)
+
+    @property
+    def past(self) -> Past | None:
+        """Nobody knows."""
+        return None
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events were heard of, and those after so many."""

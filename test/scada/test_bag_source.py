@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from conveyor_sim.errors import BagError
 from conveyor_sim.line.inputs import FORCE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING
+from conveyor_sim.scada import past
 from conveyor_sim.scada.bag_source import BagSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -52,6 +54,39 @@ def source(bag: Path) -> Iterator[BagSource]:
 def seek(source: BagSource, time: float) -> None:
     assert source.control("seek", time, "a test") == ""
     until(lambda: source.shown.tick == round(time * 100), f"{time:g} s")
+
+
+def test_its_past_is_where_tags_changed_forwards_and_back(source: BagSource, bag: Path) -> None:
+    with open_bag(bag) as opened:
+        place = list(opened.line.signal_names).index(SPEED)
+        speeds = [(frame.tick, float(frame.data[place])) for frame in opened.signals()]
+    changes = [speeds[0], *(now for was, now in pairwise(speeds) if was[1] != now[1])]
+    assert len(changes) > 3  # the ramp
+    assert source.past.read(SPEED, 0, TICKS, 1000) == (changes, None)
+    assert source.past.read(SPEED, -100, 10**9, 1000, back=True) == (changes[::-1], None)
+    assert source.past.read(SPEED, 0, TICKS, 2) == (changes[:2], changes[2][0])
+    assert source.past.read(SPEED, changes[1][0], changes[-1][0] - 1, 1000) == (changes[1:-1], None)
+    assert source.past.read(SETPOINT, 1, TICKS, 1000) == ([(SET_AT + 1, 0.25)], None)
+    assert source.past.read(SETPOINT, 0, TICKS, 1, back=True) == ([(SET_AT + 1, 0.25)], 0)
+    assert source.past.read("nothing", 0, TICKS, 1000) == ([], None)
+
+
+def test_a_long_past_is_read_in_parts(source: BagSource, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, _ = source.past.read(SPEED, 0, TICKS, 1000)
+    monkeypatch.setattr(past, "MOST_READ", 10)
+    monkeypatch.setattr(past, "WINDOW", 100)
+    for back in (False, True):
+        first, last = 0, TICKS
+        found: list[past.Sample] = []
+        parts = 0
+        rest: int | None = 0
+        while rest is not None:
+            samples, rest = source.past.read(SPEED, first, last, 1000, back)
+            found += samples
+            parts += 1
+            if rest is not None:
+                first, last = (first, rest) if back else (rest, last)
+        assert parts > 3 and found == (whole[::-1] if back else whole)
 
 
 def test_it_shows_what_was_recorded_at_any_time_forwards_and_back(source: BagSource, bag: Path) -> None:

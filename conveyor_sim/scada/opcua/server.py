@@ -139,9 +139,10 @@ class OpcUaServer:
         internal, source, requests = server.iserver, self._source, self._requests
         if await server.register_namespace(NAMESPACE) != INDEX:
             raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
-        history = History(self._history, source.about.tags)
+        clock = Clock(source.about, self._stamps)
+        history = History(self._history, source, clock)
         internal.history_manager.set_storage(history)
-        nodes, emitter, clock = Nodes(internal, history), Emitter(internal), Clock(source.about, self._stamps)
+        nodes, emitter = Nodes(internal, history), Emitter(internal)
         add_line(nodes, source.about)
         add_methods(nodes, source)
         alarms, events = AlarmStates(nodes, emitter, clock), LineEvents(source, nodes, emitter, clock)

@@ -69,7 +69,7 @@ class Clock:
         """stamps: which of both SourceTimestamps are."""
         self._start = datetime.fromisoformat(about.start_time.replace("Z", "+00:00")).astimezone(timezone.utc)
         self._tick = about.tick
-        self._simulated = stamps == "simulated"
+        self.is_simulated = stamps == "simulated"
 
     def simulated(self, tick: float) -> datetime:
         """Simulated time 0 is the scene's `start_time`."""
@@ -80,4 +80,8 @@ class Clock:
 
     def stamp(self, tick: float, heard: datetime) -> datetime:
         """SourceTimestamp of what is of a tick. heard: when the server got to know it."""
-        return self.simulated(tick) if self._simulated else heard
+        return self.simulated(tick) if self.is_simulated else heard
+
+    def tick_at(self, date: datetime) -> float:
+        """The tick of a date in simulated time, with a fraction; below 0 for one before the start."""
+        return (date - self._start).total_seconds() / self._tick

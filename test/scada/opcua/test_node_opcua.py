@@ -46,14 +46,23 @@ def test_it_reads_writes_subscribes_and_calls(line: Line, tmp_path: Path) -> Non
     assert told["unit"] == [5067859, "m/s"] and told["range"] == [0, 1]
     assert told["states"] == list(STATE_TEXTS.values())
     assert told["tick"] == 7 and told["stamped"]
-    codes = [told[name] for name in ("good", "beyond", "wrong", "signal", "called")]
+    codes = [told[name] for name in ("good", "beyond", "wrong", "signal", "called", "mode")]
     later = "GoodCompletesAsynchronously"
-    assert codes == [later, "BadOutOfRange", "BadTypeMismatch", "BadNotWritable", later]
+    assert codes == [later, "BadOutOfRange", "BadTypeMismatch", "BadNotWritable", later, "BadUserAccessDenied"]
     line.advance()
     assert [row[:4] for row in line.outcomes()] == [
         ("opcua controller", "disown", (), ()),
         ("opcua controller", "set", ("belts/zone1/cmd_speed",), (0.125,)),
     ]
+
+
+def test_an_operator_takes_a_belt_by_writing_only(line: Line, tmp_path: Path) -> None:
+    line.client()
+    done = run(line, "operator", PASSWORD, tmp_path)
+    told = json.loads(next(row for row in done.stdout.splitlines() if row.startswith("{")))
+    assert (told["mode"], told["good"]) == ("GoodCompletesAsynchronously", "BadInvalidState"), done.stderr
+    line.advance()
+    assert line.read("belts/zone2/mode") == 3
 
 
 def test_it_is_refused_with_a_wrong_password(line: Line, tmp_path: Path) -> None:

@@ -58,6 +58,7 @@ async function main([address, userName, password, folder]) {
       wrong: (await write("belts/zone1/cmd_speed", opcua.DataType.String, "1")).name,
       signal: (await write("belts/zone1/speed", opcua.DataType.Double, 0.1)).name,
       called: called.statusCode.name,
+      mode: (await write("belts/zone2/mode", opcua.DataType.UInt32, 3)).name,
     })
   );
   await session.close();
