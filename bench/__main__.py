@@ -24,6 +24,7 @@ with while_importing():
         riding,
         scada,
         start,
+        studies,
         targets,
         view,
         whole,
@@ -61,6 +62,7 @@ PARTS: dict[str, Part] = {
     "lockstep": lockstep,
     "scada": scada,
     "view": view,
+    "studies": studies,
     "whole": whole,
 }
 

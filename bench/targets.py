@@ -72,6 +72,14 @@ def _view(case: str, n: float, contestant: str, quantity: str) -> Callable[[Rows
     return lambda rows: _middle(rows.spread(case, n, contestant, quantity))
 
 
+def _two_processes(rows: Rows) -> float | None:
+    return _middle(rows.ratio(studies.SCALING, 0.0, studies.TWO, studies.ONE, studies.RATE))
+
+
+def _beside(rows: Rows) -> float | None:
+    return _middle(rows.spread(studies.BESIDE, 0.0, studies.ONE, studies.OVERHEAD))
+
+
 def _middle(spread: Spread | None) -> float | None:
     return None if spread is None else spread.middle
 
@@ -150,6 +158,8 @@ TARGETS = (
     ),
     Target("s to open an hour on the page", "view", MOST, 2.0, _view(view.LONG, view.HOUR, "server", view.OPEN)),
     Target("ms to go to a time of it", "view", MOST, 100.0, _view(view.LONG, view.HOUR, "server", view.SEEK)),
+    Target("runs of a study by two processes, times one", "studies", LEAST, 1.8, _two_processes),
+    Target("ms a run of a study beside its simulation", "studies", MOST, 50.0, _beside),
 )
 
 
