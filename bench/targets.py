@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import control, dense, growth, lockstep, node, plant, start, view, whole
+from bench import control, dense, growth, lockstep, node, plant, start, studies, view, whole
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
