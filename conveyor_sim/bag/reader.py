@@ -5,7 +5,7 @@ from __future__ import annotations
 import stat
 from collections import Counter
 from collections.abc import Collection, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path, PurePath
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.any_source import AnySource
 from conveyor_sim.bag.index import sealed
 from conveyor_sim.bag.messages import LINE, Outcome
-from conveyor_sim.bag.metadata import FILE_NAME, file_names, read_metadata
+from conveyor_sim.bag.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
 from conveyor_sim.bag.own_source import own_source
 from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.records import mapped
@@ -217,16 +217,18 @@ class Bag(AbstractContextManager["Bag"]):
         return int(message.tick_ns if message.__msgtype__ == LINE else self.line.tick_ns)
 
 
-@contextmanager
-def in_one_sentence(path: Path, what: str = "can't be read as a bag") -> Iterator[None]:
+class in_one_sentence(AbstractContextManager[None]):
     """Turns whatever the libraries raise over a bag that they can't read into a BagError of one sentence."""
-    try:
-        yield
-    except ConveyorError:
-        raise
-    except Exception as error:
-        reason = printable(" ".join(f"{type(error).__name__}: {error}".split()))
-        raise BagError(f"{path}: {what} ({reason}); damaged? `conveyor-sim recover` may help") from error
+
+    def __init__(self, path: Path, what: str = "can't be read as a bag") -> None:
+        self._path, self._what = path, what
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        if isinstance(error, Exception) and not isinstance(error, ConveyorError):
+            reason = printable(" ".join(f"{type(error).__name__}: {error}".split()))
+            raise BagError(
+                f"{self._path}: {self._what} ({reason}); damaged? `conveyor-sim recover` may help"
+            ) from error
 
 
 def mcap_files(path: Path) -> list[Path]:
@@ -285,6 +287,9 @@ def _checked_files(path: Path) -> list[Path]:
     if not (path / FILE_NAME).exists():
         hint = "`conveyor-sim recover` repairs it" if files else "expected a rosbag2 folder"
         raise BagError(f"{path}: {FILE_NAME} is missing; {hint}")
+    with suppress(OSError, UnicodeDecodeError):
+        if len(files) == 1 and is_stated_in(files[0]):
+            return files
     information = read_metadata(path)
     try:
         names = [] if information is None else file_names(information)

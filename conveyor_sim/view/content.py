@@ -31,7 +31,7 @@ class Collector:
         self._start = start
         self._gaps = gaps
         self._taken = dict.fromkeys(DRAWN, -1)
-        self._peaks: dict[int, float] = {}
+        self._left_out: list[BottleColumns] = []
         self._names = variables
         self._variables = np.full(len(variables), np.nan)
 
@@ -65,10 +65,14 @@ class Collector:
     def _add_bottles(self, tick: int, raw: bytes, is_due: bool) -> None:
         """Peak forces of those that are not taken go into the next that is."""
         bottles: BottleColumns = TOPICS["bottles"].unpack(self._bag.decode("bottles", raw))
-        ids = bottles.id.tolist()
-        for bottle, force in zip(ids, bottles.peak_force.tolist(), strict=True):
-            self._peaks[bottle] = max(force, self._peaks.get(bottle, 0.0))
-        if is_due:
-            force = np.array([self._peaks[bottle] for bottle in ids], dtype=np.float64)
-            self.content.bottles.append((tick, BottleColumns(**{**vars(bottles), "peak_force": force})))
-            self._peaks = {}
+        if not is_due:
+            self._left_out.append(bottles)
+            return
+        force = bottles.peak_force.copy()
+        for earlier in self._left_out if len(force) else ():
+            # Ids ascend; those that are gone are drawn no more.
+            place = np.searchsorted(bottles.id, earlier.id).clip(max=len(force) - 1)
+            there = bottles.id[place] == earlier.id
+            force[place[there]] = np.fmax(force[place[there]], earlier.peak_force[there])
+        self.content.bottles.append((tick, BottleColumns(**{**vars(bottles), "peak_force": force})))
+        self._left_out = []
