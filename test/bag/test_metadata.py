@@ -1,0 +1,70 @@
+"""metadata.yaml: written by hand, and not parsed where it is what the recording's file states itself."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from conveyor_sim.bag.metadata import FILE_NAME, is_stated_in, read_metadata, to_yaml, write_metadata
+from conveyor_sim.bag.qos import LATCHED
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import BagError
+
+AWKWARD = [
+    "",
+    "null",
+    "Yes",
+    "12",
+    "1.5",
+    "-",
+    "~",
+    "it's",
+    "a: b",
+    "a #b",
+    "ä b_0.mcap",
+    "two\nlines",
+    "../x",
+    '"',
+    "{}",
+]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        AWKWARD,
+        dict.fromkeys(AWKWARD[2:], "x"),
+        {"none": None, "yes": True, "no": False, "number": -3, "empty": [], "nothing": {}},
+        [{"a": [{"b": 1, "c": ["d"]}, "e"], "f": {"g": {"h": "i"}}}],
+        [LATCHED.as_rosbag2()],
+    ],
+)
+def test_a_yaml_parser_reads_what_was_written(value: Any) -> None:
+    assert YAML(typ="safe").load(to_yaml(value)) == value
+
+
+def recorded(folder: Path) -> Path:
+    with Recorder(folder, topics=["guard"]):
+        pass
+    return next(folder.glob("*.mcap"))
+
+
+def test_it_is_the_text_that_the_file_states(tmp_path: Path) -> None:
+    """Not of a file by another name, nor once a letter of it has changed: then it is parsed."""
+    file = recorded(tmp_path / "run")
+    assert is_stated_in(file)
+    assert not is_stated_in(file.rename(file.with_name("other.mcap")))
+    with pytest.raises(BagError, match="does not fit"):
+        open_bag(file.parent)
+
+
+def test_a_changed_one_is_parsed(tmp_path: Path) -> None:
+    file = recorded(tmp_path / "run")
+    beside = file.parent / FILE_NAME
+    beside.write_text(beside.read_text().replace("cdr", "xml", 1))
+    assert not is_stated_in(file)
+    write_metadata(file.parent, to_yaml({"relative_file_paths": ["else.mcap"], "files": []}))
+    assert not is_stated_in(file)
+    assert read_metadata(file.parent) == {"relative_file_paths": ["else.mcap"], "files": []}
