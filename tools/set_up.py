@@ -17,6 +17,8 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+EXTRAS = ("foxglove", "scada", "st")
+"""Whose lists in requirements/ those of the tools include."""
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
 TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "what the docs site is built with"}
 SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, where ROS looks for a package's share
@@ -177,7 +179,7 @@ def set_up(distro: str, tools: str) -> None:
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
     needed = {"packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
     if tools:
-        needed[tools] = key(requirements / f"{tools}.txt", requirements / "scada.txt", requirements / "st.txt")
+        needed[tools] = key(requirements / f"{tools}.txt", *(requirements / f"{name}.txt" for name in EXTRAS))
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
         return
 

@@ -36,6 +36,9 @@ OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables", "lockst
 TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
 OF_BAG = ("loop",)
 
+DRAWING = ("web", "foxglove")
+"""Faces that show where bottles are."""
+
 OF_FACES = (
     "modbus_role",
     "modbus_map",
@@ -64,6 +67,7 @@ _WHERE = {
 @click.option("--modbus-role", type=click.Choice(["controller", "operator"]), help="As what its clients may write.")
 @click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")
 @click.option("--web", type=PORT, is_flag=False, flag_value=8080, help="Serve a page for browsers on this port.")
+@click.option("--foxglove", type=PORT, is_flag=False, flag_value=8765, help="Serve Foxglove on this port.")
 @click.option("--web-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
 @click.option(
     "--users",
@@ -96,10 +100,10 @@ _WHERE = {
 @click.option("--threads", type=click.IntRange(1), help="Of SCENE: threads to step with.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
-    """Serve a line to SCADA systems, HMIs, PLCs and browsers.
+    """Serve a line to SCADA systems, HMIs, PLCs, browsers and Foxglove.
 
     SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node it is the
-    line that a running node simulates. Without --opcua, --modbus and --web, OPC UA and Modbus are served, each on its
+    line that a running node simulates. Without the option of a face, OPC UA and Modbus are served, each on its
     port. Ctrl-C ends it.
     """
     with collected_later():
@@ -121,7 +125,8 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             raise ConveyorError("serve: expected one of SCENE, BAG and --node")
         if what is None:
             _require_not_given("--node", (*OF_SCENE, *OF_BAG, "real_time_factor"))
-            source: Source = stack.enter_context(_node(node or "", console, given["web"] is not None))
+            drawn = any(given[face] is not None for face in DRAWING)
+            source: Source = stack.enter_context(_node(node or "", console, drawn))
         elif _is_bag(what):
             _require_not_given(what, (*OF_SCENE, "modbus_role"))
             source = stack.enter_context(_bag(Path(what), console, given["real_time_factor"], given["loop"]))

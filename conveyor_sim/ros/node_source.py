@@ -193,6 +193,7 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
                 taken.append(message[0])
             for data in taken if name == "events" else taken[-1:]:
                 came = True
+                self.pass_on(name, data)
                 decode = partial(typestore().deserialize_cdr, data, TOPICS[name].type)
                 if name in DRAWN:
                     self.keep(name, decode)

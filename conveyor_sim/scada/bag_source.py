@@ -163,10 +163,13 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         for topic in HEARD:
             if topic in states and topic != "run_state":  # a playback's own, whatever was recorded
                 self.take(topic, self._bag.decode(topic, states[topic]))
+                self.pass_on(topic, states[topic])
         for topic in states.keys() & set(DRAWN):
             self.keep(topic, partial(self._bag.decode, topic, states[topic]))
+            self.pass_on(topic, states[topic])
         for data in events:
             self.take("events", self._bag.decode("events", data))
+            self.pass_on("events", data)
         self.state_run(run)
         self.show()
 

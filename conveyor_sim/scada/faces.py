@@ -19,13 +19,15 @@ class Kind:
     port: int
     """By default; its usual one may be for root only."""
     library: str
-    """Without which it can't be; of the extra `scada`."""
+    """Without which it can't be."""
     make: Callable[[TagSource, int, Settings], Face]
     """A face on a port, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
     """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
     by_default: bool = True
     """Whether it is served where none is named."""
+    extra: str = "scada"
+    """Of this package, that brings the library."""
 
     @property
     def installed(self) -> bool:
@@ -35,7 +37,7 @@ class Kind:
     def require(self) -> None:
         """Raises FaceError if it can't be here."""
         if not self.installed:
-            raise FaceError(f"{self.name}: {self.library} is not installed: pip install 'conveyor_sim[scada]'")
+            raise FaceError(f"{self.name}: {self.library} is not installed: pip install 'conveyor_sim[{self.extra}]'")
 
 
 def _modbus(source: TagSource, port: int, settings: Settings) -> Face:
@@ -88,6 +90,15 @@ def _web(source: TagSource, port: int, settings: Settings) -> Face:
     )
 
 
+def _foxglove(source: TagSource, port: int, settings: Settings) -> Face:
+    from conveyor_sim.scada.foxglove_server import FoxgloveServer
+    from conveyor_sim.scada.view import View
+
+    if not isinstance(source, View):
+        raise FaceError("foxglove: the line of a test has no topics, expected a scene, a recording or a node")
+    return FoxgloveServer(source, settings.host, port)
+
+
 def _users_can(settings: Settings) -> str:
     readers = "read all" if settings.anonymous else "read nothing without a name and password"
     return f"{readers}, and write only as one of the users" if settings.users else f"{readers}, and write nothing"
@@ -97,4 +108,5 @@ FACES: tuple[Kind, ...] = (
     Kind(OPCUA, 4840, "asyncua", _opcua, _users_can),
     Kind(MODBUS, 5020, "pymodbus", _modbus, _modbus_exposes),
     Kind(WEB, 8080, "aiohttp", _web, _users_can, by_default=False),
+    Kind("foxglove", 8765, "foxglove", _foxglove, lambda _: "read all", by_default=False, extra="foxglove"),
 )

@@ -265,11 +265,14 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         for topic in HEARD:
             if (data := copy.states.get(topic)) is not None:
                 self.take(topic, _decoded(topic, data))
+                self.pass_on(topic, data)
         for topic in DRAWN:
             if (data := copy.states.get(topic)) is not None:
                 self.keep(topic, partial(_decoded, topic, data))
+                self.pass_on(topic, data)
         for data in copy.events:
             self.take("events", _decoded("events", data))
+            self.pass_on("events", data)
         with self._lock:
             self._handed, self._waiting = copy.handed, copy.waiting
         self._begun = self._begun or bool(copy.states)

@@ -64,8 +64,18 @@ class PictureSource(TagSource, Protocol):
     def picture(self) -> Picture:
         """What is drawn of the line as it was last."""
 
+    @property
+    def newest(self) -> Mapping[str, bytes]:
+        """By topic, the last message as it came."""
+
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on; what is returned ends that."""
+
+    def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
+        """Have a function called with topic and bytes of each message from now on; what is returned ends that.
+
+        It must not block, and must not raise.
+        """
 
 
 class View:
@@ -100,6 +110,8 @@ class View:
         self._shown = Shown(0, {}, lost=NOTHING)
         self._picture: Picture | None = None
         self._watchers = 0
+        self._hearers: tuple[Callable[[str, bytes], None], ...] = ()
+        self._newest: dict[str, bytes] = {}
         self._forget("")
 
     @property
@@ -121,6 +133,11 @@ class View:
             raise RuntimeError("nothing has been shown yet")
         return self._picture
 
+    @property
+    def newest(self) -> Mapping[str, bytes]:
+        """By topic, the last message as it came."""
+        return self._newest
+
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on, if that costs anything; what is returned ends that."""
         self._count_watchers(1)
@@ -130,6 +147,15 @@ class View:
     def past(self) -> Past | None:
         """Nobody knows."""
         return None
+
+    def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
+        """Have a function called with topic and bytes of each message from now on; what is returned ends that."""
+        self._hearers = (*self._hearers, heard)
+
+        def end() -> None:
+            self._hearers = tuple(other for other in self._hearers if other is not heard)
+
+        return end
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events were heard of, and those after so many."""
@@ -173,6 +199,12 @@ class View:
                 self._alarms = TOPICS[topic].unpack(message)
             case "events":
                 self._take_events(TOPICS[topic].unpack(message))
+
+    def pass_on(self, topic: str, data: bytes) -> None:
+        """A message as it came, of one of HEARD and DRAWN."""
+        self._newest[topic] = data
+        for heard in self._hearers:
+            heard(topic, data)
 
     def keep(self, topic: str, decode: Callable[[], Any]) -> None:
         """What decodes a message of one of DRAWN, in any thread."""

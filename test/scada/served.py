@@ -39,7 +39,7 @@ class Served:
     @property
     def address(self) -> str:
         """Of its first server, once it listens."""
-        pattern = r"(modbus|opc\.tcp)://127\.0\.0\.1:\d+"
+        pattern = r"(modbus|opc\.tcp|ws)://127\.0\.0\.1:\d+"
         until(lambda: re.search(pattern, self.told) or self.process.poll() is not None, "the server")
         found = re.search(pattern, self.told)
         assert found, self.told
