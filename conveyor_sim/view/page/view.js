@@ -1,0 +1,310 @@
+// The view: what is shown of a line, what is chosen on it, and the parts that draw and tell it.
+
+import { Alarms } from "./alarms.js";
+import { Bars } from "./bars.js";
+import { Beside } from "./beside.js";
+import { Bottle } from "./bottle.js";
+import { Camera } from "./camera.js";
+import { Clock } from "./clock.js";
+import { COLOURINGS, SCALES, colourings } from "./colours.js";
+import { Compare } from "./compare.js";
+import { Desk } from "./desk.js";
+import { deviceOf, middle } from "./devices.js";
+import { byId, element, seconds } from "./dom.js";
+import { Events } from "./events.js";
+import { Faceplate } from "./faceplate.js";
+import { LiveClock } from "./live_clock.js";
+import { Plan } from "./plan.js";
+import { Scrubber } from "./scrubber.js";
+import { awayFrom, boundsOf, inside } from "./shapes.js";
+import { Tabs } from "./tabs.js";
+import { Tiles } from "./tiles.js";
+import { Trends } from "./trends.js";
+import { Watch } from "./watch.js";
+import { WEARS, Wear } from "./wear.js";
+
+const MEASURED = 5000; // forces of a block that its scale is made from
+const MOST_EVENTS = 5000; // of a line that runs; then those before what can still be seen are forgotten
+const PANELS_EVERY = 120; // ms between two pictures of the panels while time goes on
+
+export class View {
+  // other: a recording that is shown beside it, and its story; else null. line: if it runs, and what is known of it (of
+  // a message "begin").
+  constructor(recording, story, other, line = null, about = null) {
+    Object.assign(this, { recording, story, line, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
+    this.rival = null; // what is shown beside this
+    this.fastest = 0.1;
+    this.strongest = 1;
+    this.oldest = line ? 60 : Math.max(1, Math.min(60, recording.end - recording.start));
+    this.clock = line ? new LiveClock(recording) : new Clock(recording, other?.recording);
+    this.desk = line ? new Desk(this, about) : null;
+    this.watch = line ? new Watch(this) : null;
+    this.camera = new Camera(boundsOf([recording, other?.recording]));
+    this.wear = new Wear(this);
+    this.plan = new Plan(byId("plan"), this);
+    this.plans = [this.plan];
+    if (other) {
+      this.beside = new Beside(this, other.recording, other.story, recording.head.compared.names);
+      this.compare = new Compare(this, recording.head.compared);
+      this.plans.push(this.beside.plan);
+    }
+    this.scrubber = new Scrubber(this);
+    this.trends = new Trends(this);
+    this.faceplate = new Faceplate(this);
+    this.alarms = new Alarms(this);
+    this.bars = new Bars(this);
+    this.events = new Events(this);
+    const production = { title: "Line", parts: [this.bars, new Tiles(this)] };
+    const panels = { line: production, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [this.events] },
+      device: { title: "Device", parts: [this.faceplate] }, ...(line ? { watch: { title: "Watch", parts: [this.watch] } } : {}), bottle: { title: "Bottle", parts: [new Bottle(this)] } };
+    this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : "line");
+    for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
+    for (const one of this.clock.all) {
+      one.addEventListener("loaded", () => this._loaded());
+      one.addEventListener("failed", (event) => this.say(event.detail));
+    }
+    this.snapping = false;
+  }
+
+  touch() {
+    this.dirty = true;
+  }
+
+  say(text) {
+    byId("notice").textContent = byId("notice").title = text;
+  }
+
+  badge(name, count) {
+    this.tabs?.badge(name, count);
+  }
+
+  signal(name) {
+    return this.recording.signal(name, this.clock.time);
+  }
+
+  toldMore(part) {
+    this.story.add(part);
+    this.events.filter();
+    this.bars.named();
+    this.worn();
+    this.touch();
+  }
+
+  // What a line that runs shows, and what happens on it.
+  receive() {
+    const { line, recording, story } = this;
+    line.addEventListener("frame", ({ detail }) => {
+      recording.append(detail);
+      this.measure(detail.block);
+    });
+    line.addEventListener("story", ({ detail }) => {
+      if (story.events.length > MOST_EVENTS) story.forget(recording.start);
+      this.toldMore(detail);
+      this.desk.happened(detail.events);
+    });
+    line.addEventListener("begin", ({ detail }) => {
+      if (still(detail.head) !== still(recording.head)) location.reload();
+      recording.begin(detail.head);
+      story.begin(detail.head);
+      this.toldMore(detail.story);
+      this.desk.status = detail.status;
+      this.desk.connection();
+      if (this.clock.live) this.clock.follow();
+      else this.clock.seek(this.clock.time);
+    });
+  }
+
+  // The choice of heat maps is there if the recording has any.
+  worn() {
+    byId("worn").hidden = !this.story.data.wear.length;
+  }
+
+  _loaded() {
+    if (this.snapping) this.snap();
+    this._measure();
+    this.touch();
+  }
+
+  // Scales that only grow, so that a colour means the same from frame to frame.
+  _measure() {
+    for (const block of this.clock.all.flatMap(({ blocks }) => [...blocks.values()])) {
+      if (!block.measured) this.measure(block);
+    }
+    this.legend();
+  }
+
+  measure(block) {
+    block.measured = true;
+    for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
+    const every = Math.ceil(block.contacts.reduce((sum, { force }) => sum + force.length, 0) / MEASURED);
+    const forces = block.contacts.flatMap(({ force }) => Array.from(force).filter((_, i) => i % every === 0)).sort((a, b) => a - b);
+    const strong = forces[Math.floor(0.99 * forces.length)] ?? 0;
+    this.strongest = Math.max(this.strongestSeen ?? 1, strong);
+    this.strongestSeen = this.strongest;
+  }
+
+  // Time stands at a frame of the recording, once that is there.
+  snap() {
+    if (this.clock.playing) return;
+    const at = this.clock.recording.place(this.clock.time);
+    this.snapping = !at;
+    if (at && this.clock.time !== at.block.times[at.frame]) this.clock.seek(at.block.times[at.frame]);
+  }
+
+  // How far a bottle is from where the other recording has it, m; not there: no end.
+  apart(bottle) {
+    const { frame } = this.rival.plan;
+    if (!frame) return 0;
+    frame.byId ??= new Map(frame.bottles.map((other) => [other.id, other]));
+    const other = frame.byId.get(bottle.id);
+    return other ? Math.hypot(bottle.x - other.x, bottle.y - other.y) : Infinity;
+  }
+
+  // What the comparison has found: said, and marked.
+  compared() {
+    this.story.differences = this.compare.marks();
+    this.story.build();
+    this.say(this.compare.words());
+    this.touch();
+  }
+
+  // To a time, and to the place of a tag or a bottle.
+  jump(time, tag = "", bottle = -1) {
+    this.clock.pause();
+    this.clock.seek(time);
+    if (bottle >= 0) this.selectBottle(bottle, false);
+    const mark = this.recording.head.marks.find((other) => tag && (tag === deviceOf(other) || tag.startsWith(`${deviceOf(other)}/`)));
+    if (!mark) return;
+    const [x, y] = middle(mark.points);
+    this.setFollowing(false);
+    this.camera.centre(x, y);
+    this.faceplate.show(deviceOf(mark));
+  }
+
+  nextMark(by) {
+    const marks = this.story.marks.filter(({ time }) => time >= this.recording.start), { time } = this.clock;
+    const found = by > 0 ? marks.find((mark) => mark.time > time + 1e-3) : marks.reverse().find((mark) => mark.time < time - 1e-3);
+    if (found) {
+      this.jump(found.time);
+      this.say(found.text);
+    }
+  }
+
+  selectBottle(id, show = true) {
+    this.bottle = id;
+    if (show) this.tabs.show("bottle");
+    byId("said").textContent = id === null ? "" : `bottle ${id} chosen`;
+    this.touch();
+  }
+
+  nextBottle(by) {
+    const ids = (this.plan.frame?.bottles ?? []).map(({ id }) => id), place = ids.indexOf(this.bottle);
+    if (ids.length) this.selectBottle(ids[(place < 0 ? (by > 0 ? 0 : ids.length - 1) : place + by + ids.length) % ids.length]);
+  }
+
+  selectDevice(name) {
+    this.faceplate.show(name);
+    const mark = this.recording.head.marks.find((other) => deviceOf(other) === name);
+    if (mark) this.camera.centre(...middle(mark.points));
+    this.touch();
+  }
+
+  setFollowing(on) {
+    this.following = on && this.bottle !== null;
+    this.touch();
+  }
+
+  letGo() {
+    this.setFollowing(false);
+    this.selectBottle(null, false);
+  }
+
+  wholePlant() {
+    this.setFollowing(false);
+    this.camera.fit();
+  }
+
+  setColouring(name) {
+    this.colouring = byId("colour").value = name;
+    this.legend();
+    this.touch();
+  }
+
+  nextColouring() {
+    const names = colourings(this);
+    this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
+  }
+
+  legend() {
+    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear;
+    const ramp = (colours, low, high) => {
+      const bar = element("span", { class: "ramp" });
+      bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
+      return element("span", { class: "entry" }, `${low} `, bar, ` ${high}`);
+    };
+    if (colouring.ramp) entries.push(ramp(colouring.ramp, ...colouring.ends(this)));
+    else {
+      entries.push(...colouring.legend(this).map(([colour, name]) => {
+        const swatch = element("span", { class: "swatch" });
+        swatch.style.background = colour;
+        return element("span", { class: "entry" }, swatch, name);
+      }));
+    }
+    if (shown) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
+    byId("legend").replaceChildren(...entries);
+  }
+
+  clicked(px, py, plan = this.plan) {
+    const bottle = plan.bottleAt(px, py), { head } = plan.view.recording;
+    if (bottle !== null) {
+      this.selectBottle(bottle);
+      return;
+    }
+    const [x, y] = this.camera.at(px, py), near = 12 / this.camera.scale;
+    const mark = head.marks.find(({ points }) => inside(points, x, y) || points.some((point, k) => awayFrom(point, points[(k + 1) % points.length], x, y) < near));
+    const belt = mark ? null : [...head.belts].reverse().find(({ outline }) => inside(outline, x, y));
+    const device = mark ? deviceOf(mark) : belt ? `belts/${belt.name}` : null;
+    if (device) {
+      this.faceplate.show(device);
+      this.tabs.show("device");
+    }
+  }
+
+  resize() {
+    this.beside?.resize();
+    this.plan.resize();
+    this.touch();
+  }
+
+  draw(now) {
+    for (const plan of this.plans) plan.update();
+    this._follow();
+    for (const plan of this.plans) plan.draw();
+    this.beside?.draw();
+    this.scrubber.draw();
+    const { clock, camera } = this, play = byId("play");
+    byId("clock").textContent = seconds(clock.time);
+    play.textContent = clock.playing ? "❚❚" : "▶";
+    play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    byId("speed").value = clock.speed;
+    this.desk?.drawn(now);
+    byId("plan").dataset.camera = [camera.x, camera.y, camera.scale, camera.width, camera.height].join(" ");
+    byId("plan").dataset.frame = this.plan.frame ? this.plan.frame.time.toFixed(6) : "";
+    document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
+    if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
+    this.panelsDrawn = now;
+    if (this.line) byId("end").textContent = seconds(this.recording.end);
+    this.alarms.draw();
+    this.tabs.draw();
+    this.trends.draw();
+  }
+
+  _follow() {
+    if (!this.following) return;
+    const bottle = this.plan.frame?.bottles.find(({ id }) => id === this.bottle);
+    if (bottle && (bottle.x !== this.camera.x || bottle.y !== this.camera.y)) this.camera.centre(bottle.x, bottle.y);
+  }
+}
+
+// What must be the same of a line for a page of it to go on.
+const still = (head) => JSON.stringify({ ...head, run: "", seed: 0, times: null, forced: null });
