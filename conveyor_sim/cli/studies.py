@@ -89,7 +89,7 @@ def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None
         say(f"finished runs are kept in {folder}; the same command goes on with them")
         raise
     results = read_results(folder)
-    show(points_table(rows, results.units))
+    show(points_table(rows, results.units, results.parameters))
     for row in rows:
         if row.status != "finished":
             click.echo(f"{row.status}: {row.error}: {run_command(setup.path, row)}")
@@ -132,7 +132,7 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
     found = read_results(results)
     if not any(row.status == "finished" for row in found.rows):
         raise ConveyorError(f"{results}: none of its {len(found.rows)} runs has finished, expected one at least")
-    show(points_table(found.rows, found.units))
+    show(points_table(found.rows, found.units, found.parameters))
     for sentence in verdicts(found):
         click.echo(sentence)
     plot_study = None if no_pictures else plot_function("plot_study")

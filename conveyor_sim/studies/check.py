@@ -8,12 +8,13 @@ from typing import Any
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.load import refused
+from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.problems import Path, Problem
-from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.words import field_names, shown, unit_of
 from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.design import Point, points_of
-from conveyor_sim.studies.line_of import controller_of, scene_of
+from conveyor_sim.studies.line_of import controller_of, scene_of, steps_of
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Parameter
 
@@ -49,6 +50,30 @@ def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
     if problems:
         raise StudyError(str(refused(problems, Document(setup.source, setup.path), setup.path, {})))
     return units
+
+
+def parameter_units(setup: Setup, scene: Scene) -> dict[str, str]:
+    """The unit of each parameter: the one given, or that of the field in a scene; "" where it has none."""
+    units = {}
+    for name, parameter in setup.study.parameters.items():
+        units[name] = parameter.unit or ("" if parameter.field is None else _unit_at(scene, steps_of(parameter.field)))
+    return units
+
+
+def _unit_at(scene: Scene, path: Path) -> str:
+    part: Any = scene
+    unit = ""
+    for step in path:
+        if isinstance(part, Part):
+            found = field_names(type(part)).get(str(step))
+            unit = "" if found is None else unit_of(found)
+            names = {field.alias or name: name for name, field in type(part).model_fields.items()}
+            part = getattr(part, names.get(str(step), ""), None)
+        elif isinstance(part, dict):
+            part = part.get(step)
+        else:  # a list; what is in a point has its unit
+            part = part[step] if isinstance(part, (list, tuple)) and isinstance(step, int) else None
+    return "" if unit == "1" else unit
 
 
 def _problems(setup: Setup, point: Point, path: Path) -> Iterator[Problem]:

@@ -48,7 +48,7 @@ class Display(AbstractContextManager["Display"]):
             units = {name: metric.unit for name, metric in self._setup.kept.items()}
             left_text = "" if left is None else f", about {in_words(left)} left"
             line = Text(f"{self._setup.study.name}: {done} of {total} runs{left_text}")
-            self._live.update(Group(points_table(self._rows, units, ROWS), line), refresh=True)
+            self._live.update(Group(points_table(self._rows, units, {}, ROWS), line), refresh=True)
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()

@@ -17,6 +17,7 @@ from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import salib_problem
 from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.table import with_unit
 
 MOST_LEVELS = 40
 """Of a parameter; with more its points lie anywhere, and none is run at the same value as another."""
@@ -47,7 +48,9 @@ def maps(results: Results) -> dict[str, Map]:
             [_mean(_values(_at(_at(results.rows, one, level), other, also), metric)) for also in levels[1]]
             for level in levels[0]
         ]
-        found[metric] = Map((one, other), titled(results, metric), levels, np.array(cells))
+        found[metric] = Map(
+            (titled(results, one), titled(results, other)), titled(results, metric), levels, np.array(cells)
+        )
     return found
 
 
@@ -58,12 +61,12 @@ def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] 
     and the interval rests on as many as there are seeds.
     """
     rows = results.rows if rows is None else rows
-    title = titled(results, metric)
+    title, across = titled(results, metric), titled(results, parameter)
     if parameter not in _levelled(results):
         points = sorted({row.point: row.parameters[parameter] for row in rows}.items(), key=lambda pair: pair[1])
         means = [_mean(_values([row for row in rows if row.point == point], metric)) for point, _ in points]
         levels = [level for _, level in points]
-        return Response(parameter, title, levels, np.array(means), np.full(len(means), math.nan), scattered=True)
+        return Response(across, title, levels, np.array(means), np.full(len(means), math.nan), scattered=True)
     levels = levels_of(rows, parameter)
     means, halves = [], []
     for level in levels:
@@ -74,7 +77,7 @@ def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] 
         values = [_mean(found) for found in by_seed.values()]
         means.append(_mean(values))
         halves.append(mean_interval(values).half_width if len(values) > 1 else math.nan)
-    return Response(parameter, title, levels, np.array(means), np.array(halves))
+    return Response(across, title, levels, np.array(means), np.array(halves))
 
 
 def indices(results: Results) -> list[Indices]:
@@ -107,10 +110,9 @@ def indices(results: Results) -> list[Indices]:
     return found
 
 
-def titled(results: Results, metric: str) -> str:
-    """A metric with its unit."""
-    unit = results.units[metric]
-    return metric if unit in ("", "1") else f"{metric} ({unit})"
+def titled(results: Results, name: str) -> str:
+    """A metric or a parameter with its unit."""
+    return with_unit(name, {**results.parameters, **results.units}[name])
 
 
 def levels_of(rows: Iterable[Row], parameter: str) -> list[Any]:
@@ -133,7 +135,7 @@ def _lines(results: Results, metric: str, across: str, other: str) -> list[Respo
     for level in levels_of(results.rows, other):
         found = response(results, across, metric, _at(results.rows, other, level))
         label = f"{other} {level_text(level)}"
-        lines.append(Response(across, found.metric, found.levels, found.mean, found.half_width, label))
+        lines.append(Response(found.parameter, found.metric, found.levels, found.mean, found.half_width, label))
     return lines
 
 

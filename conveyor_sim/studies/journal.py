@@ -23,7 +23,7 @@ RUNS = "runs"
 STARTS = "warm_starts"
 VERSION = "version of conveyor_sim"
 UNITS = "units.json"
-"""Of metrics, with the names of the parameters and the path of the study."""
+"""Of metrics and parameters, and the path of the study."""
 FREE = ("description", "seeds", "bags", "metrics", "optimise", "points")
 """Fields of a study that may change while its finished runs stay: all but these decide a run."""
 
@@ -83,9 +83,9 @@ class Journal(AbstractContextManager["Journal"]):
         """Keep a warm start. Raises StudyError if it can't be written."""
         self._write(Path(STARTS) / f"seed_{seed}.npz", content)
 
-    def keep_units(self, units: Mapping[str, str]) -> None:
-        """Keep the units of the metrics. Raises StudyError if they can't be written."""
-        about = {"path": self._setup.path, "units": dict(units), "parameters": list(self._setup.study.parameters)}
+    def keep_units(self, metrics: Mapping[str, str], parameters: Mapping[str, str]) -> None:
+        """Keep the units of metrics and parameters. Raises StudyError if they can't be written."""
+        about = {"path": self._setup.path, "units": dict(metrics), "parameters": dict(parameters)}
         self._write(Path(UNITS), json.dumps(about, indent=1))
 
     def _write(self, name: Path, content: str | bytes) -> None:

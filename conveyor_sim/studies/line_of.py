@@ -13,6 +13,7 @@ from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.load import merged
+from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.words import listed
 from conveyor_sim.st.load import load
 from conveyor_sim.studies.code import function
@@ -42,6 +43,11 @@ def scene_of(setup: Setup, parameters: Mapping[str, Any], seed: int) -> Scene:
     return parse_scene(text, name, merged(_data(overrides), changes))
 
 
+def steps_of(path: str) -> Path:
+    """The parts of a path such as `contacts[0].friction`."""
+    return tuple(name or int(index) for name, index in _STEP.findall(path))
+
+
 def controller_of(setup: Setup, parameters: Mapping[str, Any]) -> Controller | None:
     """The controller of a run, new; None for a study without one. Raises ConveyorError for one that can't be."""
     if not setup.controller:
@@ -67,7 +73,7 @@ def _data(text: str) -> dict[str, Any]:
 
 def _with_field(base: dict[str, Any], changes: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """The changes with one more. A list is laid over as a whole, so what it has beside comes along."""
-    steps: list[Any] = [name or int(index) for name, index in _STEP.findall(path)]
+    steps: list[Any] = list(steps_of(path))
     _require_named(merged(base, changes), steps, path)
     first_index = next((place for place, step in enumerate(steps) if isinstance(step, int)), len(steps))
     new: Any = value

@@ -35,7 +35,8 @@ class Results:
     """Of its file, as the study was run."""
     units: Mapping[str, str]
     """By metric."""
-    parameters: Sequence[str]
+    parameters: Mapping[str, str]
+    """Their units, "" where it is not known, or there is none."""
     versions: Mapping[str, str]
     rows: Sequence[Row]
 
@@ -102,8 +103,8 @@ def _table(results: Results) -> Any:
         "point": (pyarrow.array([row.point for row in rows], pyarrow.int64()), ""),
         "seed": (pyarrow.array([row.seed for row in rows], pyarrow.uint64()), ""),
     }
-    for name in results.parameters:
-        columns[name] = (pyarrow.array(_alike([row.parameters.get(name) for row in rows])), "")
+    for name, unit in results.parameters.items():
+        columns[name] = (pyarrow.array(_alike([row.parameters.get(name) for row in rows])), unit)
     for name, unit in results.units.items():
         values = [row.metrics.get(name) for row in rows]
         columns[name] = (pyarrow.array(values, pyarrow.float64()), unit)
@@ -125,7 +126,7 @@ def _table(results: Results) -> Any:
         "study": results.study,
         "path": results.path,
         "units": dict(results.units),
-        "parameters": list(results.parameters),
+        "parameters": dict(results.parameters),
         "versions": dict(results.versions),
     }
     schema = pyarrow.schema(fields, metadata={METADATA: json.dumps(about)})

@@ -10,7 +10,7 @@ from pathlib import Path
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import build_model
 from conveyor_sim.runs.compilation import Compilation
-from conveyor_sim.studies.check import units_of
+from conveyor_sim.studies.check import parameter_units, units_of
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import scene_of
@@ -87,6 +87,7 @@ class Runs(AbstractContextManager["Runs"]):
         """Have the kernels in the cache, each kind once, before processes want them at the same time."""
         kinds: set[tuple[str, ...]] = set()
         units = {name: metric.unit or "1" for name, metric in self._setup.kept.items()}
+        of_parameters = {name: parameter.unit or "" for name, parameter in self._setup.study.parameters.items()}
         parameters = {tuple(job.parameters.items()): job for job in jobs}
         for job in _different(list(parameters.values())):
             try:
@@ -99,8 +100,9 @@ class Runs(AbstractContextManager["Runs"]):
                 continue
             if not kinds:
                 units = units_of(self._setup, scene)
+                of_parameters = parameter_units(self._setup, scene)
             kinds.add(kind)
-        self.journal.keep_units(units)
+        self.journal.keep_units(units, of_parameters)
 
     def _warm(self, jobs: Sequence[Job]) -> dict[int, str]:
         """Have a warm start for each seed; why there is none, by seed."""

@@ -54,6 +54,7 @@ class Parameter(Part):
     )
     low: Number | None = quantity("Least value of a range, for the other designs.", default=None)
     high: Number | None = quantity("Greatest value of a range.", default=None)
+    unit: Text | None = quantity("Unit of its values. Left out: that of the field.", default=None)
     log: Flag = quantity("Whether the range is divided by ratio.", default=False)
     whole: Flag = quantity("Whether values of the range are whole numbers.", default=False)
 

@@ -15,8 +15,10 @@ LONGEST = 40
 """Points that a table on a terminal shows; the file has all."""
 
 
-def points_table(rows: Iterable[Row], units: Mapping[str, str], longest: int = LONGEST) -> Table:
-    """Rows of any order; those of failed runs are counted apart."""
+def points_table(
+    rows: Iterable[Row], units: Mapping[str, str], of_parameters: Mapping[str, str], longest: int = LONGEST
+) -> Table:
+    """Rows of any order; those of failed runs are counted apart. units: of metrics."""
     by_point: dict[int, list[Row]] = {}
     for row in rows:
         by_point.setdefault(row.point, []).append(row)
@@ -24,10 +26,10 @@ def points_table(rows: Iterable[Row], units: Mapping[str, str], longest: int = L
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     names = list(first[0].parameters) if first else []
     for name in names:
-        table.add_column(name)
+        table.add_column(with_unit(name, of_parameters.get(name, "")))
     table.add_column("runs", justify="right")
     for name, unit in units.items():
-        table.add_column(f"{name} ({unit})" if unit not in ("", "1") else name, justify="right")
+        table.add_column(with_unit(name, unit), justify="right")
     for point in sorted(by_point)[:longest]:
         found = by_point[point]
         finished = [row for row in found if row.status == "finished"]
@@ -38,6 +40,11 @@ def points_table(rows: Iterable[Row], units: Mapping[str, str], longest: int = L
     if len(by_point) > longest:
         table.add_row(f"and {len(by_point) - longest} more points")
     return table
+
+
+def with_unit(name: str, unit: str) -> str:
+    """As the head of a column or the label of an axis."""
+    return name if unit in ("", "1") else f"{name} ({unit})"
 
 
 def spread(values: Sequence[float]) -> str:

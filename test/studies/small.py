@@ -99,7 +99,7 @@ class Busiest:
 STUDY: Mapping[str, Any] = {
     "name": "small",
     "function": "code.py:line",
-    "parameters": {"rate": {"argument": "rate", "values": [4.0, 6.0]}},
+    "parameters": {"rate": {"argument": "rate", "values": [4.0, 6.0], "unit": "1/s"}},
     "seeds": 2,
     "metrics": ["throughput", "stops", {"queue": "mean belts/conveyor/bottles"}],
 }

@@ -28,7 +28,7 @@ def results_of(points: list[dict[str, Any]], seeds: int, made: Callable[[Mapping
         for seed in range(seeds)
     ]
     text = json.dumps({"name": "made_up", "design": "grid"})
-    return Results(text, "study.yaml", {"y": "N"}, list(points[0]), {}, rows)
+    return Results(text, "study.yaml", {"y": "N"}, {name: "m" if name == "x" else "" for name in points[0]}, {}, rows)
 
 
 GRID = [{"x": x, "kind": kind} for x, kind in product((1.0, 2.0, 3.0), ("steel", "glass"))]
@@ -41,7 +41,7 @@ def noisy(point: Mapping[str, Any], seed: int) -> float:
 
 def test_main_effects_are_means_over_all_else_with_intervals_over_seeds() -> None:
     ((x,), (kind,)) = main_effects(results_of(GRID, 3, noisy))[0]
-    assert (x.parameter, x.metric, x.levels) == ("x", "y (N)", [1.0, 2.0, 3.0])
+    assert (x.parameter, x.metric, x.levels) == ("x (m)", "y (N)", [1.0, 2.0, 3.0])
     assert x.mean == pytest.approx([2.5, 4.5, 6.5])
     # Three seeds are three values, -1, 0 and 1 about the mean: t(2) = 4.303, and 1 / sqrt(3), however many points.
     assert x.half_width == pytest.approx([4.3027 / math.sqrt(3.0)] * 3, rel=1e-4)
@@ -82,11 +82,11 @@ def test_sobol_indices_of_a_function_whose_indices_are_known() -> None:
     with pytest.raises(StudyError, match="expected design: saltelli"):
         indices(found)
     text = json.dumps({"name": "ishigami", "design": "saltelli", "points": base})
-    (shares,) = indices(Results(text, found.path, found.units, names, {}, found.rows))
+    (shares,) = indices(Results(text, found.path, found.units, dict.fromkeys(names, ""), {}, found.rows))
     assert shares.first == pytest.approx([0.314, 0.442, 0.0], abs=0.1)
     assert shares.total == pytest.approx([0.558, 0.442, 0.244], abs=0.1)
     with pytest.raises(StudyError, match="1 of 5120 points have no y"):
-        indices(Results(text, found.path, found.units, names, {}, found.rows[1:]))
+        indices(Results(text, found.path, found.units, dict.fromkeys(names, ""), {}, found.rows[1:]))
 
 
 def test_all_of_it_is_drawn(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from studies.small import setup_of
 
+from conveyor_sim.studies.check import parameter_units
 from conveyor_sim.studies.line_of import controller_of, scene_of
 
 PARAMETERS = {
@@ -38,6 +39,8 @@ def test_values_go_where_they_belong(tmp_path: Path) -> None:
     assert scene.machines["first"].rate == 5.0
     assert scene.effects == {"peaks": "on", "scuffing": "on"}
     assert scene.outputs.bottles == 50.0
+    units = {"v": "m/s", "mu": "", "c": "", "x": "m", "rate": "", "speed": ""}
+    assert parameter_units(setup, scene) == units
     controller = controller_of(setup, point)
     assert (controller.speed, controller.until) == (0.4, 3.0)  # type: ignore[union-attr]
 
