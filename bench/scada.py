@@ -38,6 +38,7 @@ TAGS, CHANGING, EVERY, TICK = 500, 50, 10, 0.01
 """EVERY: ticks, from one change to the next."""
 CLIENTS = 5
 """Of each protocol."""
+KINDS = [kind for kind in FACES if kind.by_default]
 SCENE = "config/scenarios/zoned_line.yaml"
 LOST, SEEN, LATENCY = "changes lost", "changes seen", "ms at most from a request or a change on"
 CPU, MEMORY, GROWTH = "cores of the servers", "MB", "MB more after than before"
@@ -102,7 +103,7 @@ def _tag(belt: str) -> Tag:
 
 def measure(effort: Effort) -> list[Row]:
     """What clients miss and what that costs; then what it costs the ticks."""
-    if missing := [kind.library for kind in FACES if not kind.installed]:
+    if missing := [kind.library for kind in KINDS if not kind.installed]:
         say(f"scada is left out: {', '.join(missing)} not installed")
         return []
     return [*_faces(QUICK_SECONDS if effort.quick else SECONDS), *_ticks(effort)]
@@ -112,7 +113,7 @@ def _faces(seconds: float) -> list[Row]:
     say(f"scada: {CLIENTS} clients of each protocol for {seconds:g} s")
     source = Changing()
     try:
-        with Serving(source, [(kind, 0) for kind in FACES], Settings()) as serving:  # type: ignore[arg-type]
+        with Serving(source, [(kind, 0) for kind in KINDS], Settings()) as serving:  # type: ignore[arg-type]
             with _clients(serving, seconds + SETTLE) as clients:
                 time.sleep(SETTLE)
                 serving.latencies()  # from now on
@@ -148,7 +149,7 @@ def _ticks(effort: Effort) -> list[Row]:
 
 def _cores_served(source: SceneSource, seconds: float) -> float:
     with (
-        Serving(source, [(kind, 0) for kind in FACES], Settings()) as serving,
+        Serving(source, [(kind, 0) for kind in KINDS], Settings()) as serving,
         _clients(serving, seconds + SETTLE) as clients,
     ):
         time.sleep(SETTLE)
@@ -200,7 +201,7 @@ def tables(rows: Rows) -> str:
     """By protocol, and the ticks."""
     head = ["protocol", "clients", "changes seen by each", "lost", "ms at most"]
     lines: list[list[str | None]] = []
-    for kind in FACES:
+    for kind in KINDS:
         seen, lost = (rows.values(CASE, CLIENTS, kind.name, what) for what in (SEEN, LOST))
         latency = rows.spread(CASE, CLIENTS, kind.name, LATENCY)
         if seen:
