@@ -59,6 +59,7 @@ setup(
         "scada": requirements("scada"),
         "foxglove": requirements("foxglove"),
         "studies": requirements("studies"),
+        "optimise": [*requirements("studies"), *requirements("optimise")],
         "dask": requirements("dask"),
         "st": requirements("st"),
         "bench": requirements("bench"),

@@ -48,7 +48,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "foxglove numpy pymodbus",
     "st": "control scada support | lark",
     "studies": "bag control engine errors line model observe plot runs scene simulation statistics st support "
-    "version | SALib annotated_types distributed numpy pyarrow pydantic rich scipy",
+    "version | SALib annotated_types distributed numpy optuna pyarrow pydantic rich scipy",
     "ros": "bag control errors explain line live model observe runs scada scene simulation st support version | "
     "builtin_interfaces click conveyor_msgs diagnostic_msgs numpy rcl_interfaces rclpy rosgraph_msgs std_msgs std_srvs",
     "testing": "bag control engine errors line plot ros scada scene simulation state support view | numpy pytest",

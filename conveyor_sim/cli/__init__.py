@@ -15,6 +15,7 @@ with while_importing():
 
     from conveyor_sim.cli.accuracy import accuracy
     from conveyor_sim.cli.attach import attach
+    from conveyor_sim.cli.optimise import optimise
     from conveyor_sim.cli.recordings import events, plot, recover, replay, report
     from conveyor_sim.cli.run import run
     from conveyor_sim.cli.scenes import check, explain, tags
@@ -59,6 +60,6 @@ def main(context: click.Context) -> None:
 
 for command in (
     check, tags, explain, run, serve, attach, user, accuracy, recover, replay, events, report, plot, view,
-    sweep, study_,
+    sweep, optimise, study_,
 ):  # fmt: skip
     main.add_command(command)

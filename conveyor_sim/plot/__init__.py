@@ -10,9 +10,10 @@ if TYPE_CHECKING:
     from conveyor_sim.accuracy.results import Study
     from conveyor_sim.observe.production import Production
     from conveyor_sim.plot.responses import Indices, Map, Response
+    from conveyor_sim.plot.trials_data import TrialsData
     from conveyor_sim.scene import Scene
 
-__all__ = ["plot_accuracy", "plot_bag", "plot_production", "plot_scene", "plot_study"]
+__all__ = ["plot_accuracy", "plot_bag", "plot_production", "plot_scene", "plot_study", "plot_trials"]
 
 # Each imports what it draws with: a process that draws a recording needs no kernels, which studies do.
 
@@ -123,3 +124,16 @@ def plot_study(
         if indices:
             figures["indices"] = indices_figure(indices, f"{name}: Sobol indices")
         return [path for stem, figure in figures.items() for path in style.save(figure, Path(out_dir) / stem)]
+
+
+def plot_trials(trials: TrialsData, out_dir: str | Path) -> list[Path]:
+    """Draw what an optimisation tried, as `trials`; returns the files written.
+
+    With two goals that is one against the other, with the front; with one how the best came about.
+    Raises ConveyorError if the files can't be written.
+    """
+    from conveyor_sim.plot import style
+    from conveyor_sim.plot.trials import trials_figure
+
+    with style.look():
+        return style.save(trials_figure(trials), Path(out_dir) / "trials")

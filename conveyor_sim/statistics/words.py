@@ -7,6 +7,9 @@ import math
 from conveyor_sim.statistics.intervals import CONFIDENCE, Interval
 from conveyor_sim.statistics.sample_size import runs_to_tell
 
+ROUNDING = 1e-12
+"""Of a mean: a half-width below it comes of how numbers are rounded, not of how runs scatter."""
+
 
 def plus_minus(interval: Interval, unit: str = "", sign: bool = False) -> str:
     """`73.2 ± 2.1 %`: the half-width to two digits, the mean as far. sign: show that of what is positive, too."""
@@ -16,7 +19,7 @@ def plus_minus(interval: Interval, unit: str = "", sign: bool = False) -> str:
         return "not known"
     if not math.isfinite(interval.half_width):
         return f"{interval.mean:{flag}.4g}{after} (a single run)"
-    if interval.half_width == 0.0:
+    if interval.half_width <= ROUNDING * abs(interval.mean):
         return f"{interval.mean:{flag}.4g} ± 0{after}"
     places = max(0, 1 - math.floor(math.log10(interval.half_width)))
     mean = round(interval.mean, places) + 0.0  # no minus before a zero

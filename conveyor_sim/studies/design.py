@@ -19,7 +19,11 @@ Point = dict[str, Any]
 
 
 def points_of(study: Study) -> list[Point]:
-    """The points in their order, equal for equal studies. Raises StudyError where a package is missing."""
+    """The points in their order, equal for equal studies. Raises StudyError where a package is missing, and for an
+    optimisation, whose points follow from what came of others.
+    """
+    if study.optimise is not None:
+        raise StudyError(f"{study.name}: optimise given, expected conveyor-sim optimise for this study")
     names, parameters = list(study.parameters), list(study.parameters.values())
     if study.design in ("grid", "list"):
         values = [parameter.values or () for parameter in parameters]

@@ -25,6 +25,7 @@ from conveyor_sim.scene.types import (
     quantity,
 )
 from conveyor_sim.scene.words import listed, shown
+from conveyor_sim.studies.optimisation.part import Optimise
 
 LEAST_BATCH = 10
 """Runs of a point, at least, before it is asked whether there are enough: of fewer the spread is hardly known."""
@@ -179,6 +180,12 @@ class Study(Part):
     metrics: Annotated[dict[Name, Text], Len(1), BeforeValidator(_named), Says(_METRICS)] = quantity(
         "What is kept of a run."
     )
+    optimise: Annotated[Optimise, Holds("a mapping with the fields " + ", ".join(Optimise.model_fields))] | None = (
+        quantity(
+            "What `conveyor-sim optimise` is after: points are chosen by what came of others, not by a design.",
+            default=None,
+        )
+    )
     bags: Annotated[Literal["failed", "all", "none"], Says('"failed", "all" or "none"')] = quantity(
         "Of which runs a recording is kept.", default="failed"
     )
@@ -200,15 +207,23 @@ class Study(Part):
                 yield Problem(
                     (*path,), "varies the line, expected a parameter of the controller, as runs share a warm_start"
                 )
-            if self.design == "grid" and parameter.values is None:
-                yield Problem((*path, "values"), "missing, expected a list of values, as the design is a grid")
-            if self.design == "list" and parameter.values is None:
-                yield Problem((*path, "values"), "missing, expected a list of values, as the design is a list")
-            if self.design not in ("grid", "list") and parameter.values is not None:
-                yield Problem((*path, "values"), f"given, expected low and high, as the design is {self.design}")
         for name in self.metrics:
             if name in RESERVED:
                 yield Problem(("metrics", name), "given as a name, expected another: runs have a column of that name")
+        yield from self._design_problems() if self.optimise is None else self._optimise_problems(self.optimise)
+        yield from self.seeds.problems(("seeds",))
+        if self.seeds.until is not None and self.seeds.until.metric not in self.metrics:
+            text = f"{shown(self.seeds.until.metric)} given, expected one of {', '.join(self.metrics)}"
+            yield Problem(("seeds", "until", "metric"), text)
+
+    def _design_problems(self) -> Iterator[Problem]:
+        """What is wrong with the points of a design."""
+        for name, parameter in self.parameters.items():
+            path = ("parameters", name, "values")
+            if self.design in ("grid", "list") and parameter.values is None:
+                yield Problem(path, f"missing, expected a list of values, as the design is a {self.design}")
+            if self.design not in ("grid", "list") and parameter.values is not None:
+                yield Problem(path, f"given, expected low and high, as the design is {self.design}")
         lengths = {len(parameter.values or ()) for parameter in self.parameters.values()}
         if self.design == "list" and len(lengths) > 1:
             numbers = ", ".join(map(str, sorted(lengths)))
@@ -218,7 +233,12 @@ class Study(Part):
                 yield Problem(("design",), f"{self.design} given, expected points beside it, how many")
             else:
                 yield Problem(("points",), f"{self.points} given, expected none: a {self.design} has them by values")
-        yield from self.seeds.problems(("seeds",))
-        if self.seeds.until is not None and self.seeds.until.metric not in self.metrics:
-            text = f"{shown(self.seeds.until.metric)} given, expected one of {', '.join(self.metrics)}"
-            yield Problem(("seeds", "until", "metric"), text)
+
+    def _optimise_problems(self, wanted: Optimise) -> Iterator[Problem]:
+        """What is wrong with an optimisation."""
+        for name in ("design", "points"):
+            if name in self.model_fields_set:
+                yield Problem((name,), "given, expected none beside optimise, which chooses points")
+        if self.seeds.count is None:
+            yield Problem(("seeds",), "expected a count, as optimise compares points by as many seeds each")
+        yield from wanted.problems(self.parameters, list(self.metrics))

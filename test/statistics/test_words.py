@@ -16,6 +16,7 @@ from conveyor_sim.statistics.words import plus_minus, told
         (Interval(1234.5, 210.0, 10), "1234 ± 210 %"),
         (Interval(-0.001, 0.5, 10), "0.00 ± 0.50 %"),
         (Interval(5.0, 0.0, 3), "5 ± 0 %"),
+        (Interval(5.0, 1e-15, 3), "5 ± 0 %"),
         (Interval(5.0, math.inf, 1), "5 % (a single run)"),
         (Interval(math.nan, math.nan, 0), "not known"),
     ],
