@@ -22,7 +22,7 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.inputs import DISOWN, OWN, WriterKind
 from conveyor_sim.scada.face import FaceError
-from conveyor_sim.scada.modbus_map import Row, modbus_map
+from conveyor_sim.scada.modbus_map import HANDSHAKE, Row, modbus_map
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING, Control, TickSource
 from conveyor_sim.scada.view import View
@@ -192,6 +192,15 @@ def test_without_a_role_nobody_writes(line: Line) -> None:
     line.advance()
     assert line.simulation.take_outcomes() == []
     assert line.read(SETPOINT) == pytest.approx(line.simulation.process_image.commands[0].initial)
+
+
+def test_no_operator_says_how_far_a_line_in_lockstep_goes(line: Line) -> None:
+    assert line.client.write_registers(HANDSHAKE, [0, 1]).exception_code == ILLEGAL_FUNCTION
+
+
+@controller
+def test_a_line_that_is_not_in_lockstep_takes_no_target(line: Line) -> None:
+    assert line.client.write_registers(HANDSHAKE, [0, 1]).exception_code == BUSY
 
 
 @controller
