@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import control, dense, growth, lockstep, node, plant, start, studies, view, whole
+from bench import control, dense, growth, lockstep, node, plant, start, structured_text, studies, view, whole
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
@@ -78,6 +78,15 @@ def _two_processes(rows: Rows) -> float | None:
 
 def _beside(rows: Rows) -> float | None:
     return _middle(rows.spread(studies.BESIDE, 0.0, studies.ONE, studies.OVERHEAD))
+
+
+def _scan(rows: Rows) -> float | None:
+    return _middle(rows.spread(structured_text.CASE, structured_text.STATEMENTS, "program", structured_text.SCAN))
+
+
+def _compiling(rows: Rows) -> float | None:
+    spread = rows.spread(structured_text.COMPILED, structured_text.LARGE, "program", structured_text.COMPILE)
+    return _middle(spread)
 
 
 def _middle(spread: Spread | None) -> float | None:
@@ -156,6 +165,8 @@ TARGETS = (
         Target(f"ms of CPU a frame of the page, N = {n}", "view", MOST, v, _view(view.FRAME, n, "page", view.CPU))
         for n, v in ((1_000, 1e3 / 60.0), (10_000, 1e3 / 20.0))
     ),
+    Target("us a scan of a program of 200 statements", "st", MOST, 100.0, _scan),
+    Target("s to compile a program of 10 000 statements", "st", MOST, 2.0, _compiling),
     Target("s to open an hour on the page", "view", MOST, 2.0, _view(view.LONG, view.HOUR, "server", view.OPEN)),
     Target("ms to go to a time of it", "view", MOST, 100.0, _view(view.LONG, view.HOUR, "server", view.SEEK)),
     Target("runs of a study by two processes, times one", "studies", LEAST, 1.8, _two_processes),

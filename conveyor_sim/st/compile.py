@@ -16,11 +16,12 @@ from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
 from conveyor_sim.st.types import TIME, BlockType, Member
 from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.printable import SENTENCE, printable
 
 LOWEST = 2**31
 """The priority of a program without a task: it comes after all others."""
 
-MOST_BYTES = 4 * MB
+MOST_BYTES = 2 * MB
 """Of a file."""
 
 
@@ -73,7 +74,8 @@ def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Co
     try:
         return _compile(text, file, trace)
     except SourceError as error:
-        raise StructuredTextError(f"{file}:{error.at.line}:{error.at.column}: {error}") from None
+        place = f"{file}:{error.at.line}:{error.at.column}"
+        raise StructuredTextError(f"{place}: {printable(error, SENTENCE)}") from None
     except (RecursionError, MemoryError, SyntaxError):  # Python's compiler has limits of its own
         raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
 

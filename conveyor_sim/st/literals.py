@@ -23,6 +23,7 @@ def integer(at: Position, text: str) -> int:
 
 def based(at: Position, text: str) -> int:
     """16#FF, 8#17 or 2#1010_0001."""
+    _require_short(at, text)
     base, _, digits = text.partition("#")
     try:
         return int(digits.replace("_", ""), int(base))

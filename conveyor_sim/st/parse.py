@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import threading
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.resources import files
 from typing import Any, TypeVar
 
-from lark import Lark, Token, v_args
-from lark.exceptions import UnexpectedCharacters, UnexpectedToken, VisitError
-from lark.tree import Meta
-from lark.visitors import Transformer_NonRecursive
+from lark import Lark, Token
+from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+from lark.lark import PostLex
+from lark.visitors import Transformer
 
 from conveyor_sim.st import literals, tree
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.mistakes import at_of, not_refused, unexpected
 
+_LEVELS = (
+    ("OR", "OR_ELSE"),
+    ("XOR",),
+    ("AND", "AND_THEN"),
+    ("=", "<>"),
+    ("<", ">", "<=", ">="),
+    ("+", "-"),
+    ("*", "/", "MOD"),
+    ("**",),
+)
+"""Operators between two operands, from the lowest precedence; of equal precedence they go from left to right."""
+_PRECEDENCE = {word: level for level, words in enumerate(_LEVELS) for word in words}
 _CHAINS = ({"+", "-"}, {"OR"}, {"AND"}, {"XOR"})
 
 _N = TypeVar("_N", bound=tree.Node)
@@ -23,11 +36,23 @@ _N = TypeVar("_N", bound=tree.Node)
 DEEPEST = 60
 """How deep expressions and statements nest: more than anybody writes, and less than Python's compiler takes."""
 
+MOST_TOKENS = 300_000
+"""Words, numbers and signs of a file: some 30 000 statements, which take about 6 s to compile and 500 MB."""
+MOST_OPERANDS = 1000
+"""Of an expression without parentheses."""
+
+_ONE_AT_A_TIME = threading.Lock()
+
 
 def parse(text: str) -> tree.Source:
     """The syntax tree of a file. Raises SourceError."""
     try:
-        source = _Tree().transform(_parser().parse(text))
+        with _ONE_AT_A_TIME:
+            parser, made = _parser()
+            try:
+                source = parser.parse(text)
+            finally:
+                made.depths.clear()
     except UnexpectedToken as error:
         raise unexpected(error, text) from None
     except UnexpectedCharacters as error:
@@ -36,46 +61,57 @@ def parse(text: str) -> tree.Source:
         raise SourceError(
             Position(error.line, error.column), f"found {char!r}, expected Structured Text{hint}"
         ) from None
-    except VisitError as error:
-        if isinstance(error.orig_exc, SourceError):
-            raise error.orig_exc from None
-        raise
     assert isinstance(source, tree.Source)
     return source
 
 
 @cache
-def _parser() -> Lark:
-    grammar = files(__package__).joinpath("grammar.lark").read_text(encoding="utf-8")
-    return Lark(
+def _parser() -> tuple[Lark, _Tree]:
+    """The parser, and what makes the tree as it goes."""
+    grammar, made = files(__package__).joinpath("grammar.lark").read_text(encoding="utf-8"), _Tree()
+    parser = Lark(
         grammar,
         parser="lalr",
         lexer="basic",  # type: ignore[arg-type]  # lark takes the word, its types do not
-        propagate_positions=True,
         maybe_placeholders=True,
         lexer_callbacks={"NAME": not_refused},
+        transformer=made,
+        postlex=_Bounded(),
     )
+    return parser, made
 
 
-def _of(meta: Meta) -> Position:
-    return Position(1, 1) if meta.empty else Position(meta.line, meta.column)
+class _Bounded(PostLex):
+    """Counts tokens as they come."""
+
+    always_accept = ()
+
+    def process(self, stream: Iterator[Token]) -> Iterator[Token]:
+        """The tokens. Raises SourceError for more than MOST_TOKENS."""
+        for number, token in enumerate(stream):
+            if number == MOST_TOKENS:
+                raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
+            yield token
+
+
+def _of(first: Token | tree.Node) -> Position:
+    """Where what begins with this stands."""
+    return first.at if isinstance(first, tree.Node) else at_of(first)
 
 
 def _tuple(items: Iterable[Any]) -> tuple[Any, ...]:
     return tuple(item for item in items if item is not None)
 
 
-@v_args(meta=True)
-class _Tree(Transformer_NonRecursive):
+class _Tree(Transformer[Any]):
     """One method a rule of the grammar. Depths are watched where they grow: nothing later recurses without end."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._depths: dict[int, tuple[object, int]] = {}
+        self.depths: dict[int, tuple[object, int]] = {}
+        """Of nodes, by the id of each, which is kept."""
 
-    def start(self, meta: Meta, items: list[Any]) -> tree.Source:
-        """Depths are kept by object: none are needed any more."""
-        self._depths.clear()
+    def start(self, items: list[Any]) -> tree.Source:
         source = tree.Source()
         for item in items:
             if isinstance(item, tree.Unit):
@@ -89,64 +125,64 @@ class _Tree(Transformer_NonRecursive):
         return source
 
     def _deep(self, node: _N, *parts: object) -> _N:
-        depth = 1 + max((self._depths[id(part)][1] for part in parts if id(part) in self._depths), default=0)
+        depth = 1 + max((self.depths[id(part)][1] for part in parts if id(part) in self.depths), default=0)
         if depth > DEEPEST:
             raise SourceError(node.at, f"found {depth} levels one within the other, expected at most {DEEPEST}")
-        self._depths[id(node)] = node, depth
+        self.depths[id(node)] = node, depth
         return node
 
     # Types
-    def types(self, meta: Meta, items: list[Any]) -> list[tree.TypeDeclaration]:
+    def types(self, items: list[Any]) -> list[tree.TypeDeclaration]:
         return items
 
-    def type_declaration(self, meta: Meta, items: list[Any]) -> tree.TypeDeclaration:
+    def type_declaration(self, items: list[Any]) -> tree.TypeDeclaration:
         name, spec, *initial = items
         return tree.TypeDeclaration(at_of(name), str(name), spec, initial[0] if initial else None)
 
-    def named(self, meta: Meta, items: list[Any]) -> tree.TypeSpec:
-        return tree.NamedType(_of(meta), str(items[0]))
+    def named(self, items: list[Any]) -> tree.TypeSpec:
+        return tree.NamedType(_of(items[0]), str(items[0]))
 
-    def sized(self, meta: Meta, items: list[Any]) -> tree.TypeSpec:
-        return tree.NamedType(_of(meta), str(items[0]), items[1])
+    def sized(self, items: list[Any]) -> tree.TypeSpec:
+        return tree.NamedType(_of(items[0]), str(items[0]), items[1])
 
-    def subrange(self, meta: Meta, items: list[Any]) -> tree.TypeSpec:
-        return tree.SubrangeType(_of(meta), str(items[0]), items[1], items[2])
+    def subrange(self, items: list[Any]) -> tree.TypeSpec:
+        return tree.SubrangeType(_of(items[0]), str(items[0]), items[1], items[2])
 
-    def range(self, meta: Meta, items: list[Any]) -> tuple[Any, Any]:
+    def range(self, items: list[Any]) -> tuple[Any, Any]:
         return items[0], items[1]
 
-    def array(self, meta: Meta, items: list[Any]) -> tree.TypeSpec:
-        return self._deep(tree.ArrayType(_of(meta), tuple(items[:-1]), items[-1]), items[-1])
+    def array(self, items: list[Any]) -> tree.TypeSpec:
+        return self._deep(tree.ArrayType(at_of(items[0]), tuple(items[1:-1]), items[-1]), items[-1])
 
-    def enumerator(self, meta: Meta, items: list[Any]) -> Any:
+    def enumerator(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]
 
-    def enumeration(self, meta: Meta, items: list[Any]) -> tree.TypeSpec:
-        return tree.EnumType(_of(meta), tuple(items[:-1]), str(items[-1] or ""))
+    def enumeration(self, items: list[Any]) -> tree.TypeSpec:
+        return tree.EnumType(at_of(items[0]), tuple(items[1:-1]), str(items[-1] or ""))
 
-    def structure(self, meta: Meta, items: list[Any]) -> tree.TypeSpec:
-        fields = tuple(one for many in items for one in many)
-        return self._deep(tree.StructureType(_of(meta), fields), *(one.type for one in fields))
+    def structure(self, items: list[Any]) -> tree.TypeSpec:
+        fields = tuple(one for many in items[1:] for one in many)
+        return self._deep(tree.StructureType(at_of(items[0]), fields), *(one.type for one in fields))
 
     # Units and their variables
-    def function(self, meta: Meta, items: list[Any]) -> tree.Unit:
+    def function(self, items: list[Any]) -> tree.Unit:
         name, result, *sections, body = items
         return tree.Unit(at_of(name), "FUNCTION", str(name), result, tuple(sections), body)
 
-    def block(self, meta: Meta, items: list[Any]) -> tree.Unit:
+    def block(self, items: list[Any]) -> tree.Unit:
         name, *sections, body = items
         return tree.Unit(at_of(name), "FUNCTION_BLOCK", str(name), None, tuple(sections), body)
 
-    def program(self, meta: Meta, items: list[Any]) -> tree.Unit:
+    def program(self, items: list[Any]) -> tree.Unit:
         name, *sections, body = items
         return tree.Unit(at_of(name), "PROGRAM", str(name), None, tuple(sections), body)
 
-    def variables(self, meta: Meta, items: list[Any]) -> tree.Variables:
+    def variables(self, items: list[Any]) -> tree.Variables:
         qualifiers = tuple(item.upper() for item in items[1:] if isinstance(item, Token))
         declared = tuple(one for item in items[1:] if not isinstance(item, Token) for one in item)
         return tree.Variables(at_of(items[0]), items[0].upper(), qualifiers, declared)
 
-    def variable_declaration(self, meta: Meta, items: list[Any]) -> list[tree.VariableDeclaration]:
+    def variable_declaration(self, items: list[Any]) -> list[tree.VariableDeclaration]:
         tag, *names, address, spec, initial = items
         if (address or tag) and len(names) > 1:
             raise SourceError(at_of(names[1]), f"found {names[1]}, expected one variable with {address or tag}")
@@ -156,32 +192,33 @@ class _Tree(Transformer_NonRecursive):
             for name in names
         ]
 
-    def repeated(self, meta: Meta, items: list[Any]) -> Any:
+    def repeated(self, items: list[Any]) -> Any:
         return literals.integer(at_of(items[0]), items[0]), items[1]
 
-    def initial_array(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items)
-        return self._deep(tree.InitialArray(_of(meta), elements), *(element for _, element in elements))
+    def initial_array(self, items: list[Any]) -> tree.Expression:
+        elements = tuple(item if isinstance(item, tuple) else (1, item) for item in items[1:])
+        return self._deep(tree.InitialArray(at_of(items[0]), elements), *(element for _, element in elements))
 
-    def initial_field(self, meta: Meta, items: list[Any]) -> Any:
+    def initial_field(self, items: list[Any]) -> Any:
         return at_of(items[0]), str(items[0]), items[1]
 
-    def initial_structure(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return self._deep(tree.InitialStructure(_of(meta), tuple(items)), *(item[2] for item in items))
+    def initial_structure(self, items: list[Any]) -> tree.Expression:
+        fields = tuple(items[1:])
+        return self._deep(tree.InitialStructure(at_of(items[0]), fields), *(field[2] for field in fields))
 
-    def task(self, meta: Meta, items: list[Any]) -> tree.Task:
+    def task(self, items: list[Any]) -> tree.Task:
         return tree.Task(at_of(items[0]), str(items[0]), tuple(items[1:]))
 
-    def instance(self, meta: Meta, items: list[Any]) -> tree.Instance:
+    def instance(self, items: list[Any]) -> tree.Instance:
         return tree.Instance(at_of(items[0]), str(items[0]), str(items[1] or ""), str(items[2]))
 
-    def resource(self, meta: Meta, items: list[Any]) -> tree.Configuration:
-        return self._configured(items[0], items[2:])
+    def resource(self, items: list[Any]) -> tree.Configuration:
+        return self._gathered(items[0], items[2:])
 
-    def configuration(self, meta: Meta, items: list[Any]) -> tree.Configuration:
-        return self._configured(items[0], items[1:])
+    def configuration(self, items: list[Any]) -> tree.Configuration:
+        return self._gathered(items[0], items[1:])
 
-    def _configured(self, name: Token, items: list[Any]) -> tree.Configuration:
+    def _gathered(self, name: Token, items: list[Any]) -> tree.Configuration:
         inner = [item for item in items if isinstance(item, tree.Configuration)]
         return tree.Configuration(
             at_of(name),
@@ -192,42 +229,44 @@ class _Tree(Transformer_NonRecursive):
         )
 
     # Statements
-    def statements(self, meta: Meta, items: list[Any]) -> tree.Block:
+    def statements(self, items: list[Any]) -> tree.Block:
         return _tuple(items)
 
     def _guarding(self, node: _N, *bodies: tree.Block) -> _N:
         return self._deep(node, *(statement for body in bodies for statement in body))
 
-    def assignment(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        return tree.Assignment(_of(meta), items[0], items[1])
+    def assignment(self, items: list[Any]) -> tree.Statement:
+        return tree.Assignment(items[0].at, items[0], items[1])
 
-    def call_statement(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        return tree.CallStatement(_of(meta), tree.Call(_of(meta), items[0], items[1] or ()))
+    def call_statement(self, items: list[Any]) -> tree.Statement:
+        at = items[0].at
+        return tree.CallStatement(at, tree.Call(at, items[0], items[1] or ()))
 
-    def elsif(self, meta: Meta, items: list[Any]) -> Any:
+    def elsif(self, items: list[Any]) -> Any:
         return [(items[0], items[1])]
 
-    def if_(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        condition, then, *others, otherwise = items
+    def if_(self, items: list[Any]) -> tree.Statement:
+        word, condition, then, *others, otherwise = items
         branches = ((condition, then), *(one[0] for one in others))
         otherwise = otherwise or ()
-        return self._guarding(tree.If(_of(meta), branches, otherwise), *(b for _, b in branches), otherwise)
+        return self._guarding(tree.If(at_of(word), branches, otherwise), *(b for _, b in branches), otherwise)
 
-    def label(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        found: tree.Expression = _literal(_of(meta), items[0]) if isinstance(items[0], Token) else items[0]
+    def label(self, items: list[Any]) -> tree.Expression:
+        found: tree.Expression = _literal(items[0]) if isinstance(items[0], Token) else items[0]
         return found
 
-    def negative_label(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return tree.Literal(_of(meta), f"-{items[1]}", "int", -literals.integer(_of(meta), items[1]))
+    def negative_label(self, items: list[Any]) -> tree.Expression:
+        at = at_of(items[0])
+        return tree.Literal(at, f"-{items[1]}", "int", -literals.integer(at, items[1]))
 
-    def label_range(self, meta: Meta, items: list[Any]) -> Any:
+    def label_range(self, items: list[Any]) -> Any:
         return items[0], items[1]
 
-    def labels(self, meta: Meta, items: list[Any]) -> Any:
+    def labels(self, items: list[Any]) -> Any:
         return tuple(item if isinstance(item, tuple) else (item, None) for item in items)
 
-    def case(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        selector, *inner, otherwise = items
+    def case(self, items: list[Any]) -> tree.Statement:
+        word, selector, *inner, otherwise = items
         choices: list[tuple[Any, list[tree.Statement]]] = []
         for item in inner:
             if isinstance(item, tuple):
@@ -237,76 +276,94 @@ class _Tree(Transformer_NonRecursive):
             elif item is not None:
                 choices[-1][1].append(item)
         done = tuple((labels, tuple(body)) for labels, body in choices)
-        node = tree.Case(_of(meta), selector, done, otherwise or ())
+        node = tree.Case(at_of(word), selector, done, otherwise or ())
         return self._guarding(node, *(body for _, body in done), node.otherwise)
 
-    def for_(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        control, first, last, step, body = items
-        return self._guarding(tree.For(_of(meta), control, first, last, step, body), body)
+    def for_(self, items: list[Any]) -> tree.Statement:
+        word, control, first, last, step, body = items
+        return self._guarding(tree.For(at_of(word), control, first, last, step, body), body)
 
-    def while_(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        return self._guarding(tree.While(_of(meta), items[0], items[1]), items[1])
+    def while_(self, items: list[Any]) -> tree.Statement:
+        return self._guarding(tree.While(at_of(items[0]), items[1], items[2]), items[2])
 
-    def repeat(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        return self._guarding(tree.Repeat(_of(meta), items[0], items[1]), items[0])
+    def repeat(self, items: list[Any]) -> tree.Statement:
+        return self._guarding(tree.Repeat(at_of(items[0]), items[1], items[2]), items[1])
 
-    def jump(self, meta: Meta, items: list[Any]) -> tree.Statement:
-        return tree.Jump(_of(meta), items[0].upper())
+    def jump(self, items: list[Any]) -> tree.Statement:
+        return tree.Jump(_of(items[0]), items[0].upper())
 
     # Expressions
-    def arguments(self, meta: Meta, items: list[Any]) -> tuple[tree.Argument, ...]:
+    def arguments(self, items: list[Any]) -> tuple[tree.Argument, ...]:
         return tuple(i if isinstance(i, tree.Argument) else tree.Argument(i.at, None, i) for i in items)
 
-    def input_argument(self, meta: Meta, items: list[Any]) -> tree.Argument:
-        return self._deep(tree.Argument(_of(meta), str(items[0]), items[1]), items[1])
+    def input_argument(self, items: list[Any]) -> tree.Argument:
+        return self._deep(tree.Argument(at_of(items[0]), str(items[0]), items[1]), items[1])
 
-    def output_argument(self, meta: Meta, items: list[Any]) -> tree.Argument:
+    def output_argument(self, items: list[Any]) -> tree.Argument:
         negated, name, value = items
-        return tree.Argument(_of(meta), str(name), value, output=True, negated=negated is not None)
+        return tree.Argument(at_of(negated or name), str(name), value, output=True, negated=negated is not None)
 
-    def expression(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        found: tree.Expression = items[0]
-        return found
+    def expression(self, items: list[Any]) -> tree.Expression:
+        """Operands with operators between them: the one that binds less waits for what binds more."""
+        if len(items) > 2 * MOST_OPERANDS:
+            at, count = at_of(items[2 * MOST_OPERANDS - 1]), len(items) // 2 + 1
+            raise SourceError(at, f"found {count} operands in one expression, expected at most {MOST_OPERANDS}")
+        operands: list[tree.Expression] = [items[0]]
+        waiting: list[tuple[int, str, Token]] = []
 
-    def binary(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        left, operator, right = items
-        word = {"&": "AND"}.get(operator, operator.upper())
+        def join() -> None:
+            right, left = operands.pop(), operands.pop()
+            _, word, operator = waiting.pop()
+            operands.append(self._binary(left, word, operator, right))
+
+        for operator, operand in zip(items[1::2], items[2::2], strict=True):
+            word = "AND" if operator == "&" else operator.upper()
+            level = _PRECEDENCE[word]
+            while waiting and waiting[-1][0] >= level:
+                join()
+            waiting.append((level, word, operator))
+            operands.append(operand)
+        while waiting:
+            join()
+        return operands[0]
+
+    def _binary(self, left: tree.Expression, word: str, operator: Token, right: tree.Expression) -> tree.Expression:
         node = tree.Binary(at_of(operator), word, left, right)
         if isinstance(left, tree.Binary) and any(word in chain and left.operator in chain for chain in _CHAINS):
             # No deeper than what it goes on from: both are checked, and written, in one go.
-            depth = max(self._depths[id(part)][1] for part in (left, right) if id(part) in self._depths)
-            self._depths[id(node)] = node, depth
+            depth = max(self.depths[id(part)][1] for part in (left, right) if id(part) in self.depths)
+            self.depths[id(node)] = node, depth
             return node
         return self._deep(node, left, right)
 
-    def unary(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return self._deep(tree.Unary(_of(meta), items[0].upper(), items[1]), items[1])
+    def unary(self, items: list[Any]) -> tree.Expression:
+        return self._deep(tree.Unary(_of(items[0]), items[0].upper(), items[1]), items[1])
 
-    def call(self, meta: Meta, items: list[Any]) -> tree.Expression:
+    def call(self, items: list[Any]) -> tree.Expression:
         arguments = items[1] or ()
-        return self._deep(tree.Call(_of(meta), items[0], arguments), *(one.value for one in arguments))
+        return self._deep(tree.Call(items[0].at, items[0], arguments), *(one.value for one in arguments))
 
-    def name(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return tree.Name(_of(meta), str(items[0]))
+    def name(self, items: list[Any]) -> tree.Expression:
+        return tree.Name(_of(items[0]), str(items[0]))
 
-    def member(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return self._deep(tree.Member(_of(meta), items[0], str(items[1])), items[0])
+    def member(self, items: list[Any]) -> tree.Expression:
+        return self._deep(tree.Member(_of(items[0]), items[0], str(items[1])), items[0])
 
-    def item(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return self._deep(tree.Item(_of(meta), items[0], tuple(items[1:])), *items)
+    def item(self, items: list[Any]) -> tree.Expression:
+        return self._deep(tree.Item(_of(items[0]), items[0], tuple(items[1:])), *items)
 
-    def bit(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return tree.Bit(_of(meta), items[0], int(items[1].upper().removeprefix("%X").replace("_", "")))
+    def bit(self, items: list[Any]) -> tree.Expression:
+        return tree.Bit(_of(items[0]), items[0], int(items[1].upper().removeprefix("%X").replace("_", "")))
 
-    def enum_value(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return tree.EnumValue(_of(meta), items[0].rstrip("#"), str(items[1]))
+    def enum_value(self, items: list[Any]) -> tree.Expression:
+        return tree.EnumValue(_of(items[0]), items[0].rstrip("#"), str(items[1]))
 
-    def literal(self, meta: Meta, items: list[Any]) -> tree.Expression:
-        return _literal(_of(meta), items[0])
+    def literal(self, items: list[Any]) -> tree.Expression:
+        return _literal(items[0])
 
-    def typed_literal(self, meta: Meta, items: list[Any]) -> tree.Expression:
+    def typed_literal(self, items: list[Any]) -> tree.Expression:
         prefix, *sign, token = items
-        plain = _literal(_of(meta), token)
+        plain = _literal(token, at_of(prefix))
         value = -plain.value if sign and sign[0] == "-" else plain.value  # type: ignore[operator]
         text = "".join(map(str, items))
         return tree.Literal(plain.at, text, plain.kind, value, prefix.rstrip("#").upper())
@@ -315,14 +372,13 @@ class _Tree(Transformer_NonRecursive):
 # Names that Python keeps for itself, and rules that share a method.
 for _rule in ("if", "for", "while"):
     setattr(_Tree, _rule, getattr(_Tree, f"{_rule}_"))
-for _rule in ("or", "xor", "and", "equal", "compared", "sum", "product", "power"):
-    setattr(_Tree, _rule, _Tree.binary)
 for _rule in ("exit", "continue", "return"):
     setattr(_Tree, _rule, _Tree.jump)
 
 
-def _literal(at: Position, token: Token) -> tree.Literal:
-    text = str(token)
+def _literal(token: Token, at: Position | None = None) -> tree.Literal:
+    """at: where it stands, if a type stands before it."""
+    text, at = str(token), at or at_of(token)
     if token.type == "INTEGER":
         return tree.Literal(at, text, "int", literals.integer(at, text))
     if token.type == "BASED":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -134,17 +135,19 @@ class Statements:
             )
         name = self._name("c")
         self._lines.add(f"{name} = {selector.code}", node.at)
-        taken: list[tuple[int, int]] = []
+        taken: list[tuple[int, int]] = []  # rising
         word = "if"
         for labels, body in node.choices:
             tests = []
             for first, last in labels:
                 low = self._label(first, kind)
                 high = low if last is None else self._label(last, kind)
-                if any(low <= other_high and other_low <= high for other_low, other_high in taken) or low > high:
+                place = bisect(taken, (low, high))
+                is_taken = (place and taken[place - 1][1] >= low) or (place < len(taken) and taken[place][0] <= high)
+                if is_taken or low > high:
                     shown = str(low) if low == high else f"{low}..{high}"
                     raise SourceError(first.at, f"found {shown}, expected a label that no other choice has, and rising")
-                taken.append((low, high))
+                taken.insert(place, (low, high))
                 tests.append(f"{name} == {low}" if low == high else f"{low} <= {name} <= {high}")
             self._lines.add(f"{word} {' or '.join(tests)}:", node.at)
             self.block(body)

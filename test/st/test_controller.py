@@ -251,6 +251,22 @@ def test_a_number_that_goes_on_for_ever_is_refused(tmp_path: Path, number: str) 
         controller(tmp_path, "VAR n : LINT; END_VAR", f"n := {number};")
 
 
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (";" * 300_001, r":\d+:\d+: found more than 300000 words and signs, expected fewer"),
+        ("n := n" + " + n" * 1000 + ";", r":2:4004: found 1001 operands in one expression, expected at most 1000"),
+        ("n := " + "7" * 900 + ";", r":2:6: found 7{900}, expected a number of at most 64 bits"),
+        ("n := 16#" + "7" * 90_000 + ";", r":2:6: found a number of 90003 characters, expected at most 1000"),
+        ("CASE n OF 1..9, 20: ; 12..15: ; 15: ; END_CASE", r":2:33: found 15, expected a label that no other choice"),
+    ],
+)
+def test_a_program_that_is_too_large_is_refused_in_words(tmp_path: Path, body: str, said: str) -> None:
+    with pytest.raises(StructuredTextError, match=said) as caught:
+        controller(tmp_path, "VAR n : INT; END_VAR", body)
+    assert len(str(caught.value)) < 3000
+
+
 def test_what_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
     (tmp_path / "folder.st").mkdir()
     os.mkfifo(tmp_path / "pipe.st")
