@@ -15,7 +15,7 @@ PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 
 
 class Calls:
-    """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2013, 6.6.1.6)."""
+    """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2003, 2.5)."""
 
     def __init__(self) -> None:
         self.declarations: Declarations

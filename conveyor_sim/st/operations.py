@@ -108,7 +108,7 @@ def after(values: range, low: int, high: int) -> int:
 
 
 def nearest(value: float, low: int, high: int) -> int:
-    """A real as a whole number: the nearest, of two the even one (IEC 61131-3:2013, 6.6.2.5.2)."""
+    """A real as a whole number: the nearest, of two the even one (IEC 61131-3:2013, conversion functions)."""
     if not math.isfinite(value) or not low <= (whole := round(value)) <= high:
         raise Fault(f"value out of range: found {value:g}, expected {low} to {high}")
     return whole
