@@ -67,7 +67,10 @@ def levels(force: Floats) -> Integers:
 
 
 def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[Integers, list[Integers]]:
-    """Ids of all bottles, ascending, and: ticks; of each bottle id, type, first frame, frames; x, y, forces of each."""
+    """Ids of all bottles, ascending, and: ticks; of each track id, type, first frame, frames; x, y, forces of each.
+
+    A track is a bottle from one frame to another; one that a machine has held meanwhile has two, one after the other.
+    """
     ticks = np.array([tick for tick, _ in frames], dtype=np.int64)
     if not frames:
         return ticks, [ticks] * 8
@@ -76,17 +79,19 @@ def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[I
     # By bottle, then by time: what follows each other is alike.
     order = np.lexsort((frame, column))
     column, frame = column[order], frame[order]
-    ids, first, count = np.unique(column, return_index=True, return_counts=True)
+    first = np.flatnonzero((np.diff(column, prepend=-1) != 0) | (np.diff(frame, prepend=-1) != 1))
+    count = np.diff(first, append=len(column))
     kinds = np.concatenate([bottles.type for _, bottles in frames]).astype(np.int64)[order][first]
     x, y, force = (
         np.concatenate([getattr(bottles, name) for _, bottles in frames])[order] for name in ("x", "y", "peak_force")
     )
     slot = frame // FORCE_FRAMES
-    begins = np.flatnonzero((np.diff(column, prepend=-1) != 0) | (np.diff(slot, prepend=-1) != 0))
+    begins = np.union1d(first, np.flatnonzero(np.diff(slot, prepend=-1) != 0))
     peaks = np.maximum.reduceat(force, begins) if len(begins) else force
     moves = [_bends(np.round(axis * MM).astype(np.int64), first) for axis in (x, y)]
     steps = differences(levels(peaks))
-    return ids, [differences(ticks - start), differences(ids), kinds, frame[first], count, *moves, steps]
+    ids = column[first]
+    return np.unique(ids), [differences(ticks - start), differences(ids), kinds, frame[first], count, *moves, steps]
 
 
 def _bends(values: Integers, first: Integers) -> Integers:

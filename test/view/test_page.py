@@ -2,57 +2,24 @@
 
 from __future__ import annotations
 
-from base64 import b64decode
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from view.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
 
 from conveyor_sim.bag.reader import open_bag
-
-TYPE_COLOURS = ((0, 114, 178), (213, 94, 0))
-"""Of the first two bottle types, in the colouring by type."""
 
 
 def clock(page: Any) -> float:
     return float(page.inner_text("#clock").removesuffix(" s"))
 
 
-def settled(page: Any) -> None:
-    """Wait for what is drawn next, and for what that may send for."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    page.wait_for_timeout(100)
-
-
 def press(page: Any, *keys: str) -> None:
     for key in keys:
         page.keyboard.press(key)
     settled(page)
-
-
-def to_pixels(page: Any, x: float, y: float) -> tuple[float, float]:
-    """Where a point of the line is on the canvas."""
-    at_x, at_y, scale, width, height = map(float, page.get_attribute("#plan", "data-camera").split())
-    return width / 2 + (x - at_x) * scale, height / 2 - (y - at_y) * scale
-
-
-def canvas(page: Any, found: str = "#plan") -> np.ndarray:
-    """The pixels (height, width, 3) of a canvas: the plan."""
-    data = page.evaluate(
-        """(found) => {
-            const plan = document.querySelector(found), { width, height } = plan;
-            const bytes = plan.getContext("2d").getImageData(0, 0, width, height).data;
-            const pieces = [], most = 30000;
-            for (let at = 0; at < bytes.length; at += most) {
-                pieces.push(String.fromCharCode(...bytes.subarray(at, at + most)));
-            }
-            return [width, height, btoa(pieces.join(""))];
-        }""",
-        found,
-    )
-    pixels = np.frombuffer(b64decode(data[2]), dtype=np.uint8).astype(np.int64)
-    return pixels.reshape(data[1], data[0], 4)[..., :3]
 
 
 def seek(page: Any, time: float) -> None:
@@ -62,19 +29,11 @@ def seek(page: Any, time: float) -> None:
     settled(page)
 
 
-def disc(pixels: np.ndarray, colour: tuple[int, int, int], x: float, y: float, reach: float) -> np.ndarray:
-    """Middle (x, y) of the box around pixels of a colour near a point."""
-    rows, columns = np.nonzero((np.abs(pixels - np.array(colour)) < 30).all(axis=2))
-    near = (np.abs(columns + 0.5 - x) < reach) & (np.abs(rows + 0.5 - y) < reach)
-    assert near.any(), f"nothing of {colour} near {x:.1f}, {y:.1f}"
-    rows, columns = rows[near], columns[near]
-    return np.array([(columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2])
-
-
-def test_bottles_are_drawn_where_the_topic_has_them_to_a_pixel(page: Any, bag: Path) -> None:
+@pytest.mark.parametrize("at", [7.6, 12.0], ids=["late in a block, behind a machine that holds bottles", "in between"])
+def test_bottles_are_drawn_where_the_topic_has_them_to_a_pixel(page: Any, bag: Path, at: float) -> None:
     page.uncheck("#names")
     page.uncheck("#forces")
-    seek(page, 12.0)
+    seek(page, at)
     time = float(page.get_attribute("#plan", "data-frame"))
     with open_bag(bag) as opened:
         frames = [frame for frame in opened.bottles() if abs(frame.time - time) < 1e-6]
@@ -86,13 +45,13 @@ def test_bottles_are_drawn_where_the_topic_has_them_to_a_pixel(page: Any, bag: P
     radius = np.array([0.04, 0.035])[bottles.type] * scale
     checked = 0
     for index in range(len(bottles.id)):
-        if not 2.7 < bottles.x[index] < 3.5:  # no mark is drawn over those
+        if not (2.15 < bottles.x[index] < 2.4 or 2.6 < bottles.x[index] < 3.1):  # no mark is drawn over those
             continue
         x, y = to_pixels(page, bottles.x[index], bottles.y[index])
         found = disc(pixels, TYPE_COLOURS[bottles.type[index]], x, y, radius[index] + 1)
         assert np.abs(found - [x, y]).max() <= 1.0
         checked += 1
-    assert checked >= 3
+    assert checked >= 2
 
 
 def test_frames_are_stepped_one_at_a_time_forward_and_back(page: Any) -> None:

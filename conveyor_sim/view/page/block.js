@@ -48,7 +48,7 @@ function newton(level, steps) {
 function readTracks(numbers, block, steps) {
   const ids = numbers.sums(), types = numbers.list(), firsts = numbers.list(), counts = numbers.list();
   const moves = [numbers.list(), numbers.list()], levels = numbers.sums();
-  let at = 0, slot = 0;
+  let at = 0, slot = 0, place = -1; // of a bottle among all of them: contacts say between which
   ids.forEach((id, i) => {
     const first = firsts[i], count = counts[i];
     const [x, y] = moves.map((bends) => {
@@ -68,9 +68,10 @@ function readTracks(numbers, block, steps) {
     const slots = Math.floor((first + count - 1) / steps.forceFrames) - firstSlot + 1;
     const force = Float32Array.from(levels.subarray(slot, slot + slots), (level) => newton(level, steps));
     slot += slots;
-    const track = { id, type: types[i], first, count, x, y, force, firstSlot, place: i };
+    if (!block.byId.has(id)) place++;
+    const track = { id, type: types[i], first, count, x, y, force, firstSlot, place };
     block.tracks.push(track);
-    block.byId.set(id, track);
+    if (!block.byId.has(id)) block.byId.set(id, track); // the first one of a bottle that comes back
   });
 }
 

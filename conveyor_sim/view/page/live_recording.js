@@ -5,7 +5,7 @@ import { Recording } from "./recording.js";
 const MOST = 300; // blocks that are kept
 const MOST_POINTS = 6e6; // bottles and contacts in all of them
 
-const nothing = () => ({ times: [], tracks: [], byId: new Map(), contacts: [], belts: { times: [], columns: [] }, signals: { times: [], columns: [] }, points: 0, measured: true });
+const nothing = () => ({ times: [], tracks: [], byId: new Map(), last: new Map(), contacts: [], belts: { times: [], columns: [] }, signals: { times: [], columns: [] }, points: 0, measured: true });
 const NOTHING = nothing();
 
 export class LiveRecording extends Recording {
@@ -72,11 +72,12 @@ export class LiveRecording extends Recording {
     if (!(read.times[0] <= block.times[block.times.length - 1])) {
       const frame = block.times.push(read.times[0]) - 1, slot = Math.floor(frame / forceFrames);
       for (const { id, type, x, y, force } of read.tracks) {
-        let track = block.byId.get(id);
-        if (!track) {
-          track = { id, type, first: frame, count: 0, x: [], y: [], force: [], firstSlot: slot, place: block.tracks.length };
+        let track = block.last.get(id);
+        if (!track || track.first + track.count !== frame) { // a machine may have held it meanwhile
+          track = { id, type, first: frame, count: 0, x: [], y: [], force: [], firstSlot: slot, place: track?.place ?? block.last.size };
           block.tracks.push(track);
-          block.byId.set(id, track);
+          block.last.set(id, track);
+          if (!block.byId.has(id)) block.byId.set(id, track);
         }
         track.count++;
         track.x.push(x[0]);
@@ -88,7 +89,7 @@ export class LiveRecording extends Recording {
     }
     for (const contacts of read.contacts) {
       if (contacts.time <= block.contacts[block.contacts.length - 1]?.time) continue;
-      const place = (k) => (k < 0 ? -1 : block.byId.get(read.tracks[k].id)?.place ?? -1);
+      const place = (k) => (k < 0 ? -1 : block.last.get(read.tracks[k].id)?.place ?? -1);
       block.contacts.push({ ...contacts, a: contacts.a.map(place), b: contacts.b.map(place) });
       this._count(block, contacts.force.length);
     }

@@ -174,9 +174,8 @@ export class Recording extends EventTarget {
   trace(id, from, to) {
     const points = [];
     for (let number = this.number(from); number <= this.number(to); number++) {
-      const block = this.block(number), track = block?.byId.get(id);
-      if (!track) continue;
-      for (let k = 0; k < track.count; k++) {
+      const block = this.block(number);
+      for (const track of block?.tracks.filter((other) => other.id === id) ?? []) for (let k = 0; k < track.count; k++) {
         const time = block.times[track.first + k];
         if (time < from - NEAR || time > to + NEAR) continue;
         points.push({ time, x: track.x[k], y: track.y[k], speed: speedOf(block, track, k), force: forceOf(track, track.first + k, this.head.steps) });
