@@ -54,6 +54,7 @@ class Feed:
         self._heard = 0
         self._status: dict[str, Any] = {}
         self._frame: tuple[Any, bytes] = None, b""
+        self._head: tuple[Any, dict[str, Any]] = None, {}
         self._failure = ""
         self.longest = 0.0
         """s of wall time from a tick to its frame being on its way to a page, the longest since somebody asked."""
@@ -132,7 +133,9 @@ class Feed:
     def _begin(self, viewer: Viewer) -> None:
         """All that a page has to know of the line as it is now."""
         picture, line = self._picture, self._picture.line
-        scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+        if self._head[0] is not line:
+            scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+            self._head = line, head(line, scene)
         times = {
             "first": picture.tick,
             "last": picture.tick,
@@ -140,7 +143,7 @@ class Feed:
             "blocks": 1,
             "stories": 1,
         }
-        about = {**head(line, scene), "times": times, "forced": picture.forced.tolist()}
+        about = {**self._head[1], "times": times, "forced": picture.forced.tolist()}
         story = self._new_story()
         total, events = self._source.events(max(0, self._heard - MOST_TOLD))
         story.look(self._shown, picture, events[: len(events) - (total - self._heard)])  # the others are told of later

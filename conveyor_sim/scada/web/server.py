@@ -28,14 +28,19 @@ MOST_VIEWERS = 64
 LONGEST_REQUEST = 16_384
 """Bytes that a page sends at once, at most; who sends more is cut off."""
 
-PACE = 0.005
-"""s of wall time that each request of a page takes, at least."""
+MOST_REQUESTS, RATE = 400, 200.0
+"""Of a page: at once, and a second (of wall time) for longer; who sends more is cut off. Of each frame a page says that
+it has shown it.
+"""
 
 WRONG_PASSWORD = 1.0
 """s of wall time that a page waits for the answer to a wrong one."""
 
 HEARTBEAT = 20.0
 """s of wall time after which a page is gone that has not answered."""
+
+CLOSING = 2.0
+"""s of wall time in which a page may say that it has heard of the end."""
 
 _NAMES = (HERE, "localhost", "[::1]")
 """Of this machine, for itself."""
@@ -147,7 +152,9 @@ class WebServer:
             return web.Response(status=403, text="expected a page of this server", headers=HEADERS)
         if len(self._sockets) >= MOST_VIEWERS:
             return web.Response(status=503, text=f"{MOST_VIEWERS} pages look already", headers=HEADERS)
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False)
+        socket = web.WebSocketResponse(
+            heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False, timeout=CLOSING
+        )
         self._sockets.add(socket)
         viewer = Viewer(socket)
         sending = None
@@ -172,16 +179,18 @@ class WebServer:
             self._feed.join(viewer)
         else:
             viewer.tell(text_message("locked"))
+        left, before = float(MOST_REQUESTS), time.monotonic()
         async for message in socket:
-            if message.type is not WSMsgType.TEXT:
-                break
-            request = _request(message.data)
+            now = time.monotonic()
+            left, before = min(left + RATE * (now - before), MOST_REQUESTS) - 1.0, now
+            request = _request(message.data) if message.type is WSMsgType.TEXT and left >= 0.0 else None
             if request is None:
+                reason = "too many requests" if left < 0.0 else "expected an object in JSON"
+                await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason.encode())
                 break
             match request.get("do"):
                 case "saw":
                     viewer.saw()
-                    continue
                 case "ping":
                     viewer.tell(text_message("pong", sent=request.get("sent"), now=time.time()))
                 case "sign_in":
@@ -197,7 +206,6 @@ class WebServer:
                     viewer.tell(_reply(request, "", person))
                 case _:
                     viewer.tell(_reply(request, self._commands.do(person, request), person))
-            await asyncio.sleep(PACE)
 
     async def _sign_in(self, request: Mapping[str, Any]) -> Person:
         name, password = request.get("name"), request.get("password")

@@ -43,6 +43,11 @@ class Viewer:
         return self._frame is None and self._unseen < UNSEEN
 
     @property
+    def waiting(self) -> int:
+        """Bytes that wait for it, but for a frame."""
+        return self._bytes
+
+    @property
     def free(self) -> bool:
         """Whether nothing waits for it."""
         return not (self._waiting or self._sending)

@@ -8,14 +8,17 @@ function textsOf(tag) {
   return Array.from((tag.texts ?? "").matchAll(/(-?\d+) (.*?)(?=, -?\d+ |$)/g), ([, number, text]) => [number, text]);
 }
 
-// A field for a value of a tag; give is called with a number.
-export function field(tag, label, give, texts = textsOf(tag)) {
+// A field for a value of a tag, or two buttons; give is called with a number. now: what is chosen at first.
+export function field(tag, label, give, now, texts = textsOf(tag)) {
+  if (tag.kind === "bool") {
+    const button = (text, value) => element("button", { onclick: () => give(value), "aria-label": `${label} ${tag.name} ${text}` }, `${label} ${text}`);
+    return element("span", { class: "field" }, button("on", 1), button("off", 0));
+  }
   const send = () => {
     if (input.value !== "") give(+input.value);
   };
-  const choices = tag.kind === "bool" ? [["1", "on"], ["0", "off"]] : texts;
-  const input = choices.length
-    ? element("select", { "aria-label": `${label} ${tag.name}` }, ...choices.map(([value, text]) => element("option", { value }, text)))
+  const input = texts.length
+    ? element("select", { "aria-label": `${label} ${tag.name}` }, ...texts.map(([value, text]) => element("option", { value, selected: +value === now }, text)))
     : element("input", { type: "number", step: tag.kind === "number" ? "any" : "1", "aria-label": `${label} ${tag.name}`, placeholder: limits(tag), onkeydown: (event) => event.key === "Enter" && send() });
   return element("span", { class: "field" }, input, element("button", { onclick: send, "aria-label": `${label} ${tag.name} now` }, label));
 }
@@ -26,12 +29,13 @@ function limits(tag) {
 
 // What a faceplate offers for a tag of a line that runs; null: nothing.
 export function controlsOf(tag, view) {
-  const { desk } = view;
+  const { desk, recording, story, clock } = view;
   if (!desk?.commands) return null;
-  if (tag.role === "command" || tag.role === "setpoint") return field(tag, "Set", (value) => desk.ask("set", [tag.name], [value]));
+  const command = recording.head.commands.indexOf(tag.name);
+  if (command >= 0) return field(tag, "Set", (value) => desk.ask("set", [tag.name], [value]), story.readBackAt(command, clock.time)?.value);
   if (tag.role === "fault") return field(tag, "Inject", (value) => desk.ask("inject", [tag.name], [value]));
-  if (tag.device && tag.name === `${tag.device}/mode`) return field(tag, "Set", (value) => desk.ask("mode", [tag.device], [value]), Object.entries(MODES));
-  return null;
+  if (!tag.device || tag.name !== `${tag.device}/mode`) return null;
+  return field(tag, "Set", (value) => desk.ask("mode", [tag.device], [value]), view.signal(tag.name), Object.entries(MODES));
 }
 
 const CAN = { acknowledge: [1, 3, 4], reset: [5], shelve: [1, 2, 3, 4, 5], unshelve: [6] };

@@ -3,6 +3,7 @@
 import { byId, element, seconds } from "./dom.js";
 import { wallTime } from "./live.js";
 
+const SURE = 5000; // ms in which a second click counts
 const TOLD = 500; // ms between two latencies that are shown
 const REMEMBERED = 20; // s in which a refusal by the line is one of what was asked for here
 
@@ -17,7 +18,7 @@ export class Desk {
     const can = about.users ? about.controls : [];
     const controls = [["pause", "Pause the line", []], ["resume", "Let it go on", []], ["step", "One tick", [1]], ["reset", "Begin anew", []]]
       .filter(([what]) => can.includes(what)).map(([what, label, values]) => {
-        const button = element("button", { onclick: () => this.ask("control", [what], values) }, label);
+        const button = element("button", { onclick: () => (what === "reset" ? this._sure(button, label) : this.ask("control", [what], values)) }, label);
         this.buttons.set(what, button);
         return button;
       });
@@ -27,9 +28,9 @@ export class Desk {
     this.dialog = this._dialog();
     byId("desk").replaceChildren(this.link, this.late, this.now, this.run, ...controls, element("span", { class: "gap" }), this.who, ...(about.users ? [this.sign] : []));
     byId("desk").hidden = false;
-    line.addEventListener("connection", () => this.connection());
+    line.addEventListener("connection", () => { this.at = this.before = null; this.connection(); });
     line.addEventListener("status", ({ detail }) => { this.status = detail.status; this.connection(); });
-    line.addEventListener("frame", ({ detail }) => { this.at = detail.at; });
+    line.addEventListener("frame", ({ detail }) => { [this.before, this.at] = [this.at, detail.at]; });
     this.connection();
   }
 
@@ -58,14 +59,15 @@ export class Desk {
   drawn(now) {
     const { clock } = this.view;
     this.now.setAttribute("aria-pressed", clock.live);
-    if (clock.live && this.at && this.at !== this.shown) {
+    if (clock.live && this.before && this.at !== this.shown) { // the first one may be of a line that stands
       this.shown = this.at;
       const late = wallTime() + this.view.line.offset - this.at;
       this.latency = this.latency ? 0.9 * this.latency + 0.1 * late : late;
     }
     if (now - this.told < TOLD) return;
     this.told = now;
-    const text = clock.live ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : `${seconds(this.view.recording.end - clock.time, 1)} ago`;
+    const late = this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
+    const text = clock.live ? late : `${seconds(this.view.recording.end - clock.time, 1)} ago`;
     if (this.late.textContent !== text) this.late.textContent = text;
   }
 
@@ -77,6 +79,14 @@ export class Desk {
     this.view.say(refused ? `Refused: ${refused}` : "");
     if (!refused) byId("said").textContent = `${what} ${names.join(", ")} given`;
     return !refused;
+  }
+
+  // All that there is of the run is given up: only the second click does it.
+  _sure(button, label) {
+    const sure = `${label}: sure?`, isSure = button.textContent === sure;
+    button.textContent = isSure ? label : sure;
+    if (isSure) this.ask("control", ["reset"]);
+    else setTimeout(() => { button.textContent = label; }, SURE);
   }
 
   // What the line itself has refused, a tick later.

@@ -96,6 +96,7 @@ export class View {
     line.addEventListener("frame", ({ detail }) => {
       recording.append(detail);
       this.measure(detail.block);
+      this.touch();
     });
     line.addEventListener("story", ({ detail }) => {
       if (story.events.length > MOST_EVENTS) story.forget(recording.start);
@@ -284,6 +285,7 @@ export class View {
     this.scrubber.draw();
     const { clock, camera } = this, play = byId("play");
     byId("clock").textContent = seconds(clock.time);
+    if (this.line) byId("end").textContent = seconds(this.recording.end);
     play.textContent = clock.playing ? "❚❚" : "▶";
     play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
     byId("speed").value = clock.speed;
@@ -293,7 +295,6 @@ export class View {
     document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
     if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
     this.panelsDrawn = now;
-    if (this.line) byId("end").textContent = seconds(this.recording.end);
     this.alarms.draw();
     this.tabs.draw();
     this.trends.draw();

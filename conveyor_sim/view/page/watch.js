@@ -26,7 +26,7 @@ export class Watch {
     if (this.rows.has(name)) return true;
     const value = element("span", { class: "value" }), said = element("small", {});
     const remove = element("button", { class: "quiet", "aria-label": `Remove ${name}`, title: "Remove", onclick: () => { this.rows.delete(name); row.remove(); this.draw(); } }, "✕");
-    const hands = view.desk?.commands ? element("div", { class: "choices" }, field(tag, "Force", (given) => view.desk.ask("force", [name], [given])),
+    const hands = view.desk?.commands ? element("div", { class: "choices" }, field(tag, "Force", (given) => view.desk.ask("force", [name], [given]), view.signal(name)),
       element("button", { "aria-label": `End the force on ${name}`, onclick: () => view.desk.ask("unforce", [name]) }, "Unforce")) : "";
     const row = element("li", {}, element("div", { class: "watch" }, element("span", { class: "what" }, name, said), value, remove), hands);
     this.rows.set(name, { tag, value, said });
