@@ -29,7 +29,7 @@ def seek(page: Any, time: float) -> None:
     settled(page)
 
 
-@pytest.mark.parametrize("at", [7.6, 12.0], ids=["late in a block, behind a machine that holds bottles", "in between"])
+@pytest.mark.parametrize("at", [7.2, 12.0], ids=["late in a block, behind a machine that holds bottles", "in between"])
 def test_bottles_are_drawn_where_the_topic_has_them_to_a_pixel(page: Any, bag: Path, at: float) -> None:
     page.uncheck("#names")
     page.uncheck("#forces")
