@@ -1,7 +1,7 @@
 // The alarm list: what is not normal now, the first-out marked; a click jumps to where and when it came.
 
 import { controlsOfAlarm } from "./controls.js";
-import { element, seconds } from "./dom.js";
+import { element, refill, seconds } from "./dom.js";
 import { ALARM_STATES } from "./story.js";
 
 export class Alarms {
@@ -18,12 +18,12 @@ export class Alarms {
     if (key === this.drawn) return;
     this.drawn = key;
     const rows = alarms.map((alarm) => element("li", {},
-      element("button", { class: `alarm ${alarm.stands ? alarm.alarm_class || "error" : "gone"}`, onclick: () => this.view.jump(alarm.since, alarm.tag) },
+      element("button", { class: `alarm ${alarm.stands ? alarm.alarm_class || "error" : "gone"}`, dataset: { key: alarm.number }, onclick: () => this.view.jump(alarm.since, alarm.tag) },
         element("span", { class: "icon", "aria-hidden": "true" }, alarm.stands ? (alarm.alarm_class === "message" ? "●" : "▲") : "○"),
         element("span", { class: "what" }, element("b", {}, alarm.id), ` ${alarm.text}`,
           element("small", {}, `${ALARM_STATES[alarm.state]}${alarm.by ? ` by ${alarm.by}` : ""} · since ${seconds(alarm.since)} · priority ${alarm.priority}`)),
         alarm.firstOut ? element("span", { class: "badge" }, "first out") : null), controlsOfAlarm(alarm, this.view)));
-    this.list.replaceChildren(...(rows.length ? rows : [element("li", { class: "muted" }, "All alarms are normal.")]));
+    refill(this.list, rows.length ? rows : [element("li", { class: "muted" }, "All alarms are normal.")]);
     this.count = alarms.filter((alarm) => alarm.stands).length;
     this.view.badge("alarms", this.count);
   }

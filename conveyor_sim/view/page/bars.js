@@ -11,7 +11,7 @@ const ROW = 26, NAME = 96;
 export class Bars {
   constructor(view) {
     this.view = view;
-    this.canvas = element("canvas", { class: "bars", height: 1, role: "img", onclick: (event) => this._jump(event) });
+    this.canvas = element("canvas", { class: "bars", height: 1, role: "button", tabindex: "0", onclick: (event) => this._jump(event), onkeydown: (event) => event.key === "Enter" && this._next() });
     this.note = element("p", { class: "muted" });
     this.named();
     this.root = element("section", {}, element("h2", {}, "Machines"), this.canvas, this.note);
@@ -19,9 +19,9 @@ export class Bars {
 
   named() {
     this.names = [...this.view.story.machines.keys()].sort();
-    this.canvas.setAttribute("aria-label", `States over time of ${this.names.join(", ") || "no machine"}`);
+    this.canvas.setAttribute("aria-label", `States over time of ${this.names.join(", ") || "no machine"}. Enter goes to the next change.`);
     this.canvas.style.height = `${this.names.length * ROW + 4}px`;
-    this.note.textContent = this.names.length ? "A click on a bar jumps to that time." : "No machine has changed its state.";
+    this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "No machine has changed its state.";
   }
 
   _span() {
@@ -33,6 +33,12 @@ export class Bars {
     const [from, to] = this._span(), box = this.canvas.getBoundingClientRect();
     const share = (event.clientX - box.left - NAME) / (box.width - NAME);
     if (share >= 0) this.view.jump(from + share * (to - from));
+  }
+
+  _next() {
+    const { story, clock } = this.view, times = [...story.machines.values()].flat().map(({ time }) => time);
+    const next = times.reduce((first, time) => (time > clock.time + 1e-3 ? Math.min(first, time) : first), Infinity);
+    if (next < Infinity) this.view.jump(next);
   }
 
   draw() {

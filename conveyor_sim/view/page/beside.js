@@ -12,7 +12,7 @@ export class Beside {
     this.canvas = element("canvas", { id: "plan_other", tabindex: "0", role: "img", "aria-label": "Plan of the other recording, B" });
     this.captions = names.map((name, i) => element("div", { class: "caption", title: name }, element("b", {}, "AB"[i]), element("span", {}, name.split("/").slice(-PARTS).join("/")), element("small", {})));
     byId("plan").after(this.canvas, ...this.captions);
-    byId("plan").setAttribute("aria-label", "Plan of recording A. W, A, S and D move both plans, plus and minus zoom.");
+    byId("plan").setAttribute("aria-label", "Plan of recording A. W, A, S and D move both plans, plus and minus zoom, B chooses a bottle.");
     // What is chosen and set is the first one's; the rest is its own.
     this.other = Object.create(view);
     Object.assign(this.other, { recording, story, rival: view });

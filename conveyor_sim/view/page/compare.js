@@ -1,6 +1,6 @@
 // What differs between two recordings, A and B: the first difference of each kind, and all that differs now.
 
-import { element, seconds, shown } from "./dom.js";
+import { element, refill, seconds, shown } from "./dom.js";
 
 const TITLES = {
   commands: "First different command", signals: "First different signal", bottles: "First different bottle", seen: "First bottle more than 1 mm apart",
@@ -49,11 +49,11 @@ export class Compare {
     if (key === this.key) return;
     this.key = key;
     const rows = this.found.map(({ kind, time, texts, bottle }) => element("li", {},
-      element("button", { class: "first", onclick: () => this.view.jump(time, "", bottle ?? -1) },
+      element("button", { class: "first", dataset: { key: kind }, onclick: () => this.view.jump(time, "", bottle ?? -1) },
         element("time", {}, seconds(time)),
         element("span", { class: "what" }, element("b", {}, TITLES[kind]), ...texts.map((text) => element("small", {}, text))))));
     const nothing = this.done ? this.words() : "Looking for the first difference …";
-    this.first.replaceChildren(...(rows.length ? rows : [element("li", { class: "muted" }, nothing)]));
+    refill(this.first, rows.length ? rows : [element("li", { class: "muted" }, nothing)]);
   }
 
   _bottles() {
@@ -81,10 +81,13 @@ export class Compare {
       else rows.push([name, a, b]);
     });
     const tags = recording.tags;
-    this.table.replaceChildren(
+    const written = JSON.stringify([rows, more]);
+    if (written === this.written) return;
+    this.written = written;
+    refill(this.table, [
       element("tr", {}, element("th", {}, rows.length ? "signal" : "No signal differs."), element("td", {}, rows.length ? "A" : ""), element("td", {}, rows.length ? "B" : "")),
-      ...rows.map(([name, a, b]) => element("tr", {}, element("th", { scope: "row" }, element("button", { class: "link", title: "Put on the trends", onclick: () => view.trends.add(name) }, name)),
+      ...rows.map(([name, a, b]) => element("tr", {}, element("th", { scope: "row" }, element("button", { class: "link", title: "Put on the trends", dataset: { key: name }, onclick: () => view.trends.add(name) }, name)),
         element("td", {}, shown(a, tags.get(name))), element("td", {}, shown(b, tags.get(name))))),
-      ...(more ? [element("tr", {}, element("th", { class: "muted" }, `and ${more} more`))] : []));
+      ...(more ? [element("tr", {}, element("th", { class: "muted" }, `and ${more} more`))] : [])]);
   }
 }

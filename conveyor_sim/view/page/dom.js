@@ -12,6 +12,13 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
+// Writes a list anew; what had the focus keeps it, by its data-key.
+export function refill(list, rows) {
+  const now = document.activeElement, key = list.contains(now) ? now.dataset.key : undefined;
+  list.replaceChildren(...rows);
+  if (key !== undefined) list.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus({ preventScroll: true });
+}
+
 export const byId = (id) => document.getElementById(id);
 
 export function seconds(time, digits = 2) {

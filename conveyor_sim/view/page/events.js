@@ -1,7 +1,7 @@
 // The event list: what happened around now, by kind and by words; a click jumps there.
 
 import { lastUpTo } from "./block.js";
-import { element, seconds, shown } from "./dom.js";
+import { element, refill, seconds, shown } from "./dom.js";
 
 const KINDS = {
   alarms: (kind) => kind.startsWith("alarm_"),
@@ -45,7 +45,7 @@ export class Events {
     if (now === this.drawn) return;
     this.drawn = now;
     const from = Math.max(0, now - AROUND), rows = this.found.slice(from, now + AROUND).map((event, i) => this._row(event, from + i, now));
-    this.list.replaceChildren(...(rows.length ? rows : [element("li", { class: "muted" }, "Nothing of this kind happened.")]));
+    refill(this.list, rows.length ? rows : [element("li", { class: "muted" }, "Nothing of this kind happened.")]);
     this.list.querySelector(".now")?.scrollIntoView({ block: "nearest" });
   }
 
@@ -53,7 +53,7 @@ export class Events {
     const { tags } = this.view.recording, value = event.kind === "machine_state" ? ` ${shown(event.value, tags.get(event.name))}` : "";
     const about = event.bottle >= 0 ? `${event.name} · bottle ${event.bottle}` : event.name;
     return element("li", {}, element("button", {
-      class: `event${place === now ? " now" : ""}${place > now ? " later" : ""}`, "aria-current": place === now ? "true" : null,
+      class: `event${place === now ? " now" : ""}${place > now ? " later" : ""}`, "aria-current": place === now ? "true" : null, dataset: { key: place },
       onclick: () => this.view.jump(event.time, event.name, event.bottle),
     }, element("time", {}, seconds(event.time)), element("span", { class: "what" }, element("b", {}, event.kind.replace("_", " ")), ` ${about}${value}`, event.text ? element("small", {}, event.text) : null)));
   }

@@ -34,7 +34,7 @@ export function listenToKeys(view) {
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || dialog.open) return;
     const target = event.target, typing = target.matches("input:not([type=checkbox]), select");
-    const pressing = target.matches("button, input[type=checkbox], [role=tab]") && [" ", "Enter"].includes(event.key);
+    const pressing = target.matches("button, input[type=checkbox], [role=tab], [role=button]") && [" ", "Enter"].includes(event.key);
     const tabbing = target.matches("[role=tab]") && event.key.startsWith("Arrow");
     if (typing || pressing || tabbing) return;
     const digit = /^[0-9]$/.test(event.key);

@@ -58,7 +58,7 @@ export class Trends {
     this.chips.replaceChildren(...this.names.map((name, i) => {
       const swatch = element("span", { class: "swatch" });
       swatch.style.background = COLOURED(i);
-      return element("button", { class: "chip", title: `Remove ${name}`, onclick: () => this.remove(name) }, swatch, name, " ✕");
+      return element("button", { class: "chip", title: `Remove ${name}`, "aria-label": `Remove ${name} from the trends`, onclick: () => this.remove(name) }, swatch, name, " ✕");
     }));
     this.plot?.destroy();
     this.plot = null;
