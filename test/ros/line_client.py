@@ -130,13 +130,17 @@ class LineClient:
 
     def listen(self, kind: Any, topic: str, qos: str | None = None) -> Listener:
         """Collect messages, from now on."""
-        return Listener(self.node, kind, topic, qos or topic)
+        return Listener(self, kind, topic, qos or topic)
 
     def publisher(self, kind: Any, topic: str, qos: str) -> Any:
         """A publisher to which the node under test has subscribed."""
         publisher = self.node.create_publisher(kind, topic, ros_qos(TOPICS[ROWS.get(qos, qos)].qos))
         until(publisher.get_subscription_count, f"a subscription to {topic}")
         return publisher
+
+    def between_callbacks(self, function: Callable[[], object]) -> None:
+        """Have it called by the thread that waits: rclpy ends that for what is destroyed under its hands."""
+        self._spinner.call(function).result(PATIENCE)
 
     def diagnostics(self) -> tuple[Any, dict[str, str]]:
         """The next diagnostic status, and its values by key."""
@@ -151,12 +155,12 @@ class LineClient:
 class Listener:
     """Messages of one topic, in the order of their arrival."""
 
-    def __init__(self, node: Node, kind: Any, topic: str, qos: str) -> None:
+    def __init__(self, client: LineClient, kind: Any, topic: str, qos: str) -> None:
         self.messages: list[Any] = []
-        self._node = node
+        self._client = client
         self._topic = topic
         profile = ros_qos(TOPICS[ROWS.get(qos, qos)].qos)
-        self._subscription = node.create_subscription(kind, topic, self.messages.append, profile)
+        self._subscription = client.node.create_subscription(kind, topic, self.messages.append, profile)
         until(self._subscription.get_publisher_count, f"a publisher of {topic}")
 
     def first(self) -> Any:
@@ -173,4 +177,4 @@ class Listener:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._node.destroy_subscription(self._subscription)
+        self._client.between_callbacks(lambda: self._client.node.destroy_subscription(self._subscription))

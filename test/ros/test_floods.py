@@ -60,7 +60,7 @@ def outcomes(line: LineClient) -> Any:
 def commands(line: LineClient) -> Any:
     publisher = line.publisher(Commands, "commands", "commands")
     yield publisher
-    line.node.destroy_publisher(publisher)
+    line.between_callbacks(lambda: line.node.destroy_publisher(publisher))
 
 
 def told(outcomes: list[Any], words: str) -> list[Any]:

@@ -70,7 +70,7 @@ def test_a_foreign_clock_is_told(start_node: Callable[..., Child], client: LineC
     node = start_node()
     publisher = client.node.create_publisher(Clock, "/clock", 1)
     assert until(lambda: not_alone(client), "a warning") == f"/clock is published by /line_client too: {JUMPS}"
-    client.node.destroy_publisher(publisher)
+    client.between_callbacks(lambda: client.node.destroy_publisher(publisher))
     node.stop()
 
 
