@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from conveyor_sim.accuracy.results import Study
     from conveyor_sim.observe.production import Production
-    from conveyor_sim.plot.responses import Indices, Map, Response
+    from conveyor_sim.plot.response_data import Indices, Map, Response
     from conveyor_sim.plot.trials_data import TrialsData
     from conveyor_sim.scene import Scene
 

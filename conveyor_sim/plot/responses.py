@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -14,54 +13,11 @@ from matplotlib.ticker import MaxNLocator
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Floats
 from conveyor_sim.plot.heading import heading
+from conveyor_sim.plot.response_data import Indices, Map, Response, level_text
 
 _BAND: Final = 0.25
 _NUMBERED: Final = 150  # cells of a map that have their number written in
 _MOST_LINES: Final = 6
-
-
-@dataclass(frozen=True)
-class Response:
-    """A metric over the levels of one parameter. n levels."""
-
-    parameter: str
-    metric: str
-    """With its unit, as an axis shows it."""
-    levels: Sequence[Any]
-    """(n,), numbers in rising order, or texts."""
-    mean: Floats
-    """(n,), NaN where no run has finished."""
-    half_width: Floats
-    """(n,), of the confidence interval, NaN where it is not known."""
-    label: str = ""
-    """What a line stands for, where there are several."""
-    scattered: bool = False
-    """Whether levels are those of single points that lie anywhere: no line joins them."""
-
-
-@dataclass(frozen=True)
-class Map:
-    """A metric over two parameters. n by m levels."""
-
-    parameters: tuple[str, str]
-    metric: str
-    levels: tuple[Sequence[Any], Sequence[Any]]
-    mean: Floats
-    """(n, m), NaN where no run has finished."""
-
-
-@dataclass(frozen=True)
-class Indices:
-    """Shares of a metric's variance, by parameter. k parameters."""
-
-    metric: str
-    parameters: Sequence[str]
-    first: Floats
-    """(k,), by the parameter alone."""
-    first_half_width: Floats
-    total: Floats
-    """(k,), with all interactions."""
-    total_half_width: Floats
 
 
 def responses_figure(panels: Sequence[Sequence[Sequence[Response]]], title: str) -> Figure:
@@ -127,11 +83,6 @@ def map_figure(found: Map, title: str) -> Figure:
     ax.set_ylabel(found.parameters[1])
     heading(figure, title)
     return figure
-
-
-def level_text(level: Any) -> str:
-    """A level of a parameter on an axis or in a legend."""
-    return f"{level:.4g}" if isinstance(level, float) else str(level)
 
 
 def indices_figure(found: Sequence[Indices], title: str) -> Figure:

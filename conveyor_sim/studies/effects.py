@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.plot.responses import Indices, Map, Response, level_text
+from conveyor_sim.plot.response_data import Indices, Map, Response, level_text
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import salib_problem
