@@ -15,7 +15,7 @@ import pytest
 from scenes import RADIUS, base, belt, bottle, contact, scene, segment
 
 import conveyor_sim
-from conveyor_sim.accuracy.ensemble import DIED, Ensemble
+from conveyor_sim.accuracy.ensemble import Ensemble
 from conveyor_sim.accuracy.equivalence import LOOKS, run_until_decided
 from conveyor_sim.accuracy.jitter import disturb, jittered
 from conveyor_sim.accuracy.observables import measuring, observe
@@ -25,6 +25,7 @@ from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.worker_pool import DIED
 
 FINE = Setting("semi_implicit_euler", 100)
 COARSE = Setting("semi_implicit_euler", 40, stiffness=0.5)
