@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Status = Literal["finished", "failed", "lost"]
-"""lost: its process died, twice; the next time that the study runs it is tried again."""
+"""lost: by no fault of its own: its process died, twice, or had no room to record it, or another version; the next time
+that the study runs it is tried again.
+"""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.errors import ConveyorError, StudyError
+from conveyor_sim.errors import BagError, ConveyorError, StudyError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.model import Model
@@ -50,9 +50,13 @@ def make_row(work: Work) -> Row:
     bag = None if work.folder is None else work.folder / bag_name(job)
     try:
         work.setup.require_same_versions()
+    except StudyError as error:  # of this process, not of the run
+        return replace(row, status="lost", error=str(error))
+    try:
         row = simulate(work, bag if wanted == "all" else None, clock)
     except Exception as error:  # of the functions and controllers of whoever wrote the study, too
-        row = replace(row, error=_sentence(error))
+        lost = isinstance(error, (BagError, MemoryError, OSError))  # of this machine: another time it may be made
+        row = replace(row, status="lost" if lost else "failed", error=_sentence(error))
         if bag is not None and wanted == "failed":
             with suppress(Exception):  # it fails again, in the same tick
                 simulate(work, bag, _Clock())

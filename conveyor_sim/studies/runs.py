@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from conveyor_sim.studies.check import parameter_units, units_of
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import scene_of
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, Row, Status
 from conveyor_sim.studies.run import Work, kernels_of, make_row, warm_start
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.worker_pool import DiedError, WorkerPool
@@ -53,23 +53,30 @@ class Runs(AbstractContextManager["Runs"]):
 
         Raises StudyError if one can't be kept. A run that fails is a Row with its error.
         """
-        found = {job.key: row for job in jobs if (row := self.journal.row_of(job)) is not None}
-        todo = list({job.key: job for job in jobs if job.key not in found}.values())
-        rows: dict[tuple[int, int], Row] = dict(found)
-        progress(len(found), len(rows) + len(todo), self._left(rows.values(), len(todo)), None)
+        rows = {job.key: row for job in jobs if (row := self.journal.row_of(job)) is not None}
+        todo = list({job.key: job for job in jobs if job.key not in rows}.values())
+        walls = [row.wall for row in rows.values() if row.status == "finished"]
+        spent, counted = sum(walls), len(walls)
+
+        def left() -> float | None:
+            return (total - len(rows)) * spent / counted / self._engine.processes if counted else None
+
+        total = len(rows) + len(todo)
+        progress(len(rows), total, left(), None)
         if todo:
             self._compile(todo)
         unstarted = self._warm(todo)
         for job in [job for job in todo if job.seed in unstarted]:
-            rows[job.key] = self._keep(Row(job.point, job.seed, dict(job.parameters), "failed", unstarted[job.seed]))
+            rows[job.key] = self._keep(Row(job.point, job.seed, dict(job.parameters), *unstarted[job.seed]))
         works = [self._work(job) for job in todo if job.key not in rows]
-        total = len(rows) + len(works)
         for work, made in self._engine.each(make_row, works):
             job = work.job
             lost = Row(job.point, job.seed, dict(job.parameters), "lost", str(made))
             row = lost if isinstance(made, DiedError) else made
             rows[job.key] = self._keep(row)
-            progress(len(rows), total, self._left(rows.values(), total - len(rows)), row)
+            if row.status == "finished":
+                spent, counted = spent + row.wall, counted + 1
+            progress(len(rows), total, left(), row)
         return [rows[job.key] for job in jobs]
 
     def _work(self, job: Job) -> Work:
@@ -104,24 +111,19 @@ class Runs(AbstractContextManager["Runs"]):
             kinds.add(kind)
         self.journal.keep_units(units, of_parameters)
 
-    def _warm(self, jobs: Sequence[Job]) -> dict[int, str]:
-        """Have a warm start for each seed; why there is none, by seed."""
+    def _warm(self, jobs: Sequence[Job]) -> dict[int, tuple[Status, str]]:
+        """Have a warm start for each seed; the status of runs without one, and why there is none, by seed."""
         if self._setup.study.warm_start is None:
             return {}
         seeds = {job.seed: replace(job, point=-1, parameters={}) for job in jobs}
         works = [Work(self._setup, job) for seed, job in seeds.items() if not self.journal.start_of(seed).exists()]
-        failed = {}
+        failed: dict[int, tuple[Status, str]] = {}
         for work, made in self._engine.each(_warmed, works):
             if isinstance(made, bytes):
                 self.journal.keep_start(work.job.seed, made)
             else:
-                failed[work.job.seed] = f"warm start: {made}"
+                failed[work.job.seed] = "lost" if isinstance(made, DiedError) else "failed", f"warm start: {made}"
         return failed
-
-    def _left(self, rows: Iterable[Row], todo: int) -> float | None:
-        """s of wall time for so many runs more."""
-        walls = [row.wall for row in rows if row.status == "finished"]
-        return todo * sum(walls) / len(walls) / max(1, self._engine.processes) if walls else None
 
 
 def _warmed(work: Work) -> bytes | str:

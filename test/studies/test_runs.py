@@ -207,4 +207,4 @@ def test_code_that_changes_meanwhile_is_noticed(tmp_path: Path) -> None:
     setup = setup_of(tmp_path)
     (tmp_path / "code.py").write_text("line = None")
     row = make_row(Work(setup, Job(0, {"rate": 4.0}, 1)))
-    assert row.status == "failed" and "code.py: has changed since the study was read" in row.error
+    assert row.status == "lost" and "code.py: has changed since the study was read" in row.error
