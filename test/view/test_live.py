@@ -538,7 +538,7 @@ def test_what_waits_for_a_page_is_bounded() -> None:
     run(work())
 
 
-def test_nobody_who_is_not_let_in_sees_anything(live: Live, users: Path) -> None:
+def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users: Path) -> None:
     settings = Settings(users=users / "users", anonymous=False)
     with Serving(live.source, [(WEB, 0)], settings) as serving:
         url = serving.faces[0].address.rstrip("/")
@@ -546,11 +546,18 @@ def test_nobody_who_is_not_let_in_sees_anything(live: Live, users: Path) -> None
         async def work() -> None:
             async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url) as socket:
                 assert [json.loads(message[1:])["kind"] for message in await messages(socket, 0.5)] == ["locked"]
-                await socket.send_json({"do": "sign_in", "name": "vic", "password": PASSWORD, "id": 1})
-                await next_text(socket, "begin")
-                await frames(socket, 2)
 
         run(work())
+        page = browser.new_page()
+        page.set_default_timeout(PATIENCE * 1e3)
+        page.goto(url)
+        page.fill("#signing input[autocomplete=username]", "vic")
+        page.fill("#signing input[type=password]", PASSWORD)
+        page.click("#signing button.main")
+        page.wait_for_selector("body[data-link=live]")
+        page.click("#sign")
+        page.wait_for_selector("body[data-link=locked]")
+        page.close()
 
 
 # By other ways

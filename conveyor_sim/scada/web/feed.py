@@ -1,7 +1,7 @@
 """`Feed`: what the pages that show a line are sent, made once for all of them.
 
-Messages are bytes. The first one says what follows: TEXT a JSON object, whose "kind" is begin, story, status, reply or
-pong; FRAME a tick (float64), its wall time in s since 1970 (float64), both little-endian, and a block of
+Messages are bytes. The first one says what follows: TEXT a JSON object, whose "kind" is begin, story, status, locked,
+reply or pong; FRAME a tick (float64), its wall time in s since 1970 (float64), both little-endian, and a block of
 `view.block.pack` that begins at the tick and holds that moment. Read by view/page/live.js.
 """
 

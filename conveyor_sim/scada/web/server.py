@@ -195,15 +195,16 @@ class WebServer:
                     viewer.tell(text_message("pong", sent=request.get("sent"), now=time.time()))
                 case "sign_in":
                     person = await self._sign_in(request)
-                    if not self._anonymous and person.name:
-                        self._feed.join(viewer)
                     refused = "" if person.name else "name or password are wrong"
                     viewer.tell(_reply(request, refused, person))
+                    if not self._anonymous and person.name:
+                        self._feed.join(viewer)
                 case "sign_out":
                     person = NOBODY
+                    viewer.tell(_reply(request, "", person))
                     if not self._anonymous:
                         self._feed.leave(viewer)
-                    viewer.tell(_reply(request, "", person))
+                        viewer.tell(text_message("locked"))
                 case _:
                     viewer.tell(_reply(request, self._commands.do(person, request), person))
 

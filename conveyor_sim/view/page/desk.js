@@ -25,10 +25,12 @@ export class Desk {
     this.now = element("button", { id: "follow_now", title: "Show what is now (End)", onclick: () => view.clock.follow() }, "Now");
     this.who = element("span", { id: "who" });
     this.sign = element("button", { id: "sign", onclick: () => this._sign() }, "Sign in");
-    this.dialog = this._dialog();
+    this.signing = line.signing;
+    this.signing.done = () => this.connection();
     byId("desk").replaceChildren(this.link, this.late, this.now, this.run, ...controls, element("span", { class: "gap" }), this.who, ...(about.users ? [this.sign] : []));
     byId("desk").hidden = false;
     line.addEventListener("connection", () => { this.at = this.before = null; this.connection(); });
+    line.addEventListener("locked", () => this.connection());
     line.addEventListener("status", ({ detail }) => { this.status = detail.status; this.connection(); });
     line.addEventListener("frame", ({ detail }) => { [this.before, this.at] = [this.at, detail.at]; });
     this.connection();
@@ -41,9 +43,9 @@ export class Desk {
 
   connection() {
     const { line } = this.view, { lost, run, reason } = this.status;
-    const state = !line.connected ? "broken" : lost ? "lost" : "live";
+    const state = line.locked ? "locked" : !line.connected ? "broken" : lost ? "lost" : "live";
     document.body.dataset.link = state;
-    this.link.textContent = { broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
+    this.link.textContent = { locked: "● Sign in to see the line", broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
     this.link.className = state;
     this.run.textContent = state === "live" ? `${run}${reason ? `: ${reason}` : ""}` : "";
     this.buttons.get("pause")?.toggleAttribute("hidden", run === "paused");
@@ -96,36 +98,13 @@ export class Desk {
     });
   }
 
-  _dialog() {
-    this.name = element("input", { autocomplete: "username", required: true, maxlength: "40" });
-    this.password = element("input", { type: "password", autocomplete: "current-password", required: true, maxlength: "200" });
-    this.wrong = element("p", { class: "wrong", role: "alert" });
-    const dialog = element("dialog", { id: "signing", "aria-label": "Sign in" }, element("h2", {}, "Sign in"),
-      element("form", { onsubmit: (event) => this._signIn(event) }, element("label", {}, "Name", this.name), element("label", {}, "Password", this.password),
-        this.wrong, element("div", { class: "choices" }, element("button", { class: "main" }, "Sign in"), element("button", { type: "button", onclick: () => dialog.close() }, "Cancel"))));
-    document.body.append(dialog);
-    return dialog;
-  }
-
   async _sign() {
     const { line } = this.view;
-    if (line.person.name) {
-      await line.ask({ do: "sign_out" });
-      this.connection();
+    if (!line.person.name) {
+      this.signing.open();
       return;
     }
-    this.wrong.textContent = "";
-    this.dialog.showModal();
-  }
-
-  async _signIn(event) {
-    event.preventDefault();
-    this.wrong.textContent = "…";
-    const { refused } = await this.view.line.ask({ do: "sign_in", name: this.name.value, password: this.password.value });
-    this.password.value = "";
-    this.wrong.textContent = refused ?? "";
-    if (refused) return;
-    this.dialog.close();
+    await line.ask({ do: "sign_out" });
     this.connection();
   }
 }

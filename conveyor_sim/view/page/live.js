@@ -2,6 +2,7 @@
 // conveyor_sim/scada/web/feed.py; whoever changes one changes the other.
 
 import { readBlock } from "./block.js";
+import { SignIn } from "./sign_in.js";
 
 const TEXT = 0, HEADER = 17; // bytes before the block of a frame
 const FIRST_WAIT = 0.5, LONGEST_WAIT = 5; // s before it is tried again
@@ -19,7 +20,9 @@ export class Line extends EventTarget {
     this.number = 0;
     this.wait = FIRST_WAIT;
     this.connected = false;
+    this.locked = false; // whether nobody sees it who has not signed in
     this.head = null;
+    this.signing = new SignIn(this);
     setInterval(() => this._ping(), 1000 * PING);
     this._connect();
   }
@@ -34,7 +37,7 @@ export class Line extends EventTarget {
     socket.onmessage = ({ data }) => this._take(data);
     socket.onclose = () => {
       const was = this.connected;
-      this.connected = false;
+      this.connected = this.locked = false;
       this.person = { name: "", role: "viewer" };
       for (const answer of this.asked.values()) answer({ refused: "the connection was lost before there was an answer" });
       this.asked.clear();
@@ -58,6 +61,11 @@ export class Line extends EventTarget {
     if (message.kind === "begin") {
       this.head = message.head;
       this.connected = true;
+      this.locked = false;
+      this.wait = FIRST_WAIT;
+    }
+    if (message.kind === "locked") {
+      this.locked = true;
       this.wait = FIRST_WAIT;
     }
     if (message.kind === "pong") {

@@ -83,6 +83,10 @@ async function start() {
   }
   const line = new Line();
   byId("notice").textContent = "Waiting for the line.";
+  line.addEventListener("locked", () => {
+    byId("notice").textContent = "Sign in to see the line.";
+    line.signing.open();
+  });
   line.addEventListener("begin", ({ detail }) => {
     byId("notice").textContent = "";
     const story = new Story(detail.head), recording = new LiveRecording(detail.head);
