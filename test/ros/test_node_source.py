@@ -24,7 +24,7 @@ SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
 
 @pytest.fixture
 def source(domain: int) -> Iterator[NodeSource]:
-    with NodeSource(print) as source:
+    with NodeSource(print, drawn=True) as source:
         yield source
 
 
@@ -41,6 +41,8 @@ def test_a_line_is_shown_and_worked_and_all_is_on_record(
     image = image_of(load_scene(ZONED))
     assert [tag.name for tag in source.about.tags] == [tag.name for tag in image.tags]
     assert source.shown.values.keys() == {*image.signal_names, *image.command_names}
+    until(lambda: {"bottles", "belts"} <= source.picture.drawn.keys(), "what a page draws")
+    assert len(source.picture.drawn["belts"]().actual) == len(source.picture.line.belts)
     assert source.give(setpoint(0.25)) == ""
     until(lambda: source.shown.values[SPEED] == 0.25, "the speed")
     read_back = source.shown.read_back

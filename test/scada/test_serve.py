@@ -9,6 +9,7 @@ import signal
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 from scada.served import Served
@@ -20,6 +21,7 @@ from conveyor_sim.errors import BagError
 from conveyor_sim.scada.modbus_map import read_map
 
 pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
+pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
 
 from pymodbus.client import ModbusTcpClient
 
@@ -43,14 +45,19 @@ def give(client: ModbusTcpClient, value: float) -> None:
 def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
     command: Callable[..., Served], tmp_path: Path
 ) -> None:
-    served = command(SCENE, "--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--out", "bag")
+    options = ["--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--web", "0", "--out", "bag"]
+    served = command(SCENE, *options)
     with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
         give(client, 0.25)
         until(lambda: speed_of(client) == 0.25, "the speed")
+    page = re.search(r"(http://127\.0\.0\.1:\d+/): clients can read all, and write nothing", served.told)
+    assert page and b'<meta name="line" content="live">' in urlopen(page.group(1), timeout=PATIENCE).read()
     assert "clients can read all, and write as controller" in served.told
     out = served.end()
-    assert re.fullmatch(r"served up to [\d.]+ s; modbus 1 written, 0 refused; recorded to bag\n", out)
+    assert re.fullmatch(
+        r"served up to [\d.]+ s; modbus 1 written, 0 refused, web 0 written, 0 refused; recorded to bag\n", out
+    )
     assert served.process.returncode == 0
     assert read_map(tmp_path / "map.csv")[0].table == "coil"
     report = replay(tmp_path / "bag")

@@ -15,7 +15,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.source import WEB
-from conveyor_sim.scada.users import User, authenticate
+from conveyor_sim.scada.users import Logins, User
 from conveyor_sim.scada.view import PictureSource
 from conveyor_sim.scada.web.commands import NOBODY, Commands, Person
 from conveyor_sim.scada.web.feed import Feed, text_message
@@ -67,11 +67,11 @@ class WebServer:
         """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
         TLS; None: plain, which is for this machine only. port: 0 for any that is free.
         """
-        self._source, self._users, self._anonymous, self._secured = source, dict(users or {}), anonymous, secured
+        self._logins, self._anonymous, self._secured = Logins(dict(users or {})), anonymous, secured
         self._at = host, port
         self._commands = Commands(source)
         self._feed = Feed(
-            source, users=bool(self._users), takes=source.takes_inputs, controls=sorted(self._commands.controls)
+            source, users=bool(users), takes=source.takes_inputs, controls=sorted(self._commands.controls)
         )
         self._files = page_files()
         self._runner: web.AppRunner | None = None
@@ -161,7 +161,7 @@ class WebServer:
         try:
             await socket.prepare(request)
             sending = asyncio.create_task(viewer.send())
-            await self._answer_all(socket, viewer)
+            await self._answer_all(socket, viewer, request.remote or "")
         except ConnectionError:
             pass
         finally:
@@ -172,8 +172,8 @@ class WebServer:
                 await asyncio.gather(sending, return_exceptions=True)
         return socket
 
-    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer) -> None:
-        """Until the connection ends."""
+    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, origin: str) -> None:
+        """Until the connection ends. origin: the machine that it comes from."""
         person = NOBODY
         if self._anonymous:
             self._feed.join(viewer)
@@ -194,7 +194,7 @@ class WebServer:
                 case "ping":
                     viewer.tell(text_message("pong", sent=request.get("sent"), now=time.time()))
                 case "sign_in":
-                    person = await self._sign_in(request)
+                    person = await self._sign_in(request, origin)
                     refused = "" if person.name else "name or password are wrong"
                     viewer.tell(_reply(request, refused, person))
                     if not self._anonymous and person.name:
@@ -208,12 +208,12 @@ class WebServer:
                 case _:
                     viewer.tell(_reply(request, self._commands.do(person, request), person))
 
-    async def _sign_in(self, request: Mapping[str, Any]) -> Person:
+    async def _sign_in(self, request: Mapping[str, Any], origin: str) -> Person:
         name, password = request.get("name"), request.get("password")
         user = None
         if isinstance(name, str) and isinstance(password, str):
             async with self._password:  # one at a time: it takes a processor for as long as that is
-                user = await asyncio.to_thread(authenticate, self._users, name, password)
+                user = await asyncio.to_thread(self._logins.enter, name, password, origin, time.monotonic())
         if user is None or not isinstance(name, str):
             await asyncio.sleep(WRONG_PASSWORD)
             return NOBODY
