@@ -24,6 +24,9 @@ LOWEST = 2**31
 MOST_BYTES = 2 * MB
 """Of a file."""
 
+MOST_UNITS = 5000
+"""Programs, functions and blocks of a file."""
+
 
 @dataclass(frozen=True)
 class Scheduled:
@@ -82,6 +85,9 @@ def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Co
 
 def _compile(text: str, file: str, trace: bool) -> Compiled:
     source = parse(text)
+    if len(source.units) > MOST_UNITS:
+        at, count = source.units[MOST_UNITS].at, len(source.units)
+        raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
     calls = Calls()
     declared = calls.declarations = Declarations(source, calls)
     lines = Lines()

@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 MOST_ELEMENTS = 1_000_000
 """Of an array, a structure or a block, with all that is in it."""
 
+MOST_LEVELS = 100
+"""Structures and blocks one within the other."""
+
+_OF_A_BLOCK = 5
+"""Elements of one of the library."""
+
 _SECTIONS = {
     "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
     "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
@@ -50,6 +56,7 @@ class Declarations:
         self._functions: dict[str, tree.Unit] = {}
         self._open: list[str] = []
         self._elements: dict[str, int] = {}
+        self._levels: dict[str, int] = {}
         everything: list[tree.TypeDeclaration | tree.Unit] = [*source.types, *source.units]
         for declared in everything:
             where: dict[str, Any] = self._pending
@@ -151,29 +158,40 @@ class Declarations:
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
 
     def _bound(self, kind: Structure, at: Position) -> None:
-        """Keep how many elements it has, once its members are known."""
-        own = (one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL"))
+        """Keep how many elements it has, and levels, once its members are known."""
+        own = [one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
         self._elements[kind.python] = max(1, sum(map(self._elements_of, own)))
         _require_few(self._elements[kind.python], at)
+        self._levels[kind.python] = levels = 1 + max(map(self._levels_of, own), default=0)
+        if levels > MOST_LEVELS:
+            raise SourceError(at, f"found {levels} types one within the other, expected at most {MOST_LEVELS}")
+
+    def _levels_of(self, kind: Type) -> int:
+        """Structures and blocks one within the other."""
+        while isinstance(kind, Array):
+            kind = kind.element
+        return self._levels.get(kind.python, 1) if isinstance(kind, Structure) else 0
 
     def _elements_of(self, kind: Type) -> int:
-        """Elementary variables in one of a type; a block of the library counts as one."""
+        """Elementary variables in one of a type; a block of the library counts as some."""
         if isinstance(kind, Array):
             return math.prod(high - low + 1 for low, high in kind.ranges) * self._elements_of(kind.element)
-        return self._elements.get(kind.python, 1) if isinstance(kind, Structure) else 1
+        return self._elements.get(kind.python, _OF_A_BLOCK) if isinstance(kind, Structure) else 1
 
     def _enumeration(self, spec: tree.EnumType, known: Expressions, name: str) -> Type:
         base = self.named(spec.at, spec.base) if spec.base else ELEMENTARY["INT"]
         if base.kind not in ("int", "bits"):
             raise SourceError(spec.at, f"found {base.name}, expected an integer type or a bit string")
         values: list[tuple[str, int]] = []
+        taken: set[str] = set()
         for at, word, node in spec.values:
             value = known.known(node, word) if node is not None else values[-1][1] + 1 if values else 0
-            if any(word.lower() == other.lower() for other, _ in values):
+            if word.lower() in taken:
                 raise SourceError(at, f"found {word} again, expected each value once")
             if not base.low <= value <= base.high:
                 raise SourceError(at, f"found {value} for {word}, expected {base.name}, {base.low} to {base.high}")
             values.append((word, value))
+            taken.add(word.lower())
         written = name or f"enumeration_{spec.at.line}_{spec.at.column}"
         kind = Enumeration(written, "enum", base.low, base.high, values=tuple(values))
         for word, _ in values:

@@ -68,6 +68,8 @@ class Program:
                 self.instances[name].run(now)
             except (Fault, ArithmeticError, RecursionError, MemoryError, ValueError) as error:
                 text = str(error) if isinstance(error, Fault) else f"found a value that can't be ({error})"
+                if isinstance(error, RecursionError):
+                    text = "found calls too deep within each other, expected fewer levels"
                 raise StructuredTextError(f"{self._place(error.__traceback__)}: {text}") from None
         return ran
 

@@ -267,6 +267,60 @@ def test_a_program_that_is_too_large_is_refused_in_words(tmp_path: Path, body: s
     assert len(str(caught.value)) < 3000
 
 
+def chain(kind: str, count: int) -> str:
+    """Blocks that hold, or functions that call, each the one before it."""
+    units = []
+    for number in range(count):
+        if kind == "blocks":
+            inner, body = (f"F{number - 1}", "x();") if number else ("INT", ";")
+            units.append(f"FUNCTION_BLOCK F{number} VAR x : {inner}; END_VAR {body} END_FUNCTION_BLOCK")
+        else:
+            called = f"f{number - 1}(a)" if number else "a"
+            units.append(f"FUNCTION f{number} : INT VAR_INPUT a : INT; END_VAR f{number} := {called}; END_FUNCTION")
+    use = f"x : F{count - 1};" if kind == "blocks" else "n : INT;"
+    return (
+        "\n".join(units)
+        + f"\nPROGRAM main VAR {use} END_VAR\n"
+        + ("x();" if kind == "blocks" else f"n := f{count - 1}(n);")
+    )
+
+
+def test_units_one_within_the_other_are_bounded(tmp_path: Path) -> None:
+    path = tmp_path / "p.st"
+    path.write_text(chain("blocks", 99) + "\nEND_PROGRAM")
+    plc = StructuredText(path)
+    plc.bind(TAGS)
+    scan(plc, 0)
+    plc.restore(json.loads(json.dumps(plc.snapshot())))
+    path.write_text(chain("blocks", 2000) + "\nEND_PROGRAM")
+    with pytest.raises(StructuredTextError, match=r":101:16: found 101 types one within the other, expected at most"):
+        StructuredText(path)
+    path.write_text(chain("functions", 2000) + "\nEND_PROGRAM")
+    plc = StructuredText(path)
+    plc.bind(TAGS)
+    with pytest.raises(StructuredTextError, match="found calls too deep within each other, expected fewer levels"):
+        scan(plc, 0)
+    path.write_text("PROGRAM p ; END_PROGRAM " * 5001)
+    with pytest.raises(StructuredTextError, match="found 5001 programs, functions and blocks, expected at most 5000"):
+        StructuredText(path)
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ("PROGRAM p ; END_PROGRAM (* ü *)".encode("latin-1"), "is not UTF-8"),
+        ("PROGRAM p ; END_PROGRAM".encode("utf-16"), "is not UTF-8"),
+        (b"", ":1:1: found no PROGRAM, expected one or more"),
+        (b"\0" * 1000, r":1:1: found '\\x00', expected Structured Text"),
+        (b"PROGRAM p\rVAR n : INT; END_VAR\rn := m;\rEND_PROGRAM", "found m, which is not declared"),
+    ],
+)
+def test_what_is_no_text_is_refused_in_words(tmp_path: Path, data: bytes, said: str) -> None:
+    (tmp_path / "p.st").write_bytes(data)
+    with pytest.raises(StructuredTextError, match=said):
+        StructuredText(tmp_path / "p.st")
+
+
 def test_what_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
     (tmp_path / "folder.st").mkdir()
     os.mkfifo(tmp_path / "pipe.st")
