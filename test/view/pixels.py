@@ -12,9 +12,12 @@ TYPE_COLOURS = ((0, 114, 178), (213, 94, 0))
 
 
 def settled(page: Any) -> None:
-    """Wait for what is drawn next, and for what that may send for."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    page.wait_for_timeout(100)
+    """Wait for what is drawn next, for what that sends for, and until that is drawn, however slow the machine is."""
+    frames = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    for _ in range(2):
+        page.evaluate(frames)
+        page.wait_for_selector('body:not([data-reading]), body[data-reading="0"]', state="attached", timeout=60_000)
+    page.evaluate(frames)
 
 
 def to_pixels(page: Any, x: float, y: float) -> tuple[float, float]:

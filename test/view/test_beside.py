@@ -122,9 +122,7 @@ def test_a_served_pair_finds_the_same_and_goes_on_where_one_has_ended(browser: A
         page.click("#plan", position={"x": 20, "y": 20})
         press(page, "End")
         assert clock(page) == pytest.approx(24.0, abs=0.05)
-        page.wait_for_function(
-            "document.querySelector('.caption').innerText.includes('ended at 8.00 s')", timeout=60_000
-        )
+        page.locator(".caption", has_text="ended at 8.00 s").wait_for(timeout=60_000)
         assert "ended" not in page.locator(".caption").nth(1).inner_text()
         page.close()
 

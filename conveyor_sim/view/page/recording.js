@@ -6,6 +6,13 @@ const KEPT = 60; // blocks
 const NEAR = 1e-6; // s
 const SPAN = 2; // frames to either side by which a speed is measured
 
+// How many blocks are on their way is told to whoever waits for a picture.
+let onTheWay = 0;
+function reading(more) {
+  onTheWay += more;
+  document.body.dataset.reading = onTheWay;
+}
+
 export class Recording extends EventTarget {
   constructor(source, head) {
     super();
@@ -46,6 +53,7 @@ export class Recording extends EventTarget {
 
   async _read(number) {
     const { first, block } = this.head.times;
+    reading(1);
     try {
       const bytes = await this.source.bytes(`block/${number}`);
       const read = readBlock(bytes, this.head.steps, first + number * block, this.head.tick);
@@ -60,6 +68,7 @@ export class Recording extends EventTarget {
       return null;
     } finally {
       this.pending.delete(number);
+      reading(-1);
       this.dispatchEvent(new Event("loaded"));
     }
   }
