@@ -27,6 +27,13 @@ from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
 
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More of it, for machines that are slow."""
+    monkeypatch.setattr(dask_engine, "PATIENCE", 280.0)
+
+
 RATES = {"rate": {"argument": "rate", "values": [4.0, 5.0, 6.0]}}
 
 
@@ -34,15 +41,19 @@ class Cluster:
     """A scheduler and workers, each a process."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._processes, self.port = folder, {}, 0
+        self._folder, self.port = folder, 0
+        self._processes: dict[int, subprocess.Popen[bytes]] = {}
 
     def scheduler(self) -> str:
         """Start one, at the port of the one before; its address."""
         file = self._folder / f"scheduler_{len(self._processes)}.json"
         where = ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard", "--scheduler-file", str(file)]
-        self._start("scheduler", ["scheduler", *where])
+        process = self._start("scheduler", ["scheduler", *where])
 
         def address() -> str:
+            nonlocal process
+            if process.poll() is not None:  # somebody has taken the port for a moment
+                process = self._start("scheduler", ["scheduler", *where])
             try:
                 return str(json.loads(file.read_text())["address"])
             except (OSError, ValueError):
@@ -64,12 +75,13 @@ class Cluster:
         for process in self._processes.values():
             process.wait()
 
-    def _start(self, what: str, arguments: list[str]) -> None:
+    def _start(self, what: str, arguments: list[str]) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", *arguments]
         log = (self._folder / f"{what}_{len(self._processes)}.log").open("w")
         with log:
             process = subprocess.Popen(command, stdout=log, stderr=log)
         self._processes[process.pid] = process
+        return process
 
 
 @contextmanager
