@@ -83,7 +83,7 @@ async def opcua(address: str, ready: Ready, seconds: float) -> tuple[int, int]:
     from asyncua import Client
 
     seen = Seen()
-    async with Client(address, timeout=60) as client:
+    async with Client(address, timeout=60, watchdog_intervall=60) as client:
         subscription = await client.create_subscription(PUBLISH, seen)
         nodes = [client.get_node(f"ns=2;s=belts/belt{n}/count") for n in range(CHANGING)]
         await subscription.subscribe_data_change(nodes, queuesize=20)

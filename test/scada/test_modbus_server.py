@@ -36,7 +36,7 @@ from pymodbus.client import ModbusTcpClient
 from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY, NO_RESPONSE = 1, 2, 3, 6, 11
-PATIENCE = 1.5  # s of wall time that the server has with who is silent
+LONG, SHORT = 600.0, 0.2  # s of wall time that the server has with who is silent
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
 
 
@@ -49,6 +49,11 @@ class Line:
     rows: dict[str, Row]
     server: ModbusServer
     client: ModbusTcpClient
+
+    def lose_patience(self) -> None:
+        """From now on with whoever has been silent."""
+        assert self.server._server is not None
+        self.server._server.silence = SHORT
 
     def advance(self, ticks: int = 1) -> None:
         for _ in range(ticks):
@@ -100,10 +105,10 @@ def line(request: pytest.FixtureRequest) -> Iterator[Line]:
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     source = TickSource(simulation)
     rows = modbus_map(source.about.tags)
-    server = ModbusServer(source, rows, role, silence=PATIENCE)
+    server = ModbusServer(source, rows, role, silence=LONG)
     with ServerThread() as thread:
         thread.run(server.start())
-        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=20) as client:
+        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=60) as client:
             yield Line(simulation, source, {row.name: row for row in rows}, server, client)
         thread.run(server.stop())
 
@@ -226,7 +231,7 @@ def test_packets_that_are_none_end_nothing(line: Line) -> None:
         b"GET / HTTP/1.1\r\n\r\n",
     ]
     for packet in noise:
-        with socket.create_connection(("127.0.0.1", line.server.port), timeout=20) as raw:
+        with socket.create_connection(("127.0.0.1", line.server.port), timeout=60) as raw:
             raw.sendall(packet)
     assert not line.write(SETPOINT, 0.1).isError()
     line.advance()
@@ -235,14 +240,14 @@ def test_packets_that_are_none_end_nothing(line: Line) -> None:
 
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
     address = ("127.0.0.1", line.server.port)
-    many = [socket.create_connection(address, timeout=20) for _ in range(MOST_CLIENTS + 8)]
+    many = [socket.create_connection(address, timeout=60) for _ in range(MOST_CLIENTS + 8)]
     many[-1].settimeout(20)
     assert many[-1].recv(1) == b""  # closed by the server
     assert line.server.status().clients == MOST_CLIENTS
     for one in many:
         one.close()
     assert line.read(SPEED) == line.read(SPEED)
-    with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=20) as another:
+    with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=60) as another:
         assert not another.read_coils(0).isError()
 
 
@@ -256,7 +261,7 @@ def test_a_port_that_is_taken_is_said(line: Line) -> None:
 @controller
 def test_the_first_to_write_holds_the_line_until_it_leaves(line: Line) -> None:
     assert not line.write(SETPOINT, 0.1).isError()
-    with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=20) as another:
+    with ModbusTcpClient("127.0.0.1", port=line.server.port, timeout=60) as another:
         address = line.rows[SETPOINT].address
         words = another.convert_to_registers(0.2, another.DATATYPE.FLOAT32)
         assert another.write_registers(address, words).exception_code == BUSY  # before the tick, too
@@ -276,12 +281,13 @@ def test_the_first_to_write_holds_the_line_until_it_leaves(line: Line) -> None:
 @controller
 def test_who_is_silent_no_longer_holds_the_line(line: Line) -> None:
     """As when its cable is cut: nothing ends the connection."""
-    with socket.create_connection(("127.0.0.1", line.server.port), timeout=20) as silent:
+    with socket.create_connection(("127.0.0.1", line.server.port), timeout=60) as silent:
         speed = struct.pack(">f", 0.1)
         silent.sendall(struct.pack(">HHHBBHHB", 1, 0, 11, 1, 16, line.rows[SETPOINT].address, 2, 4) + speed)
         assert silent.recv(64)[7] == 16
         line.advance()
         assert line.simulation.line.modes.owner
+        line.lose_patience()
         line.advance_until(lambda: not line.simulation.line.modes.owner, "the end of its patience")
         assert not line.write(SETPOINT, 0.2).isError()
 
@@ -314,7 +320,7 @@ def test_what_is_lost_is_not_read_as_if_it_were_there(line: Line) -> None:
     server = ModbusServer(view, list(line.rows.values()), "controller")
     with ServerThread() as thread:
         thread.run(server.start())
-        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=20) as client:
+        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=60) as client:
             speed = line.rows[SPEED].address
             assert client.read_input_registers(speed, count=2).exception_code == NO_RESPONSE
             view.show()
@@ -372,9 +378,10 @@ def test_who_asks_and_never_reads_is_cut_off(line: Line) -> None:
 
 def test_who_is_connected_and_silent_makes_room(line: Line) -> None:
     address = ("127.0.0.1", line.server.port)
-    silent = [socket.create_connection(address, timeout=20) for _ in range(MOST_CLIENTS)]
-    time.sleep(2 * PATIENCE)
-    with ModbusTcpClient(*address[:1], port=address[1], timeout=20) as another:
+    silent = [socket.create_connection(address, timeout=60) for _ in range(MOST_CLIENTS)]
+    line.lose_patience()
+    time.sleep(2 * SHORT)
+    with ModbusTcpClient(*address[:1], port=address[1], timeout=60) as another:
         assert not another.read_coils(0).isError()
     for one in silent:
         one.close()

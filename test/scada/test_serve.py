@@ -47,7 +47,7 @@ def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
 ) -> None:
     options = ["--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--web", "0", "--out", "bag"]
     served = command(SCENE, *options)
-    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
+    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=60) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
         give(client, 0.25)
         until(lambda: speed_of(client) == 0.25, "the speed")
@@ -70,11 +70,11 @@ def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
 
 def test_a_recording_is_served(command: Callable[..., Served], tmp_path: Path) -> None:
     first = command(SCENE, "--modbus", "0", "--out", "bag", "--duration", "2", "--real-time-factor", "0")
-    with ModbusTcpClient("127.0.0.1", port=first.port, timeout=20) as client:
+    with ModbusTcpClient("127.0.0.1", port=first.port, timeout=60) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
     assert "recorded to bag" in first.end()
     second = command("bag", "--modbus", "0", "--loop")
-    with ModbusTcpClient("127.0.0.1", port=second.port, timeout=20) as client:
+    with ModbusTcpClient("127.0.0.1", port=second.port, timeout=60) as client:
         until(lambda: speed_of(client) == 0.5, "the recording")
         assert client.write_coil(0, True).exception_code == 1
     assert "recorded" not in second.end(signal.SIGTERM)
@@ -105,7 +105,7 @@ def test_a_server_that_is_killed_leaves_a_whole_recording_and_its_port(
 
 def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_path: Path) -> None:
     served = command(SCENE, "--modbus", "0", "--out", "bag")
-    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
+    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=60) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
         os.kill(served.simulator, signal.SIGKILL)
         until(lambda: speed_of(client) is None, "exception 11")
@@ -118,7 +118,7 @@ def test_the_process_that_simulates_may_die(command: Callable[..., Served], tmp_
 def test_a_recording_that_a_full_disk_ended_is_said_at_the_end(command: Callable[..., Served], tmp_path: Path) -> None:
     """By a limit of the size of files, which the system keeps as it does that of the disk."""
     served = command(SCENE, "--modbus", "0", "--out", "bag")
-    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=20) as client:
+    with ModbusTcpClient("127.0.0.1", port=served.port, timeout=60) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
     (file,) = (tmp_path / "bag").glob("*.mcap")
     resource.prlimit(served.simulator, resource.RLIMIT_FSIZE, (file.stat().st_size, file.stat().st_size))

@@ -95,7 +95,7 @@ class ModbusPlc:
         )
         await self._server.serve_forever(background=True)
         port = self._server.transport.sockets[0].getsockname()[1]  # type: ignore[union-attr,attr-defined]
-        self._client = AsyncModbusTcpClient("127.0.0.1", port=port)
+        self._client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=60)
         await self._client.connect()
         self._task = asyncio.create_task(self._run())
         return f"modbus://127.0.0.1:{port}"

@@ -28,7 +28,7 @@ def by_modbus(host: str, port: int, scans: int | None) -> None:
     from conveyor_sim.scene import load_scene
 
     rows = {row.name: row for row in modbus_map(image_of(load_scene("config/scenarios/zoned_line.yaml")).tags)}
-    with ModbusTcpClient(host, port=port) as client:
+    with ModbusTcpClient(host, port=port, timeout=60) as client:
         word = client.DATATYPE.UINT32
         done = 0
         while scans is None or done < scans:
@@ -49,7 +49,7 @@ async def by_opcua(address: str, scans: int | None) -> None:
     """The tick is monitored, as it is the last of all values that change."""
     from asyncua import Client, ua
 
-    client = Client(address)
+    client = Client(address, timeout=60, watchdog_intervall=60)
     client.set_user("plc")
     client.set_password(os.environ["CONVEYOR_SIM_PASSWORD"])
     await client.set_security_string(SECURITY.format(*await own_certificate()))

@@ -30,7 +30,8 @@ def test_the_example_of_the_page_passes(pytester: pytest.Pytester) -> None:
 
 def test_an_operator_takes_a_belt_in_hand_and_the_recording_replays(opcua: Any, tmp_path: Path) -> None:
     with Scenario("scenarios/zoned_line", bag=tmp_path / "bag") as line:
-        client = Client(opcua(line, users={"jo": ("operator", "geheim")}).address, timeout=60)
+        server = opcua(line, users={"jo": ("operator", "geheim")})
+        client = Client(server.address, timeout=60, watchdog_intervall=60)
         client.set_user("jo")
         client.set_password("geheim")
         with client:

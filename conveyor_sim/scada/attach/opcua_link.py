@@ -46,7 +46,8 @@ class OpcUaLink:
 
     async def connect(self) -> None:
         """Reach it, and find the type of each variable."""
-        client = Client(self._url, timeout=PATIENCE)
+        # By itself it leaves a server that has not answered for a second.
+        client = Client(self._url, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         if self._user:
             client.set_user(self._user)
             client.set_password(self._password)

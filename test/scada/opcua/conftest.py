@@ -113,7 +113,7 @@ class Line:
 
     def client(self, user: str = "", password: str = PASSWORD, security: str = "") -> Client:
         """A new one, connected; it is closed with the test."""
-        client = Client(self.server.address, timeout=PATIENCE)
+        client = Client(self.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         if user:
             client.set_user(user)
             client.set_password(password)

@@ -105,7 +105,7 @@ def test_one_connection_begins_one_session(line: Line) -> None:
     """The library would keep each for ever."""
 
     async def come() -> int:
-        client = AsyncClient(line.server.address, timeout=PATIENCE)
+        client = AsyncClient(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         async with client:
             before = len(sessions())
             for _ in range(5):
@@ -123,7 +123,7 @@ def test_one_connection_begins_one_session(line: Line) -> None:
 def test_long_strings_are_refused(line: Line) -> None:
 
     async def write(length: int) -> None:
-        client = AsyncClient(line.server.address, timeout=PATIENCE)
+        client = AsyncClient(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         client.set_user("controller")
         client.set_password(PASSWORD)
         async with client:
@@ -142,7 +142,7 @@ def test_subscriptions_of_a_client_that_is_gone_are_not_kept(line: Line, monkeyp
     monkeypatch.setattr(session, "UNFETCHED", 4.0)  # as long as a busy machine may forget a client that is there
 
     async def come_and_vanish() -> None:
-        client = AsyncClient(line.server.address, timeout=PATIENCE)
+        client = AsyncClient(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         await client.connect()
         subscription = await client.create_subscription(100, _Deaf())
         await subscription.subscribe_data_change(client.get_node(f"ns=2;s={SETPOINT}"))
@@ -178,7 +178,7 @@ def test_three_clients_that_write_as_fast_as_they_can(line: Line) -> None:
 
         clients = []
         for _ in range(3):
-            client = AsyncClient(line.server.address, timeout=PATIENCE)
+            client = AsyncClient(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
             client.set_user("controller")
             client.set_password(PASSWORD)
             await client.connect()

@@ -60,7 +60,7 @@ def test_that_of_a_recording_is_its_own_up_to_its_place(tmp_path: Path, certific
         server = OpcUaServer(source, stamps="simulated", certificates=certificates, history=["belts/zone1/cmd_speed"])
         thread.run(server.start())
         try:
-            with Client(server.address, timeout=PATIENCE) as client:
+            with Client(server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE) as client:
                 node = client.get_node("ns=2;s=belts/zone1/cmd_speed")
                 end = START + timedelta(days=1)
                 assert values(node.read_raw_history(START, end)) == [(0.5, START)]

@@ -97,7 +97,7 @@ STRANGERS = [
 
 def test_who_is_not_known_is_not_let_in(line: Line) -> None:
     async def come(name: str, password: str) -> None:
-        client = AsyncClient(line.server.address, timeout=PATIENCE)
+        client = AsyncClient(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         client._username, client._password = name, password
         async with client:
             await client.get_node(f"ns=2;s={SETPOINT}").write_value(0.1)
@@ -138,7 +138,7 @@ class _Again(AsyncClient):
 
 
 async def _come(kind: type[AsyncClient], address: str) -> None:
-    client = kind(address, timeout=PATIENCE)
+    client = kind(address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
     client.set_user("operator")
     client.set_password(PASSWORD)
     async with client:
@@ -299,7 +299,7 @@ async def _steal(address: str, tokens: Sequence[ua.NodeId]) -> None:
     """Begin with the session of somebody else, by the token that stands for it, and write in their name."""
     setpoint = ua.WriteValue(ua.NodeId(SETPOINT, 2), ua.AttributeIds.Value, None, ua.DataValue(ua.Variant(0.5)))
     for token in tokens:
-        thief = AsyncClient(address, timeout=PATIENCE)
+        thief = AsyncClient(address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         await thief.connect_socket()
         try:
             await thief.send_hello()
