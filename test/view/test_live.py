@@ -578,7 +578,8 @@ def test_a_command_given_on_the_page_is_in_the_recording_which_replays(
             set_speed(page, "0.2")
             soon(page, lambda: source.shown.values[SPEED] == 0.2, "the belt is slow")
             row = page.locator("#panel_device tr", has_text="cmd_speed").first
-            soon(page, lambda: "by operator web jo" in row.inner_text() or "web jo" in row.inner_text(), "who did it")
+            soon(page, lambda: "by web jo since" in row.inner_text(), "who did it")
+            page.locator("#panel_device tr", has_text="by scene since 0.00 s").first.wait_for()
             assert "1 client, 2 written, 0 refused" in serving.progress()
     report = replay(tmp_path / "bag")
     assert report.exact and report.difference is None

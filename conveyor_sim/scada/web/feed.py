@@ -51,6 +51,7 @@ class Feed:
         self._picture, self._shown = source.picture, source.shown
         self._story = self._new_story()
         self._told = 0.0
+        self._due = False  # whether those who look are told of something soon
         self._heard = 0
         self._status: dict[str, Any] = {}
         self._frame: tuple[Any, bytes] = None, b""
@@ -78,7 +79,6 @@ class Feed:
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             self._status = {}
             self._task = asyncio.create_task(self._run())
-        self._tell_all()  # what happened before is in what the new one begins with
         self._viewers.add(viewer)
         viewer.began = False
         viewer.on_ready = self._changed.set
@@ -116,15 +116,17 @@ class Feed:
             self._story, (self._heard, _) = self._new_story(), self._source.events(0)
             for viewer in self._viewers:
                 viewer.began = False
-        now = time.monotonic()
-        if now > self._told + STORY:
+        self._look()
+        now, new = time.monotonic(), [one for one in self._viewers if not one.began or (one.lagging and one.free)]
+        if new or now > self._told + STORY:  # what happened before is in what a new one begins with
             self._told = now
             self._tell_all()
-        elif self._source.events(self._heard)[1]:
-            asyncio.get_running_loop().call_later(STORY, self._changed.set)
-        for viewer in [*self._viewers]:
-            if not viewer.began or (viewer.lagging and viewer.free):
-                self._begin(viewer)
+        elif not self._due:
+            self._due = True
+            asyncio.get_running_loop().call_later(STORY, self._tell_later)
+        for viewer in new:
+            self._begin(viewer)
+        for viewer in self._viewers:
             if viewer.ready and not viewer.lagging and viewer.seen != (key := self._key()):
                 viewer.seen = key
                 viewer.show(self._frame_of(key))
@@ -150,11 +152,19 @@ class Feed:
         viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
         viewer.began, viewer.seen = True, None
 
+    def _tell_later(self) -> None:
+        """Even if nothing else happens."""
+        self._due = False
+        self._changed.set()
+
+    def _look(self) -> None:
+        """Note what has happened, at the tick at which it has."""
+        self._heard, events = self._source.events(self._heard)
+        self._story.look(self._shown, self._picture, events)
+
     def _tell_all(self) -> None:
         """Those who look already, what has happened since the last time."""
-        total, events = self._source.events(self._heard)
-        self._heard = total
-        self._story.look(self._shown, self._picture, events)
+        self._look()
         data = self._story.take()
         is_new = data["events"]["at"] or any(what for name, what in data.items() if name != "events")
         messages = [text_message("story", **data)] if is_new else []

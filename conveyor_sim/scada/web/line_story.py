@@ -35,3 +35,12 @@ class LineStory(Story):
                 self.add(topic, what, int(what.tick))
             else:
                 self.add(topic, what, shown.tick)
+
+    def _readback(self, message: Any, time: float) -> None:
+        """With the ticks from which on commands are what they are, which may be before the first look."""
+        before = len(self.data["readback"])
+        super()._readback(message, time)
+        rows = self.data["readback"][before:]
+        for row in rows:
+            row[0] = self._time(int(message.since[row[1]]))
+        self.data["readback"][before:] = sorted(rows, key=lambda row: float(row[0]))
