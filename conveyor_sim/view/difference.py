@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,21 +101,19 @@ class Comparison:
         """For the page: as `find`."""
         return [vars(one) for one in self.find(number)]
 
-    def find(self, number: int = 0, kinds: Collection[str] = tuple(KINDS)) -> list[Difference]:
+    def find(self, number: int = 0) -> list[Difference]:
         """The first difference of each kind in a stretch, from 0 on, where there is one. Raises BagError."""
         start = self._first + number * self._length
         stop = min(start + self._length, self._last + 1)
         batch = max(1, round(_BATCH * 1e9 / self._tick_ns))
         found: dict[str, Difference] = {}
         for begin in range(start, stop, batch):
-            wanted = [kind for kind in KINDS if kind in kinds and kind not in found]
+            wanted = [kind for kind in KINDS if kind not in found]
             a, b = (self._messages(stamps, wanted, begin, min(begin + batch, stop)) for stamps in self._stamps)
             for tick in sorted(a.keys() | b.keys()):
                 for kind in wanted:
-                    if (
-                        kind not in found
-                        and (one := self._at(kind, tick, a.get(tick, {}), b.get(tick, {}))) is not None
-                    ):
+                    one = None if kind in found else self._at(kind, tick, a.get(tick, {}), b.get(tick, {}))
+                    if one is not None:
                         found[kind] = one
         return sorted(found.values(), key=lambda one: one.tick)
 
