@@ -7,7 +7,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.observers.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
-from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, SPRINGS, find_stored_energy
+from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, SPRINGS, stored_energy
 from conveyor_sim.engine.threads.workers import workers
 from conveyor_sim.observe.ledger import Ledger, balance
 from conveyor_sim.state import State
@@ -77,9 +77,7 @@ class EnergyAccount:
         return gained
 
     def _stored(self) -> F8:
-        energy = np.zeros(4)
-        find_stored_energy(self._state.world, self._found, energy)
-        return energy
+        return stored_energy(self._state.world, self._found)
 
     def _work(self) -> F8:
         ledger = self._state.world.ledger

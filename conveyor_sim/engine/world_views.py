@@ -1,28 +1,54 @@
 """The World with fewer groups: what takes it is compiled once for all that differ only in the groups left out.
 
 Numba compiles for the types of a World, that is for the groups that are there. The groups of an integrator are nothing
-to the forces, and what forces alone need is nothing to the lists.
+to the forces, what forces alone need is nothing to the lists, and who only looks at contacts needs neither.
 """
 
 from typing import Any
 
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.engine.compiler.groups import without
+from conveyor_sim.engine.compiler.groups import fewer, without
+from conveyor_sim.engine.contact.laws import DAMPING
 
 NOT_FOR_FORCES = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
-NOT_FOR_LISTS = NOT_FOR_FORCES | {
-    "spin", "load", "path", "implicit", "riding", "curves", "rail_law", "static_friction", "ledger",
+_FORCES_OF_PAIRS = frozenset(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent", "parts"))
+NOT_FOR_LISTS = NOT_FOR_FORCES | _FORCES_OF_PAIRS | {
+    "spin", "load", "path", "implicit", "riding", "curves", "pair_law", "pairs.law", "rail_law", "static_friction",
+    "ledger", "moving.actuators", "moving.springs", "settings.atan",
+}  # fmt: skip
+NOT_FOR_CONTACTS = NOT_FOR_FORCES | _FORCES_OF_PAIRS | {
+    "load", "path", "implicit", "riding", "neighbourhood", "probe", "slots", "pairs.reach", "pairs.radius_i",
+    "pair_law", "grid", "railed", "moving.actuators", "belts", "surface", "footing", "ring", "static_friction",
+    "ledger",
+}  # fmt: skip
+_LOSSES = ("friction", "tangential_damping", *(law.column for law in DAMPING))
+NOT_FOR_ENERGY = NOT_FOR_CONTACTS - {"static_friction"} | {
+    "settings.atan", *(f"{law}.{column}" for law in ("pairs.law", "rail_law") for column in _LOSSES)
 }  # fmt: skip
 
 
 def lists_of(world: World) -> World:
     """The World for `rebuild`, and for a look at the overlaps; from Python."""
-    absent: dict[str, Any] = dict.fromkeys(NOT_FOR_LISTS)
-    return world._replace(**absent)
+    return _fewer(world, NOT_FOR_LISTS)
 
 
-for_forces: Any = without(World, NOT_FOR_FORCES)
+def contacts_of(world: World) -> World:
+    """The World for a list of contacts; from Python."""
+    return _fewer(world, NOT_FOR_CONTACTS)
+
+
+def energy_of(world: World) -> World:
+    """The World for the energy that it stores; from Python."""
+    return _fewer(world, NOT_FOR_ENERGY)
+
+
+def _fewer(world: World, names: frozenset[str]) -> World:
+    fewer_groups: World = fewer(world, names)
+    return fewer_groups
+
+
+for_forces: Any = without(NOT_FOR_FORCES)
 """The World for all in `forces.py`; for kernels."""
 
-for_lists: Any = without(World, NOT_FOR_LISTS)
+for_lists: Any = without(NOT_FOR_LISTS)
 """The same as `lists_of`, for kernels."""

@@ -12,7 +12,7 @@ from conveyor_sim.engine.arrays.damage import bin_columns, lasting_columns, slot
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
 from conveyor_sim.engine.arrays.moving import present
 from conveyor_sim.engine.lists.near import drop_near_springs
-from conveyor_sim.engine.lists.neighbours import drop_springs
+from conveyor_sim.engine.lists.neighbours import drop_springs, fill_column
 from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.model import Model
@@ -227,6 +227,16 @@ class State:
             needed = rebuild(lists_of(self.world))
             if self.world.neighbourhood.stale[0]:
                 self._lengthen_lists(*needed)
+            else:
+                self._fill_laws()
+
+    def _fill_laws(self) -> None:
+        """The coefficients by pair; one column after the other, so that no combination of laws has to be compiled."""
+        pairs, tables = self.world.pairs, self.world.pair_law
+        if pairs is not None and tables is not None:
+            for column, table in zip(pairs.law, tables, strict=True):
+                if column is not None:
+                    fill_column(column, table, pairs.i, pairs.j, pairs.used, self.world.bottles.type)
 
     def _resize(self, slots: int) -> None:
         """Room for more bottles; lists stay as they are, for tangential springs are remembered by them."""

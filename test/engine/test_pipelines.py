@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.compiler.groups import group, without
+from conveyor_sim.engine.compiler.groups import fewer, group, without
 from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
 
 
@@ -100,7 +100,7 @@ def test_an_absent_member_among_several_taken_at_once_is_pruned() -> None:
 
 def test_a_group_without_some_members() -> None:
     """What is left out is `None` for whatever takes the view."""
-    view = without(Outer, ["inner"])
+    view = without(["inner"])
 
     @part
     def has_inner(outer: Any) -> int:
@@ -113,6 +113,32 @@ def test_a_group_without_some_members() -> None:
         return has_inner(outer), has_inner(view(outer)), view(outer).sums[0]
 
     assert both(Outer(OUTER.inner, np.array([7.0]))) == (1, 0, 7.0)
+
+
+def test_a_group_without_members_of_members() -> None:
+    """From Python and in kernels alike: the same type, so that what takes it is compiled once."""
+    view = without(["inner.values"])
+
+    @part
+    def first(outer: Any) -> float:
+        if outer.inner.values is None:
+            return outer.inner.factor
+        return outer.inner.values[0]
+
+    @kernel
+    def first_of_view(outer: Any) -> Any:
+        return first(outer), first(view(outer)), typed(view(outer))
+
+    @kernel
+    def typed(outer: Any) -> float:
+        return first(outer) + outer.sums[0]
+
+    outer = Outer(Inner(np.array([5.0]), 3.0), np.array([7.0]))
+    assert first_of_view(outer) == (5.0, 3.0, 10.0)
+    fewer_members = fewer(outer, frozenset({"inner.values"}))
+    assert (fewer_members.inner.values, fewer_members.inner.factor, fewer_members.sums) == (None, 3.0, outer.sums)
+    assert typed(fewer_members) == 10.0
+    assert len(typed.signatures) == 1
 
 
 def test_a_part_is_linked_whoever_calls_it_first() -> None:

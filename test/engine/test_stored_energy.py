@@ -8,7 +8,7 @@ import pytest
 from scenes import NO_FLOOR, RADIUS, bottle, contact, kind, polyline, scene
 from worlds import ALONE, FAR, rail_forces, rail_scene, state_of
 
-from conveyor_sim.engine.observers.stored_energy import ELASTIC, KINETIC, SPRINGS, find_stored_energy
+from conveyor_sim.engine.observers.stored_energy import ELASTIC, KINETIC, SPRINGS, stored_energy
 from conveyor_sim.state import State
 
 DEEP = 0.004
@@ -16,9 +16,7 @@ DEEP = 0.004
 
 
 def stored(state: State) -> np.ndarray:
-    energy = np.full(4, math.nan)
-    find_stored_energy(state.world, ALONE.found, energy)
-    return energy
+    return stored_energy(state.world, ALONE.found)
 
 
 def test_contacts_hold_what_their_laws_take_up() -> None:

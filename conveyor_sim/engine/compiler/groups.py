@@ -7,7 +7,8 @@ nothing is left of the copies but the few values that are used.
 """
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any, TypeVar
 
 from numba.core import cgutils, types
@@ -31,25 +32,64 @@ def group(cls: Class) -> Class:
     return cls
 
 
-def without(cls: type, names: Iterable[str]) -> Any:
-    """For kernels: a function from a group to one of the same class without some of its members."""
+def without(names: Iterable[str]) -> Any:
+    """For kernels: a function from a group to one of the same class without some of its members (as `fewer` has it)."""
     absent = frozenset(names)
 
     @intrinsic
-    def fewer(_context: Any, whole: Any) -> Any:
-        pairs = zip(whole.fields, whole.types, strict=True)
-        kept = Group([types.none if name in absent else member for name, member in pairs], cls)
+    def fewer_members(_context: Any, whole: Any) -> Any:
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            return _stored_without(context, builder, whole, arguments[0], absent)
 
-        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            members = [
-                context.get_dummy_value() if name in absent else _member(builder, arguments[0], place)
-                for place, name in enumerate(whole.fields)
-            ]
-            return _store(context, builder, signature.return_type, members)
+        return _type_without(whole, absent)(whole), code
 
-        return kept(whole), code
+    return fewer_members
 
-    return fewer
+
+def fewer(whole: Any, names: frozenset[str]) -> Any:
+    """From Python: a group with None in place of some members. `pairs.law`: member `law` of member `pairs`."""
+    if whole is None:
+        return None
+    mine, inner = _by_member(names)
+    return whole._replace(
+        **dict.fromkeys(mine), **{name: fewer(getattr(whole, name), inside) for name, inside in inner.items()}
+    )
+
+
+@cache
+def _by_member(names: frozenset[str]) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
+    """Those of a group's own members, and those of members of members, by member."""
+    split = [name.partition(".") for name in names]
+    inner = {member for member, _, inside in split if inside}
+    return (
+        frozenset(member for member, _, inside in split if not inside),
+        {member: frozenset(inside for owner, _, inside in split if inside and owner == member) for member in inner},
+    )
+
+
+def _type_without(whole: Any, names: frozenset[str]) -> Any:
+    mine, inner = _by_member(names)
+    members = [
+        types.none if name in mine else _type_without(member, inner[name]) if _has(member, name, inner) else member
+        for name, member in zip(whole.fields, whole.types, strict=True)
+    ]
+    return Group(members, whole.instance_class)
+
+
+def _has(member: Any, name: str, inner: Mapping[str, Any]) -> bool:
+    """Whether a member, if it is there at all, has members that are to be left out."""
+    return name in inner and isinstance(member, Group)
+
+
+def _stored_without(context: Any, builder: Any, whole: Any, value: Any, names: frozenset[str]) -> Any:
+    mine, inner = _by_member(names)
+    members = []
+    for place, (name, member) in enumerate(zip(whole.fields, whole.types, strict=True)):
+        taken = context.get_dummy_value() if name in mine else _member(builder, value, place)
+        if _has(member, name, inner):
+            taken = _stored_without(context, builder, member, taken, inner[name])
+        members.append(taken)
+    return _store(context, builder, _type_without(whole, names), members)
 
 
 class Group(types.NamedTuple):

@@ -10,6 +10,7 @@ from numba import uint64
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.lists.neighbours import fill_laws
 from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
 from conveyor_sim.engine.lists.riding import wake_all
 from conveyor_sim.engine.observers.guard_probe import probe_overlaps
@@ -68,6 +69,7 @@ def lists_hold(world: World, worker: Worker) -> bool:
         if worker.rank == 0:
             lower_flag(worker, MOVED)
             rebuild(for_lists(world))
+            fill_laws(world.pairs, world.pair_law, world.bottles)
             world.probe.due[0] = 1
         wait_for_all(worker)
         wake_all(world.riding, world.bottles, worker)

@@ -8,15 +8,16 @@ from typing import Any
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
 from conveyor_sim.engine.arrays.lists import Neighbourhood
+from conveyor_sim.engine.arrays.types import I8, U4
 from conveyor_sim.engine.compiler.compile import kernel, part, written
 from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
 
 
 @part
-def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell: float, skin: float) -> int:
+def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, skin: float) -> int:
     """Fill the pair list, sorted by (i, j), i < j; return the number of pairs, which may exceed its capacity.
 
-    law: by type. What is by pair (coefficients, radii, tangential springs) is filled or carried over too.
+    Radii and tangential springs by pair are filled or carried over too; coefficients, by `fill_laws` afterwards.
     """
     if pairs is None:
         return 0
@@ -49,31 +50,41 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, law: Any, cell
                             pairs.i[count] = i
                         count += 1
     pairs.used[0] = min(count, capacity)
-    _fill_laws(pairs, pairs.law, law, bottles)
     _fill_radii(pairs, pairs.reach, bottles)
     if count <= capacity:
         _put_springs_back(pairs, pairs.spring)
     return count
 
 
-@part
-def _fill(column: Any, table: Any, pairs: Pairs, bottles: Bottles) -> None:
+@kernel
+def fill_column(column: Any, table: Any, pairs_i: U4, pairs_j: U4, used: I8, types: U4) -> None:
+    """A coefficient by pair, from its table by types; both are None where no contact has that law."""
     if column is None:
         return
-    types = round(table.size**0.5)
-    for p in range(pairs.used[0]):
-        column[p] = table[bottles.type[pairs.i[p]] * types + bottles.type[pairs.j[p]]]
+    count = round(table.size**0.5)
+    for p in range(used[0]):
+        column[p] = table[types[pairs_i[p]] * count + types[pairs_j[p]]]
 
 
-_fill_laws: Any = written(
+_fill_columns: Any = written(
     "\n    ".join(
         [
-            "def function(pairs, columns, tables, bottles):",
-            *(f"fill(columns.{name}, tables.{name}, pairs, bottles)" for name in ContactLaw._fields),
+            "def function(pairs, columns, tables, types):",
+            *(
+                f"fill(columns.{name}, tables.{name}, pairs.i, pairs.j, pairs.used, types)"
+                for name in ContactLaw._fields
+            ),
         ]
     ),
-    fill=_fill,
+    fill=fill_column,
 )
+
+
+@part
+def fill_laws(pairs: Any, law: Any, bottles: Bottles) -> None:
+    """The coefficients by pair of a list made anew; law: by type."""
+    if pairs is not None:
+        _fill_columns(pairs, pairs.law, law, bottles.type)
 
 
 @part

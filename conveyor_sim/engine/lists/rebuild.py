@@ -22,11 +22,12 @@ from conveyor_sim.engine.support.footing import refresh_footing
 def rebuild(world: World) -> tuple[int, int, int, int, int]:
     """Make all lists anew; return the entries that pairs, slots, segments, arcs and belts need.
 
-    Where that is more than a list holds, the lists are incomplete and `neighbourhood.stale` is set: grow, call again.
+    Coefficients by pair are not filled, so that this is compiled once for all laws: `fill_laws` comes after it. Where
+    a list needs more than it holds, the lists are incomplete and `neighbourhood.stale` is set: grow, call again.
     """
     bottles, hood = world.bottles, world.neighbourhood
     skin = world.settings.skin
-    pairs = list_pairs(bottles, hood, world.pairs, world.pair_law, world.settings.cell, skin)
+    pairs = list_pairs(bottles, hood, world.pairs, world.settings.cell, skin)
     more = fill_slots(world.pairs, world.slots)
     segments = list_near_segments(bottles, world.grid, world.segments, world.near_segments, 0.5 * skin)
     arcs = list_near_arcs(bottles, world.grid, world.arcs, world.near_arcs, 0.5 * skin)

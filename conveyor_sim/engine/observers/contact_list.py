@@ -11,6 +11,7 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.contact import contact_force
 from conveyor_sim.engine.contact.pairs import elongation, normal_and_overlap
 from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_contact, rail_elongation
+from conveyor_sim.engine.world_views import contacts_of
 
 BOTTLE_BOTTLE, BOTTLE_RAIL = 0, 1
 
@@ -109,7 +110,7 @@ def _write_force(values: F8, c: int, nx: float, ny: float, overlap: float, norma
 
 def closed_contacts(world: World, found: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
     """Every closed contact of the present state as `list_contacts` has it: kind (C,), ends (2, C), values (7, C)."""
-    room = 64
+    world, room = contacts_of(world), 64
     while True:
         kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))
         count = list_contacts(world, found, kind, ends[0], ends[1], values)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import World
@@ -11,13 +13,21 @@ from conveyor_sim.engine.contact.pairs import elongation, normal_and_overlap
 from conveyor_sim.engine.rails.deepest_contacts import law_entry
 from conveyor_sim.engine.rails.rails import find_rail_contacts, rail_elongation
 from conveyor_sim.engine.support.static_friction import anchor_energy
+from conveyor_sim.engine.world_views import energy_of
 
 KINETIC, ELASTIC, SPRINGS, BASE_SPRINGS = 0, 1, 2, 3
 
 
+def stored_energy(world: World, found: RailContacts) -> F8:
+    """The energy of all bottles, (4,), J. found: scratch. The neighbour lists must hold."""
+    energy = np.zeros(4)
+    find_stored_energy(energy_of(world), found, energy)
+    return energy
+
+
 @kernel
 def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
-    """Write the energy (J) of all bottles to energy, (4,). found: scratch. The neighbour lists must hold.
+    """Write the energy (J) of all bottles to energy, (4,).
 
     Pieces of a rail's surface that push together hold their share of a contact's: with a linear law that is exactly
     what they give back.

@@ -3,14 +3,12 @@
 import math
 from typing import Any
 
-import numpy as np
-
 from conveyor_sim.accounts.elastic import deepest_overlap
 from conveyor_sim.engine.arrays.bodies import Bottles, Spin
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.observers.guard_probe import look
-from conveyor_sim.engine.observers.stored_energy import find_stored_energy
+from conveyor_sim.engine.observers.stored_energy import stored_energy
 from conveyor_sim.state import State
 from conveyor_sim.stepping.guard.squeeze import Squeeze, squeeze_of
 from conveyor_sim.stepping.guard.violation import GuardEvent, Violation, Words
@@ -150,9 +148,7 @@ class Guard:
         return deep > DEEPEST
 
     def _energy(self) -> float:
-        energy = np.zeros(4)
-        find_stored_energy(self._state.world, self._found, energy)
-        return float(energy.sum())
+        return float(stored_energy(self._state.world, self._found).sum())
 
     def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
         """Look for the first time."""
