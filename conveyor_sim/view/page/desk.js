@@ -48,8 +48,9 @@ export class Desk {
     this.link.textContent = { locked: "● Sign in to see the line", broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
     this.link.className = state;
     this.run.textContent = state === "live" ? `${run}${reason ? `: ${reason}` : ""}` : "";
-    this.buttons.get("pause")?.toggleAttribute("hidden", run === "paused");
-    for (const what of ["resume", "step"]) this.buttons.get(what)?.toggleAttribute("hidden", run !== "paused");
+    const useful = { pause: run !== "paused", resume: run === "paused", step: run === "paused", reset: true };
+    for (const [what, button] of this.buttons) button.hidden = state !== "live" || !useful[what];
+    this.late.hidden = state !== "live";
     const { name, role } = line.person;
     this.who.textContent = name ? `${name} (${role})` : "";
     this.sign.textContent = name ? "Sign out" : "Sign in";

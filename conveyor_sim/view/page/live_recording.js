@@ -68,6 +68,7 @@ export class LiveRecording extends Recording {
 
   _bottles(read) {
     if (!read.times.length || read.times[0] < this.start) return;
+    if (!this.points) this.start = Math.max(this.start, read.times[0]); // before, not all was known
     const block = this._blockAt(read.times[0]), { forceFrames } = this.head.steps;
     if (!(read.times[0] <= block.times[block.times.length - 1])) {
       const frame = block.times.push(read.times[0]) - 1, slot = Math.floor(frame / forceFrames);
