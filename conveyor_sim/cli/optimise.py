@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -33,7 +34,7 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
         from conveyor_sim.studies.optimisation.optimise import optimise as found_by
         from conveyor_sim.studies.optimisation.optimise import wanted_of
         from conveyor_sim.studies.optimisation.search import require_optuna
-        from conveyor_sim.studies.results import read_results
+        from conveyor_sim.studies.results import PARQUET, read_results, write_parquet
         from conveyor_sim.studies.runs import Runs
         from conveyor_sim.studies.sweep import study_folder
 
@@ -49,11 +50,15 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
     except KeyboardInterrupt:
         say(f"finished runs are kept in {folder}; the same command goes on with them")
         raise
-    units = read_results(folder).units
+    results = read_results(folder)
+    units = results.units
     for line in answer(optimum, units):
         click.echo(line)
     plot_trials = None if no_pictures else plot_function("plot_trials")
     if plot_trials is not None:
         for picture in plot_trials(trials_data(setup.study.name, optimum, units), folder / "pictures"):
             click.echo(f"picture: {picture}")
-    click.echo(f"runs: {folder}, which conveyor-sim study reads")
+    if find_spec("pyarrow") is None:
+        say("no Parquet file: pyarrow is not installed (pip install 'conveyor_sim[optimise]')")
+    else:
+        click.echo(f"table: {write_parquet(results, folder / PARQUET)}")
