@@ -5,7 +5,7 @@ Nothing here waits for a tick. What the line refuses then is among its events, w
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -22,6 +22,9 @@ OPERATIONS = tuple(operation for operation in MAY if operation != DECLARE)
 
 MOST_NAMES, LONGEST_NAME = 100, 200
 """Of one request, and characters of each."""
+
+LARGEST = sys.float_info.max
+"""Of values."""
 
 
 class Person(NamedTuple):
@@ -66,10 +69,10 @@ class Commands:
             who = f"{person.name} is a viewer, who only reads" if person.name else "nobody has signed in"
             return f"{who}; expected an operator, engineer, controller or test"
         what, names, values = request.get("do"), request.get("names", []), request.get("values", [])
-        if not (_are(names, str) and _are(values, (int, float)) and all(map(math.isfinite, values))):
+        if not (_are(names, str) and _are(values, (int, float)) and all(abs(value) <= LARGEST for value in values)):
             return f"expected at most {MOST_NAMES} names and finite values"
-        if any(len(name) > LONGEST_NAME for name in names):
-            return f"expected names of at most {LONGEST_NAME} characters"
+        if not all(len(name) <= LONGEST_NAME and name.isprintable() for name in names):
+            return f"expected names of at most {LONGEST_NAME} characters that print"
         if what == "control":
             return self._control(person, person.kind, names, values)
         if not isinstance(what, str):

@@ -192,7 +192,10 @@ class WebServer:
                 case "saw":
                     viewer.saw()
                 case "ping":
-                    viewer.tell(text_message("pong", sent=request.get("sent"), now=time.time()))
+                    sent = request.get("sent")
+                    viewer.tell(
+                        text_message("pong", sent=sent if isinstance(sent, (int, float)) else 0.0, now=time.time())
+                    )
                 case "sign_in":
                     person = await self._sign_in(request, origin)
                     refused = "" if person.name else "name or password are wrong"
