@@ -52,8 +52,8 @@ def run_study(
     """Make a study, or go on with one that was interrupted: what is finished is in the folder and stays.
 
     tolerance: relative error in impacts, in resting load, and in what long runs are judged by. `report` gets each
-    answer on the way: a preliminary one of the first settings, then one without long runs; where a KeyboardInterrupt
-    comes in the midst of long runs, one with those made so far. `compiles` is called as soon as something has to be
+    answer on the way: a preliminary one of the first settings, then one without long runs; where it ends
+    in the midst of long runs, one with those made so far. `compiles` is called as soon as something has to be
     compiled. Writes study.json and CSV files.
 
     Raises ConveyorError if the folder has a study of another scene or version, SimulationError if the scene does not
@@ -66,12 +66,12 @@ def run_study(
     found = measured_once(scene, folder, tolerance, effort, bars, of_first, compiles)
     report(after_measuring(_study(scene, found, tolerance)))
     try:
-        samples, comparisons, reference = _long_runs(scene, found, folder, tolerance, effort, bars)
-    except KeyboardInterrupt:
-        report(unfinished(_study(scene, found, tolerance, *_made_so_far(scene, found, folder, tolerance))))
+        study = _study(scene, found, tolerance, *_long_runs(scene, found, folder, tolerance, effort, bars))
+        write_study(study, folder)
+    except (KeyboardInterrupt, Exception):  # in the midst of checking a setting, pydantic makes another error of Ctrl-C
+        with suppress(ConveyorError):
+            report(unfinished(_study(scene, found, tolerance, *_made_so_far(scene, found, folder, tolerance))))
         raise
-    study = _study(scene, found, tolerance, samples, comparisons, reference)
-    write_study(study, folder)
     return study
 
 
