@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 
 import click
 
 from conveyor_sim.cli.output import say
-from conveyor_sim.cli.studies import engine_of
+from conveyor_sim.cli.studies import engine_of, shown_runs
 from conveyor_sim.support.garbage import collected_later
 
 
@@ -28,28 +27,20 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
     with collected_later():
         from conveyor_sim.runs.report import plot_function
         from conveyor_sim.studies.check import check_study
-        from conveyor_sim.studies.display import Display
         from conveyor_sim.studies.load import load_study
         from conveyor_sim.studies.optimisation.answer import answer, trials_data
         from conveyor_sim.studies.optimisation.optimise import optimise as found_by
         from conveyor_sim.studies.optimisation.optimise import wanted_of
         from conveyor_sim.studies.optimisation.search import require_optuna
         from conveyor_sim.studies.results import PARQUET, read_results, write_parquet
-        from conveyor_sim.studies.runs import Runs
         from conveyor_sim.studies.sweep import study_folder
 
     require_optuna()
     setup = load_study(study)
     check_study(setup, wanted_of(setup).first(setup.study.parameters))
     folder = study_folder(setup) if out is None else out
-    try:
-        with ExitStack() as stack:
-            runs = stack.enter_context(Runs(setup, folder, engine_of(processes, dask)(), say))
-            display = stack.enter_context(Display(setup))
-            optimum = found_by(runs, setup, display.update)
-    except KeyboardInterrupt:
-        say(f"finished runs are kept in {folder}; the same command goes on with them")
-        raise
+    with shown_runs(setup, folder, engine_of(processes, dask)) as (runs, display):
+        optimum = found_by(runs, setup, display.update)
     results = read_results(folder)
     units = results.units
     for line in answer(optimum, units):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,9 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
 if TYPE_CHECKING:
+    from conveyor_sim.studies.display import Display
     from conveyor_sim.studies.engine import Engine
+    from conveyor_sim.studies.runs import Runs
     from conveyor_sim.studies.setup import Setup
 
 
@@ -72,22 +74,31 @@ def engine_of(processes: int | None, dask: str | None) -> Callable[[], Engine]:
     return lambda: DaskEngine(dask, processes, say)
 
 
-def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None:
+@contextmanager
+def shown_runs(setup: Setup, folder: Path, engine: Callable[[], Engine]) -> Iterator[tuple[Runs, Display]]:
+    """What makes the runs of a study and what shows how far they are; after a Ctrl-C it says how to go on.
+
+    Raises StudyError as `Runs`.
+    """
     from conveyor_sim.studies.display import Display
-    from conveyor_sim.studies.results import PARQUET, read_results, run_command, write_parquet
     from conveyor_sim.studies.runs import Runs
+
+    try:
+        with Runs(setup, folder, engine(), say) as runs, Display(setup) as display:
+            yield runs, display
+    except KeyboardInterrupt:
+        say(f"finished runs are kept in {folder}; the same command goes on with them")
+        raise
+
+
+def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None:
+    from conveyor_sim.studies.results import PARQUET, read_results, run_command, write_parquet
     from conveyor_sim.studies.sweep import study_folder, sweep
     from conveyor_sim.studies.table import points_table
 
     folder = study_folder(setup) if out is None else out
-    try:
-        with ExitStack() as stack:
-            runs = stack.enter_context(Runs(setup, folder, engine(), say))
-            display = stack.enter_context(Display(setup))
-            rows = sweep(runs, setup, display.update)
-    except KeyboardInterrupt:
-        say(f"finished runs are kept in {folder}; the same command goes on with them")
-        raise
+    with shown_runs(setup, folder, engine) as (runs, display):
+        rows = sweep(runs, setup, display.update)
     results = read_results(folder)
     show(points_table(rows, results.units, results.parameters))
     for row in rows:

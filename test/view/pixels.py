@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from base64 import b64decode
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
+from conveyor_sim.observe.columns import BottleColumns
 
 TYPE_COLOURS = ((0, 114, 178), (213, 94, 0))
 """Of the first two bottle types, in the colouring by type."""
@@ -51,3 +54,15 @@ def disc(pixels: np.ndarray, colour: tuple[int, int, int], x: float, y: float, r
     assert near.any(), f"nothing of {colour} near {x:.1f}, {y:.1f}"
     rows, columns = rows[near], columns[near]
     return np.array([(columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2])
+
+
+def count_where_they_are(page: Any, bottles: BottleColumns, clear: Callable[[float], bool]) -> int:
+    """See that bottles are drawn within a pixel of their places; how many. clear: x where no mark is over them."""
+    pixels, scale = canvas(page), float(page.get_attribute("#plan", "data-camera").split()[2])
+    radius = np.array([0.04, 0.035])[bottles.type] * scale
+    inside = [index for index in range(len(bottles.id)) if clear(bottles.x[index])]
+    for index in inside:
+        x, y = to_pixels(page, bottles.x[index], bottles.y[index])
+        found = disc(pixels, TYPE_COLOURS[bottles.type[index]], x, y, radius[index] + 1)
+        assert np.abs(found - [x, y]).max() <= 1.0
+    return len(inside)
