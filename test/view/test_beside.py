@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from view.conftest import opened_page
 from view.line import record
-from view.test_page import TYPE_COLOURS, canvas, clock, disc, press, seek, settled, to_pixels
+from view.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
+from view.test_page import clock, press, seek
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.view.one_file import write_page

@@ -16,7 +16,8 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from view.line import LINE
-from view.test_page import TYPE_COLOURS, canvas, clock, disc, settled, to_pixels
+from view.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
+from view.test_page import clock
 
 from conveyor_sim.bag import own_source
 from conveyor_sim.bag.messages import Header
