@@ -28,12 +28,27 @@ def test_of_what_is_steady_from_the_start_hardly_anything_is_left_out() -> None:
     assert warm_up(steady_waits(0.5, 400, 1000, seed=7)) == pytest.approx(0, abs=100)
 
 
+def test_what_is_steady_is_not_said_to_be_too_short() -> None:
+    """Though each value has 0.9 of the one before. Plain MSER-5 refuses a fifth of these."""
+    draw = np.random.default_rng(8)
+    series = np.empty((400, 200))
+    series[:, 0] = draw.normal(size=400) / math.sqrt(1.0 - 0.9**2)
+    for place in range(1, 200):
+        series[:, place] = 0.9 * series[:, place - 1] + draw.normal(size=400)
+    found = [warm_up(one) for one in series]
+    assert sum(one is None for one in found) < 0.08 * 400
+    filling = [warm_up(one - 10.0 * np.exp(-np.arange(200) / 15.0)) for one in series]
+    cut = [one for one in filling if one is not None]
+    assert len(cut) > 0.92 * 400 and 15 <= np.median(cut) <= 45
+
+
 def test_a_step_is_cut_where_it_is() -> None:
     assert warm_up([1.0] * 35 + [2.0, 2.1] * 100) == 35
 
 
 def test_what_never_settles_is_said_so() -> None:
-    assert warm_up(np.linspace(0.0, 1.0, 400)) is None
+    for count in (60, 100, 200, 400):
+        assert warm_up(np.linspace(0.0, 1.0, count)) is None
     assert warm_up([1.0] * 280 + [2.0, 2.1] * 60) is None
 
 
