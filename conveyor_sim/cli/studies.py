@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--dask", help="Workers of Dask instead: the address of a scheduler, or `local`.")
 @click.option("--set", "given", multiple=True, metavar="NAME=VALUE", help="One run alone, with --seed: a parameter.")
 @click.option("--seed", type=click.IntRange(0), help="Of the run alone.")
+@click.option("--warm-up", type=click.FloatRange(0), help="Of the run alone: s, of a study with `warm_up: mser`.")
 @click.option("--record", type=click.Path(path_type=Path), help="Of the run alone: folder to record to.")
 def sweep(
     study: Path,
@@ -36,6 +37,7 @@ def sweep(
     dask: str | None,
     given: tuple[str, ...],
     seed: int | None,
+    warm_up: float | None,
     record: Path | None,
 ) -> None:
     """Run a scene at many points and seeds, as STUDY (YAML) says.
@@ -50,10 +52,12 @@ def sweep(
         from conveyor_sim.studies.load import load_study
 
     setup = load_study(study)
-    if given or seed is not None or record is not None:
+    if given or seed is not None or warm_up is not None or record is not None:
         if not given or seed is None or out or processes or dask:
-            raise ConveyorError("--set, --seed, --record: expected --set for each parameter and --seed, and no others")
-        _alone(setup, given, seed, record)
+            raise ConveyorError(
+                "--set, --seed, --warm-up, --record: expected --set for each parameter and --seed, and no others"
+            )
+        _alone(setup, given, seed, warm_up, record)
         return
     check_study(setup)
     _sweep(setup, out, engine_of(processes, dask))
@@ -92,7 +96,7 @@ def shown_runs(setup: Setup, folder: Path, engine: Callable[[], Engine]) -> Iter
 
 
 def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None:
-    from conveyor_sim.studies.results import PARQUET, read_results, run_command, write_parquet
+    from conveyor_sim.studies.results import PARQUET, read_results, write_parquet
     from conveyor_sim.studies.sweep import study_folder, sweep
     from conveyor_sim.studies.table import points_table
 
@@ -103,8 +107,8 @@ def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None
     show(points_table(rows, results.units, results.parameters))
     for row in rows:
         if row.status != "finished":
-            click.echo(f"{row.status}: {row.error}: {run_command(setup.path, row)}")
-    click.echo(f"any run alone: {run_command(setup.path, rows[0])}")
+            click.echo(f"{row.status}: {row.error}: {results.command(row)}")
+    click.echo(f"any run alone: {results.command(rows[0])}")
     if find_spec("pyarrow") is None:
         say("no Parquet file: pyarrow is not installed (pip install 'conveyor_sim[studies]')")
     else:
@@ -112,9 +116,15 @@ def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None
     click.echo(f"pictures: conveyor-sim study {folder}")
 
 
-def _alone(setup: Setup, given: tuple[str, ...], seed: int, record: Path | None) -> None:
+def _alone(setup: Setup, given: tuple[str, ...], seed: int, warm_up: float | None, record: Path | None) -> None:
     from conveyor_sim.studies.alone import job_of, run_alone
+    from conveyor_sim.studies.study import MSER
 
+    if warm_up is None and setup.study.warm_up == MSER:
+        raise ConveyorError("--warm-up: missing, expected the seconds that the study has found, as its results say")
+    if warm_up is not None and setup.study.warm_up != MSER:
+        raise ConveyorError(f"--warm-up: {warm_up:g} given, expected none: the study has a warm_up of its own")
+    setup = setup if warm_up is None else setup.with_warm_up(warm_up)
     job = job_of(setup, given, seed)
     row = run_alone(setup, job, record)
     for name, value in row.metrics.items():
@@ -144,6 +154,8 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
     if not any(row.status == "finished" for row in found.rows):
         raise ConveyorError(f"{results}: none of its {len(found.rows)} runs has finished, expected one at least")
     show(points_table(found.rows, found.units, found.parameters))
+    if found.warm_up is not None:
+        click.echo(f"warm-up: {found.warm_up:g} s, by rule MSER-5")
     for sentence in verdicts(found):
         click.echo(sentence)
     plot_study = None if no_pictures else plot_function("plot_study")

@@ -80,8 +80,9 @@ def _problems(setup: Setup, point: Point, path: Path) -> Iterator[Problem]:
     """The first thing that is wrong with the line of a point."""
     try:
         scene = scene_of(setup, point, setup.study.seeds.first)
-        if setup.study.warm_up >= scene.duration - (setup.study.warm_start or 0.0):
-            yield Problem(("warm_up",), f"{setup.study.warm_up:g} given, expected less than a run takes (s)")
+        warm_up, whole = setup.study.warm_up, scene.duration - (setup.study.warm_start or 0.0)
+        if not isinstance(warm_up, str) and warm_up >= whole:
+            yield Problem(("warm_up",), f"{warm_up:g} given, expected less than a run takes (s)")
         controller_of(setup, point)
     except ConveyorError as error:
         yield Problem(path, str(error).splitlines()[0])

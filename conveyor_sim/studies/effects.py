@@ -71,12 +71,13 @@ def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] 
     means, halves = [], []
     for level in levels:
         by_seed: dict[int, list[float]] = {}
-        for row in _at(rows, parameter, level):
+        at_level = _at(rows, parameter, level)
+        for row in at_level:
             if row.status == "finished" and math.isfinite(row.metrics[metric]):
                 by_seed.setdefault(row.seed, []).append(row.metrics[metric])
         values = [_mean(found) for found in by_seed.values()]
         means.append(_mean(values))
-        halves.append(mean_interval(values).half_width if len(values) > 1 else math.nan)
+        halves.append(mean_interval(values).half_width if len(values) > 1 else _of_one_run(at_level, metric))
     return Response(across, title, levels, np.array(means), np.array(halves))
 
 
@@ -145,6 +146,12 @@ def _at(rows: Iterable[Row], parameter: str, level: Any) -> list[Row]:
 
 def _values(rows: Iterable[Row], metric: str) -> list[float]:
     return [row.metrics[metric] for row in rows if row.status == "finished"]
+
+
+def _of_one_run(rows: Sequence[Row], metric: str) -> float:
+    """Half width by batch means, of a level with a single run; NaN: it has none."""
+    half = rows[0].half_widths.get(metric) if len(rows) == 1 else None
+    return math.nan if half is None else half
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from conveyor_sim.errors import StudyError
 from conveyor_sim.observe.counters import LINE, CounterColumns
 from conveyor_sim.scene.words import shown
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.statistics.batch_means import batch_means
+
+COUNTING_INTERVAL = 1.0
+"""s, at which bottles are counted: too few come in less for means of them to say more."""
 
 SCUFFING_INTERVAL = 0.1
 """s, at which bottles are looked at: of one that leaves, so much at most is missed."""
@@ -26,6 +30,21 @@ class Gauge(Protocol):
 
     def value(self) -> float:
         """At the end; NaN: there is none."""
+
+
+@runtime_checkable
+class Averaged(Gauge, Protocol):
+    """One whose number is a mean over time, so that a long run alone says how well it is known."""
+
+    @property
+    def series(self) -> np.ndarray:
+        """What it is the mean of (n,), at even times."""
+
+
+def half_width(gauge: Averaged) -> float | None:
+    """Of the 95 % interval of its number, by batch means; None: the run is too short for one."""
+    found = batch_means(gauge.series)
+    return None if found is None else found.interval.half_width
 
 
 class Counted:
@@ -51,9 +70,18 @@ class Throughput:
         """device: "" for the line."""
         self._simulation, self._began = simulation, simulation.time
         self._made = Counted(simulation, device or LINE, "processed")
+        self._first, self._every = simulation.tick, max(1, round(COUNTING_INTERVAL / simulation.scene.tick))
+        self._counts = array("d", [0.0])
 
     def after_tick(self) -> None:
-        """Counters need no looking at."""
+        """Count now and then."""
+        if (self._simulation.tick - self._first) % self._every == 0:
+            self._counts.append(self._made.value())
+
+    @property
+    def series(self) -> np.ndarray:
+        """Bottles a minute (n,), in one COUNTING_INTERVAL after the other."""
+        return np.diff(np.array(self._counts)) * (60.0 / (self._every * self._simulation.scene.tick))
 
     def value(self) -> float:
         """Since the warm-up."""
@@ -143,7 +171,7 @@ class OfTag:
     """A signal over all ticks since the warm-up."""
 
     def __init__(self, simulation: Simulation, tag: str, take: str) -> None:
-        """take: "mean", "maximum", "minimum", "last" or "change"."""
+        """take: "maximum", "minimum", "last" or "change"."""
         names = simulation.process_image.signal_names
         if tag not in names:
             raise StudyError(f"{shown(tag)} given as a tag, expected a signal as `conveyor-sim tags` lists them")
@@ -163,8 +191,6 @@ class OfTag:
 
     def value(self) -> float:
         """What is taken of them."""
-        if self._take == "mean":
-            return math.fsum(self._values) / len(self._values)
         if self._take in ("maximum", "minimum"):
             return max(self._values) if self._take == "maximum" else min(self._values)
         return self._values[-1] - (self._first if self._take == "change" else 0.0)
@@ -173,13 +199,29 @@ class OfTag:
         return float(self._simulation.signals()[self._index])
 
 
+class MeanOfTag(OfTag):
+    """The mean of a signal over all ticks."""
+
+    def __init__(self, simulation: Simulation, tag: str) -> None:
+        super().__init__(simulation, tag, "mean")
+
+    @property
+    def series(self) -> np.ndarray:
+        """(n,), one a tick."""
+        return self.values
+
+    def value(self) -> float:
+        """In the unit of the tag."""
+        return math.fsum(self._values) / len(self._values)
+
+
 class Quantile:
     """A quantile of a signal over all ticks, linear between them."""
 
     def __init__(self, simulation: Simulation, of: str) -> None:
         """of: a share and a tag, "0.95 zones/table/bottles"."""
         self._share, tag = share_of(of)
-        self._signal = OfTag(simulation, tag, "mean")
+        self._signal = MeanOfTag(simulation, tag)
         self.unit = self._signal.unit
 
     def after_tick(self) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, Pilot, Row
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.files import FileError, write_file
 
@@ -21,6 +21,10 @@ ORIGIN = "study.json"
 SOURCE = "study.yaml"
 RUNS = "runs"
 STARTS = "warm_starts"
+PILOTS = "pilots"
+"""Runs that find the warm-up."""
+WARM_UP = "warm_up"
+"""What they have found, in ORIGIN."""
 VERSION = "version of conveyor_sim"
 UNITS = "units.json"
 """Of metrics and parameters, and the path of the study."""
@@ -41,6 +45,8 @@ class Journal(AbstractContextManager["Journal"]):
         """
         self.folder = folder
         self._setup = setup
+        self.warm_up: float | None = None
+        """s, as pilot runs have found it; None: they have not yet, or need not."""
         try:
             (folder / RUNS).mkdir(parents=True, exist_ok=True)
             self._lock = open(folder / ".lock", "ab")  # noqa: SIM115 (closed by __exit__)
@@ -83,6 +89,24 @@ class Journal(AbstractContextManager["Journal"]):
         """Keep a warm start. Raises StudyError if it can't be written."""
         self._write(Path(STARTS) / f"seed_{seed}.npz", content)
 
+    def pilot_of(self, job: Job) -> Pilot | None:
+        """What a pilot run has shown before; None if it is to be made."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            found = json.loads((self.folder / _pilot(job)).read_text(encoding="utf-8"))
+            if (found["parameters"], found["metrics"]) == (dict(job.parameters), dict(self._setup.metrics)):
+                return Pilot(found["part"], found["series"])
+        return None
+
+    def keep_pilot(self, job: Job, made: Pilot) -> None:
+        """Keep a pilot run. Raises StudyError if it can't be written."""
+        about = {"parameters": dict(job.parameters), "metrics": dict(self._setup.metrics)}
+        self._write(_pilot(job), json.dumps({**about, **asdict(made)}))
+
+    def keep_warm_up(self, seconds: float) -> None:
+        """Keep what pilot runs have found: that of all runs in the folder. Raises StudyError if it can't be written."""
+        self._write(Path(ORIGIN), json.dumps({**origin_of(self._setup), WARM_UP: seconds}, indent=1))
+        self.warm_up = seconds
+
     def keep_units(self, metrics: Mapping[str, str], parameters: Mapping[str, str]) -> None:
         """Keep the units of metrics and parameters. Raises StudyError if they can't be written."""
         about = {"path": self._setup.path, "units": dict(metrics), "parameters": dict(parameters)}
@@ -112,12 +136,17 @@ class Journal(AbstractContextManager["Journal"]):
             self._write(Path(ORIGIN), json.dumps(origin, indent=1))
             self._write(Path(SOURCE), self._setup.source)
             return
+        self.warm_up = found.get(WARM_UP) if isinstance(found, dict) else None
         other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
         if other:
             raise StudyError(
                 f"{self.folder}: its runs were made with another {' and another '.join(other)}, so they can't be "
                 "compared with new ones; expected another folder, or this one emptied to begin anew"
             )
+
+
+def _pilot(job: Job) -> Path:
+    return Path(PILOTS) / f"point_{job.point}_seed_{job.seed}.json"
 
 
 def origin_of(setup: Setup) -> dict[str, str]:

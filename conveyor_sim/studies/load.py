@@ -14,9 +14,9 @@ from conveyor_sim.scene.load import refused, untagged
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.studies.code import digest_of, file_of, function, located
-from conveyor_sim.studies.metrics import metric_of
+from conveyor_sim.studies.metrics import WORDS, metric_of
 from conveyor_sim.studies.setup import Setup
-from conveyor_sim.studies.study import Study
+from conveyor_sim.studies.study import MSER, Study
 from conveyor_sim.support.files import FileError, read_file
 from conveyor_sim.support.resources import scene_path
 
@@ -84,12 +84,16 @@ def _study(document: Document, name: str) -> Study:
 
 
 def _metric_problems(study: Study, folder: Path) -> list[Problem]:
-    problems = []
+    problems: list[Problem] = []
+    settling = False
     for name, what in study.metrics.items():
         try:
-            metric_of(_metric(what, folder))
+            settling = metric_of(_metric(what, folder)).series is not None or settling
         except StudyError as error:
             problems.append(Problem(("metrics", name), str(error)))
+    if study.warm_up == MSER and not settling and not problems:
+        words = ", ".join(word for word, found in WORDS.items() if found.series is not None)
+        problems.append(Problem(("warm_up",), f"{MSER} given, expected one of these metrics, which show it: {words}"))
     return problems
 
 

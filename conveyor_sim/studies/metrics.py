@@ -30,6 +30,10 @@ class Metric:
     unit: str
     """"1": it has no dimension; "": as the tag has it."""
     needs: Needs
+    series: Callable[[Simulation], Gauge] | None = None
+    """Made anew for each part of a pilot run: its values are the series by which the end of a warm-up is seen. None: it
+    is no mean or rate that settles.
+    """
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class _Word:
     of: str
     """What may or must follow: "" nothing, "[device]", "[machine]", "tag"."""
     needs: Needs = lambda _data: {}
+    series: Callable[[Simulation, str], Gauge] | None = None
 
 
 def _peaks(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,12 +63,22 @@ def _counter(column: str) -> Callable[[Simulation, str], Gauge]:
     return lambda simulation, device: gauges.Counted(simulation, device or LINE, column)
 
 
+def _mean(simulation: Simulation, tag: str) -> Gauge:
+    return gauges.MeanOfTag(simulation, tag)
+
+
 def _tag(take: str) -> Callable[[Simulation, str], Gauge]:
     return lambda simulation, tag: gauges.OfTag(simulation, tag, take)
 
 
 WORDS: Mapping[str, _Word] = {
-    "efficiency": _Word("OEE of the line against its bottleneck, or of a device", "1", _counter("oee"), "[device]"),
+    "efficiency": _Word(
+        "OEE of the line against its bottleneck, or of a device",
+        "1",
+        _counter("oee"),
+        "[device]",
+        series=gauges.Throughput,  # OEE is none where nothing is made
+    ),
     "availability": _Word("time running / planned busy time", "1", _counter("availability"), "[device]"),
     "effectiveness": _Word(
         "processed bottles / (nominal rate x time running)", "1", _counter("effectiveness"), "[device]"
@@ -74,6 +89,7 @@ WORDS: Mapping[str, _Word] = {
         "1/min",
         gauges.Throughput,
         "[device]",
+        series=gauges.Throughput,
     ),
     "failures": _Word("failures of the bottleneck, or of a machine", "1", _counter("failures"), "[machine]"),
     "stops": _Word(
@@ -90,12 +106,18 @@ WORDS: Mapping[str, _Word] = {
         "",
         _scuffing,
     ),
-    "mean": _Word("mean of a tag over all ticks", "", _tag("mean"), "tag"),
+    "mean": _Word("mean of a tag over all ticks", "", _mean, "tag", series=_mean),
     "maximum": _Word("its largest value", "", _tag("maximum"), "tag"),
     "minimum": _Word("its smallest value", "", _tag("minimum"), "tag"),
     "last": _Word("its value at the end", "", _tag("last"), "tag"),
     "change": _Word("its value at the end less that at the end of the warm-up", "", _tag("change"), "tag"),
-    "quantile": _Word("its quantile over all ticks, such as `quantile 0.95 <tag>`", "", gauges.Quantile, "number tag"),
+    "quantile": _Word(
+        "its quantile over all ticks, such as `quantile 0.95 <tag>`",
+        "",
+        gauges.Quantile,
+        "number tag",
+        series=gauges.Quantile,
+    ),
 }
 """By the first word."""
 
@@ -116,7 +138,13 @@ def metric_of(what: str) -> Metric:
         raise StudyError(f"{shown(what)} given, expected {first} with nothing behind it")
     if first == "quantile":
         gauges.share_of(rest)
-    return Metric(lambda simulation: word.make(simulation, rest), word.unit, word.needs)
+    series = word.series
+    return Metric(
+        lambda simulation: word.make(simulation, rest),
+        word.unit,
+        word.needs,
+        None if series is None else lambda simulation: series(simulation, rest),
+    )
 
 
 def _nothing(_data: Mapping[str, Any]) -> dict[str, Any]:

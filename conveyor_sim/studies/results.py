@@ -12,8 +12,9 @@ from typing import Any
 
 from conveyor_sim.errors import StudyError
 from conveyor_sim.scene import parse_overrides
-from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, VERSION, read_rows
+from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, VERSION, WARM_UP, read_rows
 from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.study import HALF_WIDTH
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.version import __version__
 
@@ -39,6 +40,8 @@ class Results:
     """Their units, "" where it is not known, or there is none."""
     versions: Mapping[str, str]
     rows: Sequence[Row]
+    warm_up: float | None = None
+    """s, where pilot runs have found it; None: as the study says."""
 
     @property
     def name(self) -> str:
@@ -47,13 +50,19 @@ class Results:
 
     def command(self, row: Row) -> str:
         """What makes a run again, alone."""
-        return run_command(self.path, row)
+        return run_command(self.path, row, self.warm_up)
+
+    @property
+    def one_run_each(self) -> bool:
+        """Whether no point has been run with two seeds."""
+        return len({row.point for row in self.rows}) == len(self.rows)
 
 
-def run_command(path: str, row: Row) -> str:
-    """What makes a run of a study file again, alone."""
+def run_command(path: str, row: Row, warm_up: float | None = None) -> str:
+    """What makes a run of a study file again, alone. warm_up: s, if pilot runs have found it."""
     given = [f"--set {name}={shlex.quote(text_of(value))}" for name, value in row.parameters.items()]
-    return " ".join(["conveyor-sim sweep", shlex.quote(path), *given, f"--seed {row.seed}"])
+    found = [] if warm_up is None else [f"--warm-up {warm_up!r}"]
+    return " ".join(["conveyor-sim sweep", shlex.quote(path), *given, f"--seed {row.seed}", *found])
 
 
 def text_of(value: Any) -> str:
@@ -71,7 +80,8 @@ def read_results(path: Path) -> Results:
         about = json.loads((path / UNITS).read_text(encoding="utf-8"))
         origin = json.loads((path / ORIGIN).read_text(encoding="utf-8"))
         versions = {"conveyor_sim": __version__, "engine": origin["engine"], "sources": origin[VERSION]}
-        return Results(study, about["path"], about["units"], about["parameters"], versions, rows)
+        units, parameters, found = about["units"], about["parameters"], origin.get(WARM_UP)
+        return Results(study, about["path"], units, parameters, versions, rows, found)
     except (OSError, ValueError, KeyError, TypeError):
         raise StudyError(
             f"{path}: not the folder of a study that has begun, expected one of conveyor-sim sweep"
@@ -108,6 +118,9 @@ def _table(results: Results) -> Any:
     for name, unit in results.units.items():
         values = [row.metrics.get(name) for row in rows]
         columns[name] = (pyarrow.array(values, pyarrow.float64()), unit)
+        if any(name in row.half_widths for row in rows):
+            halves = [row.half_widths.get(name) for row in rows]
+            columns[name + HALF_WIDTH] = (pyarrow.array(halves, pyarrow.float64()), unit)
     for name in ("status", "error"):
         columns[name] = (pyarrow.array([getattr(row, name) for row in rows], pyarrow.string()), "")
     for name, unit in FIXED_UNITS.items():
@@ -128,6 +141,7 @@ def _table(results: Results) -> Any:
         "units": dict(results.units),
         "parameters": dict(results.parameters),
         "versions": dict(results.versions),
+        WARM_UP: results.warm_up,
     }
     schema = pyarrow.schema(fields, metadata={METADATA: json.dumps(about)})
     return pyarrow.Table.from_arrays([column for column, _ in columns.values()], schema=schema)
@@ -142,7 +156,8 @@ def _of_parquet(path: Path) -> Results:
         table = parquet.read_table(path)
         about = json.loads(table.schema.metadata[METADATA.encode()])
         rows = [_row(values, about) for values in table.to_pylist()]
-        return Results(about["study"], about["path"], about["units"], about["parameters"], about["versions"], rows)
+        kept = {name: about[name] for name in ("study", "path", "units", "parameters", "versions")}
+        return Results(**kept, rows=rows, warm_up=about.get(WARM_UP))
     except (ArrowException, KeyError, TypeError, ValueError, OSError):
         raise StudyError(f"{path}: not the results of a study, expected a Parquet file of conveyor-sim sweep") from None
 
@@ -150,10 +165,12 @@ def _of_parquet(path: Path) -> Results:
 def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> Row:
     kept = ("point", "seed", "status", "error", *FIXED_UNITS, "bag")
     finished = values["status"] == "finished"
+    halves = {name: values[name + HALF_WIDTH] for name in about["units"] if name + HALF_WIDTH in values}
     return Row(
         **{name: values[name] for name in kept},
         parameters={name: values[name] for name in about["parameters"]},
         metrics={name: values[name] for name in about["units"]} if finished else {},
+        half_widths=halves if finished else {},
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -29,6 +29,16 @@ class Job:
 
 
 @dataclass(frozen=True)
+class Pilot:
+    """A run by which the end of the warm-up is seen."""
+
+    part: float
+    """s, of each of its parts."""
+    series: Mapping[str, Sequence[float]]
+    """By metric, its value in each part."""
+
+
+@dataclass(frozen=True)
 class Row:
     """What came of a run."""
 
@@ -40,6 +50,8 @@ class Row:
     """One sentence, of a run that has not finished."""
     metrics: Mapping[str, float] = field(default_factory=dict)
     """By name, in SI units or as docs/studies.md says; NaN: there is none. Empty unless finished."""
+    half_widths: Mapping[str, float | None] = field(default_factory=dict)
+    """By metric that is a mean over time: of the 95 % interval by batch means of this run; None: it is too short."""
     simulated: float = 0.0
     """s, from the start of the run or of its warm start."""
     dt: float = 0.0
@@ -55,3 +67,13 @@ class Row:
     def key(self) -> tuple[int, int]:
         """By which it is kept."""
         return self.point, self.seed
+
+
+def point_text(parameters: Mapping[str, Any]) -> str:
+    """ "length 0.7, speed 0.4"."""
+    return ", ".join(f"{name} {number(value)}" for name, value in parameters.items())
+
+
+def number(value: Any) -> str:
+    """A value of a parameter, short."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

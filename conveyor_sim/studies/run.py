@@ -20,9 +20,9 @@ from conveyor_sim.runs.compilation import compile_kernels
 from conveyor_sim.runs.controlled import Controlled
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.studies.gauges import Gauge
+from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import Job, Row
+from conveyor_sim.studies.row import Job, Row, Status
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -55,14 +55,20 @@ def make_row(work: Work) -> Row:
     try:
         row = simulate(work, bag if wanted == "all" else None, clock)
     except Exception as error:  # of the functions and controllers of whoever wrote the study, too
-        lost = isinstance(error, (BagError, MemoryError, OSError))  # of this machine: another time it may be made
-        row = replace(row, status="lost" if lost else "failed", error=_sentence(error))
+        status, said = failure_of(error)
+        row = replace(row, status=status, error=said)
         if bag is not None and wanted == "failed":
             with suppress(Exception):  # it fails again, in the same tick
                 simulate(work, bag, _Clock())
         if bag is not None and bag.exists():
             row = replace(row, bag=bag_name(job))
     return replace(row, wall=clock.wall, cpu=clock.cpu)
+
+
+def failure_of(error: Exception) -> tuple[Status, str]:
+    """What an error makes of a run, and the sentence that says it."""
+    lost = isinstance(error, (BagError, MemoryError, OSError))  # of this machine: another time it may be made
+    return "lost" if lost else "failed", _sentence(error)
 
 
 def bag_name(job: Job) -> str:
@@ -82,7 +88,7 @@ def warm_start(work: Work) -> bytes:
     controller = controller_of(work.setup, {})
     controlled = None if controller is None else Controlled(simulation, controller)
     for _ in range(round((study.warm_start or 0.0) / scene.tick)):
-        _tick(simulation, controlled, None)
+        make_tick(simulation, controlled, None)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "start.npz"
         simulation.save(path)
@@ -94,9 +100,9 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     study, job = work.setup.study, work.job
     scene = scene_of(work.setup, job.parameters, job.seed)
     controller = controller_of(work.setup, job.parameters)
-    simulation = _started(scene, work.start)
+    simulation = begun(scene, work.start)
     with nullcontext() if clock is None else clock.standing():
-        _load_kernels(simulation)
+        load_kernels(simulation)
     recorder = None if bag is None else Recorder(bag)
     try:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
@@ -105,18 +111,20 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         controlled = None if controller is None else Controlled(simulation, controller)
+        if isinstance(study.warm_up, str):
+            raise StudyError(f"warm_up: {study.warm_up} given, expected seconds, as pilot runs have found them")
         first, last = simulation.tick, scene.duration_ticks
         measured = first + round(study.warm_up / scene.tick)
         if measured >= last:
             raise StudyError(f"warm_up: {study.warm_up:g} s given, expected less than a run takes")
         try:
             while simulation.tick < measured:
-                _tick(simulation, controlled, outputs)
-            if simulation.tick and simulation.line.counters() is not None:
-                simulation.give(Input(STUDY, STUDY, "test", "reset_counters", (), ()))
+                make_tick(simulation, controlled, outputs)
+            if simulation.tick:
+                reset_counters(simulation)
             gauges = _gauges(work.setup, simulation)
             while simulation.tick < last:
-                _tick(simulation, controlled, outputs)
+                make_tick(simulation, controlled, outputs)
                 for gauge in gauges.values():
                     gauge.after_tick()
         except Exception as error:
@@ -133,13 +141,15 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
         dict(job.parameters),
         "finished",
         metrics={name: float(gauge.value()) for name, gauge in gauges.items()},
+        half_widths={name: half_width(gauge) for name, gauge in gauges.items() if isinstance(gauge, Averaged)},
         simulated=(last - first) * scene.tick,
         dt=simulation.model.dt,
         bag="" if bag is None else bag_name(job),
     )
 
 
-def _started(scene: Scene, start: Path | bytes | None) -> Simulation:
+def begun(scene: Scene, start: Path | bytes | None) -> Simulation:
+    """A line at the start of a run, or as its warm start left it."""
     if start is None:
         return Simulation(scene, threads=1)
     if isinstance(start, Path):
@@ -150,13 +160,20 @@ def _started(scene: Scene, start: Path | bytes | None) -> Simulation:
         return Simulation.load(path, threads=1, scene=scene)
 
 
-def _tick(simulation: Simulation, controlled: Controlled | None, outputs: Outputs | None) -> None:
+def make_tick(simulation: Simulation, controlled: Controlled | None, outputs: Outputs | None) -> None:
+    """One tick of a run, with a scan of its controller."""
     if controlled is not None:
         controlled.before_tick(outputs)
     simulation.advance(1)
     outcomes = simulation.take_outcomes() if outputs is None else outputs.after_tick()
     if controlled is not None:
         controlled.after_tick(outcomes)
+
+
+def reset_counters(simulation: Simulation) -> None:
+    """Have all counters of a line begin anew with the next tick."""
+    if simulation.line.counters() is not None:
+        simulation.give(Input(STUDY, STUDY, "test", "reset_counters", (), ()))
 
 
 def _gauges(setup: Setup, simulation: Simulation) -> Mapping[str, Gauge]:
@@ -177,7 +194,7 @@ def kernels_of(model: Model) -> tuple[str, ...]:
     return (model.integrator, *(choice.name for choice in model.effects if choice.on))
 
 
-def _load_kernels(simulation: Simulation) -> None:
+def load_kernels(simulation: Simulation) -> None:
     """Have them in this process."""
     kind = kernels_of(simulation.model)
     if kind not in _LOADED:

@@ -14,9 +14,11 @@ from conveyor_sim.studies.check import parameter_units, units_of
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal
 from conveyor_sim.studies.line_of import scene_of
+from conveyor_sim.studies.pilots import find_warm_up
 from conveyor_sim.studies.row import Job, Row, Status
 from conveyor_sim.studies.run import Work, kernels_of, make_row, warm_start
 from conveyor_sim.studies.setup import Setup
+from conveyor_sim.studies.study import MSER
 from conveyor_sim.support.worker_pool import DiedError, WorkerPool
 
 Progress = Callable[[int, int, float | None, Row | None], None]
@@ -44,6 +46,8 @@ class Runs(AbstractContextManager["Runs"]):
             self.journal = stack.enter_context(Journal(folder, setup))
             self._engine = stack.enter_context(WorkerPool() if engine is None else engine)
             self._stack = stack.pop_all()
+        if self.journal.warm_up is not None:
+            self._setup = setup.with_warm_up(self.journal.warm_up)
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)  # type: ignore[arg-type]
@@ -68,6 +72,10 @@ class Runs(AbstractContextManager["Runs"]):
         unstarted = self._warm(todo)
         for job in [job for job in todo if job.seed in unstarted]:
             rows[job.key] = self._keep(Row(job.point, job.seed, dict(job.parameters), *unstarted[job.seed]))
+        if self._setup.study.warm_up == MSER and len(rows) < total:
+            works = [self._work(job) for job in todo if job.key not in rows]
+            found = find_warm_up(works, self._engine, self.journal, self._say, progress)
+            self._setup = self._setup.with_warm_up(found)
         works = [self._work(job) for job in todo if job.key not in rows]
         for work, made in self._engine.each(make_row, works):
             job = work.job

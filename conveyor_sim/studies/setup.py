@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -51,6 +51,10 @@ class Setup:
         for metric in self.kept.values():
             changes = merged(changes, metric.needs(data))
         return changes
+
+    def with_warm_up(self, seconds: float) -> Setup:
+        """The same, with a warm-up that was found."""
+        return replace(self, study=self.study.model_copy(update={"warm_up": seconds}))
 
     def require_same_versions(self) -> None:
         """Raises StudyError in a process whose package or code is another: no other gives the same bits."""

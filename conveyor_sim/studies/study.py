@@ -30,6 +30,12 @@ from conveyor_sim.studies.optimisation.part import Optimise
 LEAST_BATCH = 10
 """Runs of a point, at least, before it is asked whether there are enough: of fewer the spread is hardly known."""
 
+MSER = "mser"
+"""In place of the seconds of a warm-up: pilot runs find it."""
+
+HALF_WIDTH = "_half_width"
+"""Behind the name of a metric: the column beside it that says how well the run alone knows it."""
+
 RESERVED = ("point", "seed", "status", "error", "simulated", "dt", "wall", "cpu", "bag")
 """Columns that every table of runs has."""
 
@@ -40,6 +46,7 @@ Value = StrictBool | StrictInt | StrictFloat | StrictStr
 
 _Value = Annotated[Value, Says("a number, a text, true or false")]
 _Batch = Annotated[int, Strict(), Ge(LEAST_BATCH), Says(f"a whole number, {LEAST_BATCH} or greater")]
+_WarmUp = Annotated[NotNegative | Literal["mser"], Says('a number, 0 or greater, or "mser"')]
 _Confidence = Annotated[float, Strict(), Gt(0), Lt(1), Says("a number between 0 and 1")]
 _Path = re.compile(r"[A-Za-z]\w*(\[\d+\])*(\.[A-Za-z]\w*(\[\d+\])*)*")
 
@@ -125,6 +132,10 @@ def _named(value: Any) -> Any:
     return dict(pairs)
 
 
+def _is_reserved(name: str) -> bool:
+    return name in RESERVED or name.endswith(HALF_WIDTH)
+
+
 _METRICS = (
     "a list of metrics, each a name such as efficiency, or a mapping of a name of yours to one metric, such as "
     "queue: mean zones/table/bottles; each name once"
@@ -153,7 +164,11 @@ class Study(Part):
         "Parameters of the factory, beside those that vary.", default={}
     )
     duration: Positive | None = quantity("Of each run. Left out: the scene's.", "s", default=None)
-    warm_up: NotNegative = quantity("At the start of each run, which metrics leave out.", "s", default=0.0)
+    warm_up: _WarmUp = quantity(
+        "At the start of each run, which metrics leave out; mser: as long as rule MSER-5 says, by pilot runs.",
+        "s",
+        default=0.0,
+    )
     warm_start: Positive | None = quantity(
         "For so long the line is run once a seed, with the controller as `settings` have it; every run begins there. "
         "For studies in which only the controller varies.",
@@ -197,7 +212,7 @@ class Study(Part):
         for name, parameter in self.parameters.items():
             path = ("parameters", name)
             yield from parameter.problems(path)
-            if name in RESERVED or name in self.metrics:
+            if name in self.metrics or _is_reserved(name):
                 yield Problem(path, f"{name} given as a name, expected another: runs have a column of that name")
             if parameter.argument is not None and self.function is None:
                 yield Problem((*path, "argument"), "given, expected function beside it, which takes the argument")
@@ -208,7 +223,7 @@ class Study(Part):
                     (*path,), "varies the line, expected a parameter of the controller, as runs share a warm_start"
                 )
         for name in self.metrics:
-            if name in RESERVED:
+            if _is_reserved(name):
                 yield Problem(("metrics", name), "given as a name, expected another: runs have a column of that name")
         yield from self._design_problems() if self.optimise is None else self._optimise_problems(self.optimise)
         yield from self.seeds.problems(("seeds",))

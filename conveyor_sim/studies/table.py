@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from rich.table import Table
 
-from conveyor_sim.statistics.intervals import CONFIDENCE, mean_interval
-from conveyor_sim.studies.row import Row
+from conveyor_sim.statistics.intervals import mean_interval
+from conveyor_sim.studies.row import Row, number
 
 LONGEST = 40
 """Points that a table on a terminal shows; the file has all."""
@@ -36,7 +35,7 @@ def points_table(
         lacking = len(found) - len(finished)
         runs = f"{len(finished)}" + (f", {lacking} failed" if lacking else "")
         values = [number(found[0].parameters[name]) for name in names]
-        table.add_row(*values, runs, *(spread([row.metrics[name] for row in finished]) for name in units))
+        table.add_row(*values, runs, *(_mean(finished, name) for name in units))
     if len(by_point) > longest:
         table.add_row(f"and {len(by_point) - longest} more points")
     return table
@@ -47,18 +46,14 @@ def with_unit(name: str, unit: str) -> str:
     return name if unit in ("", "1") else f"{name} ({unit})"
 
 
-def spread(values: Sequence[float]) -> str:
-    """Mean with the half width of its interval of CONFIDENCE."""
-    known = [value for value in values if math.isfinite(value)]
+def _mean(rows: Sequence[Row], metric: str) -> str:
+    """Of runs of a point, with the half width of its interval: over the seeds, or of a single run by batch means."""
+    known = [row.metrics[metric] for row in rows if math.isfinite(row.metrics[metric])]
     if not known:
         return "-"
-    found = mean_interval(known, CONFIDENCE)
-    if len(known) < 2 or found.half_width == 0.0:
+    found = mean_interval(known)
+    half = found.half_width if len(known) > 1 else rows[0].half_widths.get(metric)
+    if not half:
         return f"{found.mean:.4g}"
-    digits = max(0, 1 - math.floor(math.log10(found.half_width)))
-    return f"{found.mean:.{digits}f} ± {found.half_width:.{digits}f}"
-
-
-def number(value: Any) -> str:
-    """A value of a parameter, short."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    return f"{found.mean:.{digits}f} ± {half:.{digits}f}"

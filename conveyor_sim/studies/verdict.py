@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from conveyor_sim.statistics.comparisons import best
 from conveyor_sim.studies.results import Results
-from conveyor_sim.studies.row import Row
-from conveyor_sim.studies.table import number
+from conveyor_sim.studies.row import Row, point_text
 
 MOST = 100
 """Points that are compared, each with each."""
@@ -17,7 +16,13 @@ LISTED = 3
 
 
 def verdicts(results: Results) -> Iterator[str]:
-    """For each metric, by pairs of runs with the same seed, corrected for being so many comparisons."""
+    """For each metric, by pairs of runs with the same seed, corrected for being so many comparisons.
+
+    Of a study with one run a point, instead: which metrics that run alone has no interval for.
+    """
+    if results.one_run_each:
+        yield from _of_single_runs(results)
+        return
     by_point: dict[int, dict[int, Row]] = {}
     for row in results.rows:
         if row.status == "finished":
@@ -35,12 +40,25 @@ def verdicts(results: Results) -> Iterator[str]:
             yield f"{metric}: no point can be told from another with {len(seeds)} seeds"
             continue
         for word, (top, *others) in sides.items():
-            like = [point_text(rows[place][0]) for place in others[:LISTED]]
-            more = f" and {len(others) - LISTED} more points" if len(others) > LISTED else ""
-            rest = f"; not told from it with {len(seeds)} seeds: {'; '.join(like)}{more}" if others else ""
-            yield f"{metric}: {word} at {point_text(rows[top][0])}{rest}"
+            like = _points([rows[place][0] for place in others])
+            rest = f"; not told from it with {len(seeds)} seeds: {like}" if others else ""
+            yield f"{metric}: {word} at {point_text(rows[top][0].parameters)}{rest}"
 
 
-def point_text(row: Row) -> str:
-    """Its parameters: "length 0.7, speed 0.4"."""
-    return ", ".join(f"{name} {number(value)}" for name, value in row.parameters.items())
+def _of_single_runs(results: Results) -> Iterator[str]:
+    rows = [row for row in results.rows if row.status == "finished"]
+    averaged = [metric for metric in results.units if any(metric in row.half_widths for row in rows)]
+    if averaged:
+        yield f"one run a point: the intervals, of {', '.join(averaged)}, are by batch means of that run"
+    for metric in averaged:
+        if lacking := [row for row in rows if row.half_widths.get(metric) is None]:
+            yield (
+                f"{metric}: no interval at {_points(lacking)}: the run is too short for its batches to be independent, "
+                "expected a longer run, or more seeds"
+            )
+
+
+def _points(rows: Sequence[Row]) -> str:
+    """Some of them, and how many more there are."""
+    more = f" and {len(rows) - LISTED} more points" if len(rows) > LISTED else ""
+    return "; ".join(point_text(row.parameters) for row in rows[:LISTED]) + more

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from studies.small import Here, setup_of
+from studies.test_warm_up import FILLING
 from studies.waiting import until
 
 pytest.importorskip("distributed")
@@ -22,6 +23,7 @@ from conveyor_sim.errors import StudyError
 from conveyor_sim.studies import dask_engine
 from conveyor_sim.studies.alone import run_alone
 from conveyor_sim.studies.dask_engine import DaskEngine
+from conveyor_sim.studies.results import read_results
 from conveyor_sim.studies.row import Job, Row
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
@@ -170,3 +172,13 @@ def test_workers_of_this_machine(tmp_path: Path, expected: list[dict[str, float]
     setup = setup_of(tmp_path, parameters=RATES, duration=1.0)
     with Runs(setup, tmp_path / "out", DaskEngine("local", 2, lambda _: None)) as runs:
         assert [dict(row.metrics) for row in sweep(runs, setup)] == expected
+
+
+def test_the_warm_up_that_they_find_is_the_same(tmp_path: Path) -> None:
+    setup = setup_of(tmp_path, **FILLING)
+    with Runs(setup, tmp_path / "here", Here()) as runs:
+        here = sweep(runs, setup)
+    with Runs(setup, tmp_path / "there", DaskEngine("local", 2, lambda _: None)) as runs:
+        there = sweep(runs, setup)
+    assert [row.metrics for row in there] == [row.metrics for row in here]
+    assert read_results(tmp_path / "there").warm_up == read_results(tmp_path / "here").warm_up

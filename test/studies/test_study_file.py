@@ -50,6 +50,12 @@ RATE = {"argument": "rate", "values": [4.0]}
             {"parameters": {"x": {"argument": "x", "low": 2.0, "high": 1.0}}},
             r"x.high: 1 given, expected more than low, 2",
         ),
+        ({"warm_up": "msr"}, r'warm_up: "msr" given, expected a number, 0 or greater, or "mser"'),
+        (
+            {"warm_up": "mser", "metrics": ["stops"]},
+            r"warm_up: mser given, expected one of these metrics, .* it: efficiency, throughput, mean, quantile",
+        ),
+        ({"metrics": [{"x_half_width": "stops"}]}, r"metrics.x_half_width: given as a name, expected another"),
         ({"warm_start": 1.0}, r"parameters.rate: varies the line, expected a parameter of the controller"),
     ],
 )
