@@ -85,7 +85,7 @@ def _stored_without(context: Any, builder: Any, whole: Any, value: Any, names: f
     mine, inner = _by_member(names)
     members = []
     for place, (name, member) in enumerate(zip(whole.fields, whole.types, strict=True)):
-        taken = context.get_dummy_value() if name in mine else _member(builder, value, place)
+        taken = context.get_dummy_value() if name in mine else _member(context, builder, whole, value, place)
         if _has(member, name, inner):
             taken = _stored_without(context, builder, member, taken, inner[name])
         members.append(taken)
@@ -108,13 +108,16 @@ class Group(types.NamedTuple):
 
 @register_model(Group)
 class _GroupModel(TupleModel):
-    """Wherever numba has a value of a group, it is the address of a struct with its members."""
+    """Wherever numba has a value of a group, it is the address of a struct with its members.
+
+    The address says nothing of the struct: its type would be written out, kilobytes each, wherever a group is named.
+    """
 
     def struct(self) -> Any:
         return super().get_value_type()
 
     def get_value_type(self) -> Any:
-        return self.struct().as_pointer()
+        return cgutils.voidptr_t
 
     get_data_type = get_argument_type = get_return_type = get_value_type
 
@@ -129,27 +132,32 @@ class _GroupModel(TupleModel):
     def _copied(self, builder: Any, value: Any) -> Any:
         copy = cgutils.alloca_once(builder, self.struct())
         for place, model in enumerate(self._models):
-            member = _member(builder, value, place)
+            member = self.member(builder, value, place)
             if isinstance(model, _GroupModel):
                 member = model._copied(builder, member)
             builder.store(member, cgutils.gep_inbounds(builder, copy, 0, place))
-        return copy
+        return builder.bitcast(copy, cgutils.voidptr_t)
+
+    def member(self, builder: Any, value: Any, place: int) -> Any:
+        """Code for a member of the group at an address."""
+        struct = builder.bitcast(value, self.struct().as_pointer())
+        return builder.load(cgutils.gep_inbounds(builder, struct, 0, place))
 
 
-def _member(builder: Any, value: Any, place: int) -> Any:
-    return builder.load(cgutils.gep_inbounds(builder, value, 0, place))
+def _member(context: Any, builder: Any, group_type: Group, value: Any, place: int) -> Any:
+    return context.data_model_manager[group_type].member(builder, value, place)
 
 
 def _store(context: Any, builder: Any, group_type: Group, members: Sequence[Any]) -> Any:
     struct = cgutils.alloca_once(builder, context.data_model_manager[group_type].struct())
     for place, member in enumerate(members):
         builder.store(member, cgutils.gep_inbounds(builder, struct, 0, place))
-    return struct
+    return builder.bitcast(struct, cgutils.voidptr_t)
 
 
 @lower_getattr_generic(Group)
-def _lower_member(_context: Any, builder: Any, group_type: Group, value: Any, name: str) -> Any:
-    return _member(builder, value, group_type.fields.index(name))
+def _lower_member(context: Any, builder: Any, group_type: Group, value: Any, name: str) -> Any:
+    return _member(context, builder, group_type, value, group_type.fields.index(name))
 
 
 @unbox(Group)
