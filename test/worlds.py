@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 
-from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.forces import evaluate_forces
-from conveyor_sim.engine.threads.workers import workers
+from conveyor_sim.engine.contact.path import forget_path
+from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
+from conveyor_sim.engine.lists.riding import step_all
+from conveyor_sim.engine.threads.workers import BLOCK, workers
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.state import State
@@ -27,12 +29,21 @@ FAR = 90.0
 ALONE = workers(1)[0]
 """A thread by itself."""
 
-_evaluate_forces: Any = kernel(evaluate_forces.py_func)  # type: ignore[attr-defined]
-
 
 def evaluate(world: World, dt: float = 1e-5) -> None:
-    """Evaluate all forces of the present state into `world.load`."""
-    _evaluate_forces(world, ALONE, dt)
+    """Evaluate all forces of the present state into `world.load`; springs stay as they are."""
+    _evaluate(world, ALONE, dt)
+
+
+@kernel
+def _evaluate(world: World, worker: Worker, dt: float) -> None:
+    forget_path(world.path, world.moving, worker)
+    step_all(world.riding, world.bottles, worker)
+    pack_all(world, worker)
+    pair_phase(world, worker, dt, 0.0)
+    bottles = world.bottles.x.size
+    for first in range(0, bottles, BLOCK):
+        bottle_forces(world, worker, dt, 0.0, first, min(first + BLOCK, bottles))
 
 
 def state_of(

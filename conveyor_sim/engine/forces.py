@@ -9,9 +9,8 @@ from typing import Any
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import find_touching, pack, pair_forces
-from conveyor_sim.engine.contact.path import forget_path
 from conveyor_sim.engine.contact.slots import sum_pair_forces, sum_slots
-from conveyor_sim.engine.lists.riding import step_all, stepped_run, stepped_runs
+from conveyor_sim.engine.lists.riding import stepped_run, stepped_runs
 from conveyor_sim.engine.observers.ledger_parts import (
     add_belt_powers,
     clear_belt_powers,
@@ -25,19 +24,6 @@ from conveyor_sim.engine.support.base import add_base_friction, add_straddling_f
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
 from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
-
-
-@part
-def evaluate_forces(world: World, worker: Worker, dt: float) -> None:
-    """Fill `world.load` and `world.spin.moment` for all bottles; springs stay as they are. dt: s, of the step."""
-    forget_path(world.path, world.moving, worker)
-    step_all(world.riding, world.bottles, worker)
-    pack_all(world, worker)
-    pair_phase(world, worker, dt, 0.0)
-    begin, stop = share(worker, world.bottles.x.size)
-    for first in range(begin, stop, BLOCK):
-        bottle_forces(world, worker, dt, 0.0, first, min(first + BLOCK, stop))
-    wait_for_all(worker)
 
 
 @part

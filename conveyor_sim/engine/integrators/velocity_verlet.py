@@ -20,8 +20,8 @@ from conveyor_sim.engine.arrays.integrators import Stage
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
-from conveyor_sim.engine.contact.path import note_path
-from conveyor_sim.engine.forces import bottle_forces, evaluate_forces, pack_all, pair_phase
+from conveyor_sim.engine.contact.path import forget_path, note_path
+from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, probe_rebuilt, settle
 from conveyor_sim.engine.integrators.phase import START
 from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
@@ -44,31 +44,24 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     damage = _is_there(world.damage)
     begin, stop = share(worker, world.bottles.x.size)
     place_rails(line.moving, worker, dt)
+    # Commands and supply come in between ticks: the last forces are of another line. What is found first ends no step.
+    fresh = phase == START
+    if fresh:
+        forget_path(line.path, line.moving, worker)
+    step_all(world.riding, world.bottles, worker)
+    pack_all(line, worker)
     done = 0
-    if phase == START:
-        # Commands and supply come in between ticks: the last forces are of another line.
-        evaluate_forces(line, worker, dt)
-        if steps == 0:
-            return 0
-        note_damage(world, worker, dt)
-        for first in range(begin, stop, BLOCK):
-            _begin_step(world, line, stage, worker, dt, first, min(first + BLOCK, stop))
-        hold = lists_hold(line, worker)
-        pass_step(line.moving, line.ledger, worker, dt, True)
-        if not hold:
-            return 0
-        probe_rebuilt(line, worker)
-    else:
-        step_all(world.riding, world.bottles, worker)
-        pack_all(line, worker)
     while True:
-        done += 1
-        pair_phase(line, worker, dt, dt)
+        drawn = 0.0 if fresh else dt
+        done += not fresh
+        # One place alone has the forces: they would be compiled again for each.
+        pair_phase(line, worker, dt, drawn)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, worker, dt, dt, first, end)
-            _end_step(world, stage, dt, first, end)
-            end_look(line, stage, first, end)
+            bottle_forces(line, worker, dt, drawn, first, end)
+            if not fresh:
+                _end_step(world, stage, dt, first, end)
+                end_look(line, stage, first, end)
             if done < steps and not damage:
                 _begin_step(world, line, stage, worker, dt, first, end)
         if done == steps:
@@ -82,6 +75,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         if not hold:
             return done
         probe_rebuilt(line, worker)
+        fresh = False
 
 
 @part
