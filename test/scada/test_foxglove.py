@@ -6,6 +6,7 @@ import asyncio
 import json
 import struct
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,8 @@ def connected(address: str, act: Callable[[Client], Any]) -> Any:
         ):
             return await act(Client(socket))
 
-    return asyncio.run(asyncio.wait_for(run(), 3 * PATIENCE))
+    with ThreadPoolExecutor(1) as thread:  # a browser that tests before this one have opened keeps a loop in this one
+        return thread.submit(asyncio.run, asyncio.wait_for(run(), 3 * PATIENCE)).result()
 
 
 @pytest.fixture(scope="module")
