@@ -68,11 +68,12 @@ def told(outcomes: list[Any], words: str) -> list[Any]:
     return [outcome for outcome in outcomes if outcome.source == "arrival" and words in outcome.reason]
 
 
-def publish_slowly(publisher: Any, message: Any, count: int) -> None:
-    for number in range(count):
+def publish_slowly(line: LineClient, publisher: Any, message: Any, count: int) -> None:
+    """So that DDS loses none, however long the node waits for a core."""
+    for number in range(1, count + 1):
         publisher.publish(message)
         if number % 10 == 0:
-            time.sleep(0.02)  # so that none is lost, even if the node waits 0.2 s for a core
+            line.lockstep(0, run_id="look")  # refused; the node has taken by then what was sent before
 
 
 def test_the_queue_of_a_paused_simulation_is_bounded_by_count(
@@ -80,7 +81,7 @@ def test_the_queue_of_a_paused_simulation_is_bounded_by_count(
 ) -> None:
     before = counts(line)
     sent = MOST_WAITING + 300
-    publish_slowly(commands, GOOD, sent)
+    publish_slowly(line, commands, GOOD, sent)
     change(line, before, {"received": sent, "refused": 300, "waiting": MOST_WAITING})
     refused = sum(int(outcome.reason.split()[0]) for outcome in told(outcomes, "from commands refused: the queue was"))
     assert refused == 300
@@ -107,7 +108,7 @@ def test_large_commands_take_little_memory(line: LineClient, shared_node: Child,
 def test_the_queue_is_bounded_by_bytes(line: LineClient, commands: Any) -> None:
     names = ["x" * 100] * 2000
     before = counts(line)
-    publish_slowly(commands, Commands(names=names, values=[0.0] * 2000), 40)
+    publish_slowly(line, commands, Commands(names=names, values=[0.0] * 2000), 40)
     until(lambda: counts(line)["received"] - before["received"] == 40, "all of them")
     _, values = line.diagnostics()
     assert MESSAGE_BYTES * 10 < int(values["waiting commands (bytes)"]) <= 4 * 1024 * 1024
@@ -178,7 +179,7 @@ def test_refusals_do_not_flood_the_log(line: LineClient, shared_node: Child, com
     """And nothing in a name makes a line of its own."""
     before, begin = counts(line), len(shared_node.log.read_text())
     forged = Commands(names=["x\n[ERROR] [conveyor_sim]: forged\x1b[31m" + "y" * 5000], values=[1.0])
-    publish_slowly(commands, forged, 500)
+    publish_slowly(line, commands, forged, 500)
     change(line, before, {"received": 500, "waiting": 500})
     line.step()
     until(lambda: "490 more commands were refused; each outcome says why" in shared_node.log.read_text(), "a last line")
@@ -197,8 +198,8 @@ def test_a_recording_with_a_flood_is_replayed(
     commands = client.publisher(Commands, "commands", "commands")
     speed = client.publisher(Float64, FEEDER, "cmd_speed")
     client.step(3)
-    publish_slowly(commands, GOOD, MOST_WAITING + 100)
-    publish_slowly(commands, b"\xff" * 9, 3)
+    publish_slowly(client, commands, GOOD, MOST_WAITING + 100)
+    publish_slowly(client, commands, b"\xff" * 9, 3)
     speed.publish(Float64(data=7.0))
     until(lambda: sum(counts(client)[name] for name in ("refused", "waiting")) == MOST_WAITING + 104, "the account")
     client.step(20)
