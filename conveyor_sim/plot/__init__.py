@@ -52,7 +52,7 @@ def plot_bag(
 
     with open_bag(bag) as opened, opened.sense(), style.look():
         drawn = {name: style.rendered(draw()) for name, draw in figures_of(opened, times, bottles).items()}
-    return [path for name, pair in drawn.items() for path in write(pair, Path(out_dir) / name)]
+    return [path for name, picture in drawn.items() for path in write(picture, Path(out_dir) / name)]
 
 
 def plot_production(production: Production, out_dir: str | Path) -> list[Path]:

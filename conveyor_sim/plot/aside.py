@@ -25,7 +25,7 @@ from conveyor_sim.bag.typestore import DEFAULT
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Velocity
-from conveyor_sim.plot.files import Pair
+from conveyor_sim.plot.files import PNG, Picture
 from conveyor_sim.plot.pictures import Figures, figures_of
 from conveyor_sim.plot.series import velocity_figure
 from conveyor_sim.scene import Scene
@@ -34,10 +34,10 @@ LONGEST = ("flow", "table", "damage_rails", "energy", "plant")
 """What takes longest is drawn first, so that no process is left with it at the end."""
 
 
-Task = tuple[Path, Sequence[float] | None, Sequence[int] | None]
-"""Bag, times and bottles, as `plot_bag` takes them."""
+Task = tuple[Path, Sequence[float] | None, Sequence[int] | None, Sequence[str]]
+"""Bag, times and bottles, as `plot_bag` takes them; the suffixes of the files of each picture."""
 
-Drawn = dict[str, Pair] | str
+Drawn = dict[str, Picture] | str
 """Pictures by the names of their files, in the order in which they are listed; or a sentence that says why not."""
 
 
@@ -65,18 +65,18 @@ def get_ready() -> None:
     still = np.zeros(2)
     nothing = Velocity(0, 0, np.array([0.0, 1.0]), still, still, still.astype(np.int64))
     with style.look():
-        style.rendered(velocity_figure(nothing, ("belt",), 1.0))
+        style.rendered(velocity_figure(nothing, ("belt",), 1.0), PNG)
 
 
 def side_by_side(task: Task, processes: int, lifeline: BinaryIO | None = None) -> Drawn:
     """Draw in so many processes. They and this one are killed when the lifeline ends: this one leads their group."""
-    path, times, bottles = task
+    path, times, bottles, suffixes = task
     try:
         with open_bag(path) as bag, bag.sense(), style.look():
             figures = figures_of(bag, times, bottles)
             with ProcessPoolExecutor(min(processes, len(figures)), get_context("fork"), _share, (figures, bag)) as pool:
                 order = sorted(figures, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
-                drawn = {name: pool.submit(_draw, name) for name in order}
+                drawn = {name: pool.submit(_draw, name, suffixes) for name in order}
                 if lifeline is not None:
                     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()  # threads are not forked
                 return {name: drawn[name].result() for name in figures}
@@ -95,10 +95,10 @@ def _share(figures: Figures, bag: Bag) -> None:
     _shared = figures, bag
 
 
-def _draw(name: str) -> Pair:
+def _draw(name: str, suffixes: Sequence[str]) -> Picture:
     figures, bag = _shared
     with bag.sense():
-        return style.rendered(figures[name]())
+        return style.rendered(figures[name](), suffixes)
 
 
 def _end_with(lifeline: BinaryIO) -> None:

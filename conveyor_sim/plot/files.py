@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.files import FileError, write_file
 
-Pair = tuple[bytes, bytes]
-"""A picture as PNG and as SVG."""
+PNG: Final[Sequence[str]] = (".png",)
+PNG_AND_SVG: Final[Sequence[str]] = (".png", ".svg")
+"""Suffixes of the files that a picture is written to."""
+
+Picture = Mapping[str, bytes]
+"""Contents of its files by their suffix."""
 
 
-def write(pair: Pair, stem: Path) -> list[Path]:
-    """Write `stem`.png and `stem`.svg, each whole or not at all. Raises ConveyorError if they can't be written."""
-    files = [stem.with_name(stem.name + suffix) for suffix in (".png", ".svg")]
+def write(picture: Picture, stem: Path) -> list[Path]:
+    """Write `stem`.png and its like, each whole or not at all. Raises ConveyorError if they can't be written."""
+    files = {stem.with_name(stem.name + suffix): content for suffix, content in picture.items()}
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
-        for file, content in zip(files, pair, strict=True):
+        for file, content in files.items():
             write_file(file, content)
     except (OSError, FileError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise ConveyorError(f"{stem}.png and .svg can't be written: {reason}") from error
-    return files
+        raise ConveyorError(f"{stem}{' and '.join(picture)} can't be written: {reason}") from error
+    return list(files)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.plot.files import Pair, write
+from conveyor_sim.plot.files import PNG_AND_SVG, Picture, write
 
 INK: Final = "#1f2933"
 MUTED: Final = "#616e7c"
@@ -42,6 +42,10 @@ SPEED: Final[Colormap] = LinearSegmentedColormap.from_list(
 
 _PNG_DPI: Final = 150
 _SVG_DPI: Final = 90  # of what an SVG holds as a picture
+_SAVED: Final[dict[str, dict[str, Any]]] = {
+    ".png": {"dpi": _PNG_DPI, "metadata": {"Software": None}},
+    ".svg": {"dpi": _SVG_DPI, "metadata": {"Date": None, "Creator": None}},
+}
 
 _RC: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",
@@ -104,13 +108,15 @@ def lay_out(figure: Figure) -> None:
         figure.set_dpi(dpi)
 
 
-def rendered(figure: Figure) -> Pair:
-    """PNG and SVG of a figure; equal figures give equal bytes."""
-    png, svg = BytesIO(), BytesIO()
+def rendered(figure: Figure, suffixes: Sequence[str] = PNG_AND_SVG) -> Picture:
+    """A figure as files of these suffixes; equal figures give equal bytes."""
     lay_out(figure)
-    figure.savefig(png, format="png", dpi=_PNG_DPI, metadata={"Software": None})
-    figure.savefig(svg, format="svg", dpi=_SVG_DPI, metadata={"Date": None, "Creator": None})
-    return png.getvalue(), svg.getvalue()
+    picture = {}
+    for suffix in suffixes:
+        content = BytesIO()
+        figure.savefig(content, format=suffix[1:], **_SAVED[suffix])
+        picture[suffix] = content.getvalue()
+    return picture
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
@@ -122,7 +128,7 @@ def save_png(figure: Figure, path: Path) -> Path:
     """Write a PNG alone. Raises ConveyorError if it can't be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=_PNG_DPI, metadata={"Software": None})
+        figure.savefig(path, **_SAVED[".png"])
     except OSError as error:
         raise ConveyorError(f"{path} can't be written: {error.strerror or error}") from error
     return path

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.plot.files import Pair, write
+from conveyor_sim.plot.files import PNG_AND_SVG, Picture, write
 
 CODE = """
 import sys
@@ -48,13 +48,19 @@ class Drawing(AbstractContextManager["Drawing"]):
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # it forks, which goes well without threads
         )
 
-    def begin(self, bag: Path, times: Sequence[float] | None = None, bottles: Sequence[int] | None = None) -> None:
+    def begin(
+        self,
+        bag: Path,
+        times: Sequence[float] | None = None,
+        bottles: Sequence[int] | None = None,
+        suffixes: Sequence[str] = PNG_AND_SVG,
+    ) -> None:
         """Have a recording read and drawn (as `plot.plot_bag` would) while this process does something else."""
         self.get_ready()
         if self._process is not None:
             assert self._process.stdin is not None
             with suppress(BrokenPipeError):  # it has ended, so there will be no answer
-                pickle.dump((bag, times, bottles), self._process.stdin)
+                pickle.dump((bag, times, bottles, suffixes), self._process.stdin)
                 self._process.stdin.flush()
 
     def pictures(self, folder: Path) -> list[Path]:
@@ -66,12 +72,12 @@ class Drawing(AbstractContextManager["Drawing"]):
             return []
         assert self._process.stdout is not None
         try:
-            drawn: dict[str, Pair] | str = pickle.load(self._process.stdout)
+            drawn: dict[str, Picture] | str = pickle.load(self._process.stdout)
         except (EOFError, pickle.UnpicklingError):
             raise ConveyorError("the process that draws has ended early") from None
         if isinstance(drawn, str):
             raise ConveyorError(drawn)
-        return [file for name, pair in drawn.items() for file in write(pair, folder / name)]
+        return [file for name, picture in drawn.items() for file in write(picture, folder / name)]
 
     def __exit__(self, *_: object) -> None:
         """Nothing is left running, not even what it has forked."""

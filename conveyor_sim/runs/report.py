@@ -13,6 +13,7 @@ from rich.console import Console
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model import Model
 from conveyor_sim.model.remedies import step_limit
+from conveyor_sim.plot.files import PNG
 from conveyor_sim.runs.drawing import Drawing
 from conveyor_sim.runs.force_check import achieved, pressed
 from conveyor_sim.runs.runner import Run
@@ -34,7 +35,7 @@ def report(bag: Path, wall: float | None, drawing: Drawing | None, spent: Spent 
     """
     began = time.monotonic()
     if drawing is not None:
-        drawing.begin(bag)
+        drawing.begin(bag, suffixes=PNG)  # `conveyor-sim plot` draws SVG too
     summary = summarize(bag, wall)
     Console(markup=False, highlight=False).print(render(summary))
     if drawing is not None:
