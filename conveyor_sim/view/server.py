@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import socket
 import sys
 import threading
 import zlib
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -21,6 +22,10 @@ from conveyor_sim.view.difference import Comparison
 from conveyor_sim.view.recording import Detail, Recording, text
 
 ADDRESS = "127.0.0.1"
+MOST_CONNECTIONS = 64
+"""At once; for one more the oldest makes room."""
+SILENT = 20.0
+"""s of wall time in which a browser has to ask, and to take what it is sent."""
 SERVED = Detail(bottles=50.0, contacts=25.0, belts=50.0, signals=50.0, block=2.0, story=60.0)
 
 
@@ -99,6 +104,28 @@ class _Server(ThreadingHTTPServer):
     """Connections that wait to be accepted: one that finds no room tries again only after a second."""
     answer: Callable[[str], bytes]
 
+    def __init__(self, *arguments: Any) -> None:
+        self._connected: dict[Any, None] = {}
+        self._changing = threading.Lock()
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Have it answered in a thread of its own."""
+        with self._changing:
+            if len(self._connected) >= MOST_CONNECTIONS:
+                oldest = next(iter(self._connected))
+                del self._connected[oldest]
+                with suppress(OSError):  # it has just ended
+                    oldest.shutdown(socket.SHUT_RDWR)
+            self._connected[request] = None
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """It has been answered, or left."""
+        with self._changing:
+            self._connected.pop(request, None)
+        super().shutdown_request(request)
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that leaves while it is answered is nothing to tell of."""
         if not isinstance(sys.exc_info()[1], ConnectionError):
@@ -108,6 +135,7 @@ class _Server(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     server: _Server
     server_version, sys_version = "conveyor_sim", ""
+    timeout = SILENT
 
     def do_GET(self) -> None:
         path = urlsplit(self.path).path.removeprefix("/") or "index.html"

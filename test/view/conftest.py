@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from view.line import record
+from scada.waiting import PATIENCE
+from view.line import LINE, record
+from view.live_line import PASSWORD, PEOPLE, Live
 
+from conveyor_sim.scada.scene_messages import Task
+from conveyor_sim.scada.scene_source import SceneSource
+from conveyor_sim.scada.users import keep_user, new_user
+from conveyor_sim.scene import load_scene
 from conveyor_sim.view.one_file import Failure, write_page
 
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -68,4 +74,46 @@ def opened_page(browser: Any, html: Path, size: tuple[int, int] = (1280, 720)) -
     opened.wait_for_selector("body[data-ready]")
     yield opened
     context.close()
+    assert wrong == []
+
+
+@pytest.fixture(scope="module")
+def users(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("users")
+    for name, role in PEOPLE.items():
+        keep_user(folder / "users", name, new_user(role, PASSWORD))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def live(users: Path) -> Iterator[Live]:
+    """The line, in real time, recorded; its end is an hour away."""
+    pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
+    scene = load_scene(LINE, {"duration": 3600.0})
+    with SceneSource(Task(scene, users / "bag", 0, 1.0, 1), lambda text: None) as source:
+        source.wait_for_line()
+        made = Live(users, source)
+        made.serve()
+        yield made
+        made.end()
+
+
+@pytest.fixture
+def open_page(browser: Any) -> Iterator[Callable[[str], Any]]:
+    """Opens a page that has begun; anything that goes wrong in it fails the test, but for the network."""
+    contexts, wrong = [], []
+
+    def open_it(url: str) -> Any:
+        contexts.append(browser.new_context(viewport={"width": 1280, "height": 720}, ignore_https_errors=True))
+        contexts[-1].set_default_timeout(PATIENCE * 1e3)
+        page = contexts[-1].new_page()
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("dialog", lambda dialog: (wrong.append(dialog.message), dialog.dismiss()))
+        page.goto(url)
+        page.wait_for_selector("body[data-ready]")
+        return page
+
+    yield open_it
+    for context in contexts:
+        context.close()
     assert wrong == []

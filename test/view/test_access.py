@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from scada.waiting import until
 from view.conftest import opened_page
+from view.live_line import PASSWORD, Live, show_device, signed_in, soon
 from view.test_page import clock, press, settled
 
 from conveyor_sim.view.bundle import text
@@ -97,17 +99,57 @@ def pair(browser: Any, html: Path) -> Iterator[Any]:
         yield page
 
 
+def go_through(page: Any, panel: str) -> None:
+    """By Tab, past all that can be clicked while a panel is open."""
+    page.click(f"#tab_{panel}")
+    settled(page)
+    assert page.evaluate(BEGIN) > 15
+    for _ in range(400):
+        page.keyboard.press("Tab")
+        if page.evaluate(SEEN):
+            break
+    assert page.evaluate(MISSED) == [], panel
+    assert page.evaluate(NAMELESS) == [], panel
+
+
 def test_tab_reaches_all_that_is_clicked_and_each_has_a_name(pair: Any) -> None:
     for panel in ("compare", *PANELS):
-        pair.click(f"#tab_{panel}")
-        settled(pair)
-        assert pair.evaluate(BEGIN) > 15
-        for _ in range(400):
-            pair.keyboard.press("Tab")
-            if pair.evaluate(SEEN):
-                break
-        assert pair.evaluate(MISSED) == [], panel
-        assert pair.evaluate(NAMELESS) == [], panel
+        go_through(pair, panel)
+
+
+def test_so_it_does_on_a_line_that_runs_for_one_who_may_command_it(open_page: Callable[[str], Any], live: Live) -> None:
+    page = open_page(live.url)
+    signed_in(page, "tess")
+    page.wait_for_selector("#panel_alarms .alarm", state="attached")
+    page.focus("text=Pause the line")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("text=Let it go on")
+    show_device(page, "photo_eyes/exit")
+    page.focus("[aria-label='Watch photo_eyes/exit/blocked']")
+    page.keyboard.press("Enter")
+    page.focus("#plan")
+    page.keyboard.press("b")
+    for panel in (*PANELS, "watch"):
+        go_through(page, panel)
+    page.focus("text=Let it go on")
+    page.keyboard.press(" ")
+    page.wait_for_selector("text=Pause the line")
+
+
+def test_a_line_that_runs_is_commanded_by_keys_alone(open_page: Callable[[str], Any], live: Live) -> None:
+    page = open_page(live.url)
+    page.focus("#sign")
+    page.keyboard.press("Enter")
+    for said in ("tess", PASSWORD):
+        page.keyboard.type(said)
+        page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("body[data-person=tess]")
+    show_device(page, "photo_eyes/exit")
+    for value, now in (("on", 1.0), ("off", 0.0)):
+        page.focus(f"[aria-label='Inject photo_eyes/exit/stuck_on {value}']")
+        page.keyboard.press("Enter")
+        soon(page, lambda now=now: live.source.shown.values["photo_eyes/exit/blocked"] == now, value)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -118,8 +160,8 @@ def test_texts_and_edges_stand_out_from_what_is_behind_them(pair: Any, theme: st
     for panel in ("compare", *PANELS):
         pair.click(f"#tab_{panel}")
         pair.mouse.move(400, 300)
-        pair.wait_for_timeout(200)  # colours of what was hovered go back
         settled(pair)
+        until(lambda: pair.evaluate("!document.getAnimations().length"), "colours of what was hovered go back")
         assert pair.evaluate(FAINT) == [], panel
     press(pair, "?")
     assert pair.evaluate(FAINT) == []

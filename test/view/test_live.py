@@ -2,156 +2,45 @@
 
 from __future__ import annotations
 
-import asyncio
-import json
-import os
-import signal
-from collections.abc import Callable, Coroutine, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import pytest
-from scada.waiting import PATIENCE, until
+from scada.waiting import until
 from view.line import LINE
+from view.live_line import (
+    SETPOINT,
+    SPEED,
+    WEB,
+    Live,
+    clock,
+    put_into_mode,
+    set_speed,
+    show_device,
+    sign_in,
+    signed_in,
+    soon,
+    told,
+)
 from view.pixels import count_where_they_are, settled
-
-pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
-
-from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeError
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.scada.bag_source import BagSource
-from conveyor_sim.scada.face import FaceError, Settings
-from conveyor_sim.scada.faces import FACES
+from conveyor_sim.scada.face import Settings
 from conveyor_sim.scada.scene_messages import Task
 from conveyor_sim.scada.scene_source import SceneSource
 from conveyor_sim.scada.serving import Serving
-from conveyor_sim.scada.users import Role, keep_user, new_user
-from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_REQUESTS, MOST_VIEWERS
-from conveyor_sim.scada.web.viewer import MOST_WAITING, UNSEEN
 from conveyor_sim.scene import load_scene
 
-T = TypeVar("T")
-
-WEB = next(kind for kind in FACES if kind.name == "web")
-PEOPLE: dict[str, Role] = {"vic": "viewer", "jo": "operator", "tess": "test"}
-PASSWORD = "open sesame"
-SPEED, SETPOINT = "belts/line/speed", "belts/line/cmd_speed"
-
-
-class Live:
-    """A line that runs, and the server of its page, which may be ended and begun again."""
-
-    def __init__(self, folder: Path, source: Any) -> None:
-        self.folder, self.source, self.port = folder, source, 0
-        self.serving: Serving | None = None
-
-    def serve(self, host: str = "127.0.0.1") -> None:
-        settings = Settings(host, users=self.folder / "users", opcua_certificates=self.folder / "certificates")
-        self.serving = Serving(self.source, [(WEB, self.port)], settings)
-        self.port = int(self.serving.faces[0].address.rstrip("/").rpartition(":")[2])
-
-    def end(self) -> None:
-        if self.serving is not None:
-            self.serving.close()
-            self.serving = None
-
-    @property
-    def url(self) -> str:
-        return f"http://127.0.0.1:{self.port}"
-
-
-@pytest.fixture(scope="module")
-def users(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("users")
-    for name, role in PEOPLE.items():
-        keep_user(folder / "users", name, new_user(role, PASSWORD))
-    return folder
-
-
-@pytest.fixture(scope="module")
-def live(users: Path) -> Iterator[Live]:
-    """The line, in real time, recorded; its end is an hour away."""
-    scene = load_scene(LINE, {"duration": 3600.0})
-    with SceneSource(Task(scene, users / "bag", 0, 1.0, 1), lambda text: None) as source:
-        source.wait_for_line()
-        made = Live(users, source)
-        made.serve()
-        yield made
-        made.end()
-
-
-@pytest.fixture
-def open_page(browser: Any) -> Iterator[Callable[[str], Any]]:
-    """Opens a page that has begun; anything that goes wrong in it fails the test, but for the network."""
-    contexts, wrong = [], []
-
-    def open_it(url: str) -> Any:
-        contexts.append(browser.new_context(viewport={"width": 1280, "height": 720}, ignore_https_errors=True))
-        contexts[-1].set_default_timeout(PATIENCE * 1e3)
-        page = contexts[-1].new_page()
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("dialog", lambda dialog: (wrong.append(dialog.message), dialog.dismiss()))
-        page.goto(url)
-        page.wait_for_selector("body[data-ready]")
-        return page
-
-    yield open_it
-    for context in contexts:
-        context.close()
-    assert wrong == []
+pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
 
 
 @pytest.fixture
 def page(open_page: Callable[[str], Any], live: Live) -> Any:
     return open_page(live.url)
-
-
-def soon(page: Any, condition: Callable[[], Any], what: str) -> None:
-    """Wait for something that will happen on a page, which goes on meanwhile."""
-    until(lambda: condition() or page.wait_for_timeout(20), what)
-
-
-def sign_in(page: Any, name: str, password: str = PASSWORD) -> None:
-    page.click("#sign")
-    page.fill("#signing input[autocomplete=username]", name)
-    page.fill("#signing input[type=password]", password)
-    page.click("#signing button.main")
-
-
-def signed_in(page: Any, name: str) -> None:
-    sign_in(page, name)
-    page.wait_for_selector(f"body[data-person={name}]")
-
-
-def show_device(page: Any, name: str) -> None:
-    page.click("#tab_device")
-    page.select_option("#panel_device select", name)
-    settled(page)
-
-
-def told(page: Any, text: str) -> None:
-    soon(page, lambda: text in page.inner_text("#notice"), text)
-
-
-def set_speed(page: Any, value: str) -> None:
-    show_device(page, "belts/line")
-    page.fill(f"[aria-label='Set {SETPOINT}']", value)
-    page.click(f"[aria-label='Set {SETPOINT} now']")
-
-
-def put_into_mode(page: Any, mode: str) -> None:
-    show_device(page, "belts/line")
-    page.select_option("[aria-label='Set belts/line/mode']", mode)
-    page.click("[aria-label='Set belts/line/mode now']")
-
-
-def clock(page: Any) -> float:
-    return float(page.inner_text("#clock").removesuffix(" s"))
 
 
 # What is shown
@@ -276,6 +165,22 @@ def test_an_operator_is_refused_in_automatic_and_for_what_is_out_of_range(page: 
     told(page, "Refused: belts/line: Maintenance is not for operators")  # by the line, a tick later
 
 
+def test_what_one_does_another_sees_and_may_not_undo(open_page: Callable[[str], Any], live: Live) -> None:
+    viewer, tester = open_page(live.url), open_page(live.url)
+    signed_in(viewer, "vic")
+    show_device(viewer, "belts/line")
+    field = viewer.locator("[aria-label='Set belts/line/mode']")
+    assert field.input_value() == "1"
+    signed_in(tester, "tess")
+    put_into_mode(tester, "3")
+    soon(viewer, lambda: field.input_value() == "3", "the mode, in the field, too")
+    put_into_mode(viewer, "1")
+    told(viewer, "Refused: vic is a viewer")
+    assert viewer.locator("#panel_device tr", has_text="mode").first.locator("td").inner_text() == "Manual"
+    put_into_mode(tester, "1")
+    soon(tester, lambda: live.source.shown.values["belts/line/mode"] == 1.0, "automatic again")
+
+
 def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
     signed_in(page, "tess")
     show_device(page, "photo_eyes/exit")
@@ -319,240 +224,19 @@ def test_alarms_are_shelved_acknowledged_and_reset(page: Any) -> None:
     soon(page, lambda: "forced" not in page.inner_text("#panel_watch li"), "the end of the force")
 
 
-# Connections
-
-
-def test_a_page_comes_back_when_its_server_does(page: Any, live: Live) -> None:
-    signed_in(page, "jo")
-    live.end()
-    page.wait_for_selector("body[data-link=broken]")
-    assert page.inner_text("#link") == "● No connection to the server: trying again"
-    before = clock(page)
-    live.serve()
-    page.wait_for_selector("body[data-link=live]")
-    soon(page, lambda: clock(page) > before + 0.2, "time goes on")
-    assert page.get_attribute("body", "data-person") == "", "who was signed in is so no longer"
-
-
-def test_a_line_whose_process_dies_is_lost_and_begins_anew(page: Any, live: Live) -> None:
-    soon(page, lambda: clock(page) > 2.0, "some time has passed")
-    os.kill(live.source.pid, signal.SIGKILL)
-    soon(page, lambda: clock(page) < 2.0, "it began anew")
-    soon(page, lambda: page.get_attribute("body", "data-link") == "live", "it is there")
-    soon(page, lambda: int(page.get_attribute("body", "data-bottles")) > 2, "its bottles")
-
-
-def run(work: Coroutine[Any, Any, T]) -> T:
-    """In a thread of its own: the browser's driver has a loop in this one."""
-    with ThreadPoolExecutor(1) as thread:
-        return thread.submit(asyncio.run, asyncio.wait_for(work, PATIENCE)).result()
-
-
-def test_pages_of_others_are_refused(live: Live) -> None:
-    async def status(**headers: str) -> int:
-        async with ClientSession() as session:
-            try:
-                async with session.ws_connect(f"{live.url}/live", headers=headers):
-                    return 101
-            except WSServerHandshakeError as error:
-                return error.status
-
-    async def page_of(host: str) -> int:
-        async with ClientSession() as session, session.get(live.url, headers={"Host": host}) as answer:
-            return answer.status
-
-    assert run(status(Origin=live.url)) == 101
-    assert run(status(Origin="http://evil.example")) == 403
-    assert run(status(Origin=live.url.replace("http", "https"))) == 403
-    assert run(status()) == 403
-    assert run(status(Origin=f"http://evil.example:{live.port}", Host=f"evil.example:{live.port}")) == 403
-    assert run(page_of(f"localhost:{live.port}")) == 200
-    assert run(page_of(f"evil.example:{live.port}")) == 403
-
-
-def test_files_outside_the_page_are_not_there(live: Live) -> None:
-    async def status(path: str) -> int:
-        async with ClientSession() as session, session.get(f"{live.url}{path}") as answer:
-            return answer.status
-
-    for path, expected in {"/main.js": 200, "/../server.py": 404, "/%2e%2e/server.py": 404, "/users": 404}.items():
-        assert run(status(path)) == expected, path
-
-
-async def messages(socket: Any, seconds: float) -> list[bytes]:
-    """What comes until nothing does for so long."""
-    found = []
-    while True:
-        try:
-            message = await asyncio.wait_for(socket.receive(), seconds)
-        except asyncio.TimeoutError:
-            return found
-        if message.type is not WSMsgType.BINARY:
-            return found
-        found.append(message.data)
-
-
-async def next_text(socket: Any, kind: str) -> dict[str, Any]:
-    while True:
-        message = await socket.receive()
-        assert message.type is WSMsgType.BINARY, message
-        if message.data[0] == 0:
-            text: dict[str, Any] = json.loads(message.data[1:])
-            if text["kind"] == kind:
-                return text
-
-
-async def frames(socket: Any, count: int) -> None:
-    """Take so many, and say so."""
-    while count:
-        message = await socket.receive()
-        assert message.type is WSMsgType.BINARY, message
-        if message.data[0] == 1:
-            count -= 1
-            await socket.send_json({"do": "saw"})
-
-
-@pytest.mark.parametrize(
-    "sent",
-    ["x" * (LONGEST_REQUEST + 1), "no json", "[]", "[" * 10_000, b"\0", '{"do": "saw"}\0'],
-    ids=["too long", "no json", "no object", "deep", "binary", "a tail"],
-)
-def test_what_is_no_request_ends_its_connection_and_no_other(live: Live, sent: str | bytes) -> None:
-    async def work() -> None:
-        async with (
-            ClientSession() as session,
-            session.ws_connect(f"{live.url}/live", origin=live.url) as bad,
-            session.ws_connect(f"{live.url}/live", origin=live.url) as good,
-        ):
-            await next_text(bad, "begin")
-            await next_text(good, "begin")
-            await (bad.send_str(sent) if isinstance(sent, str) else bad.send_bytes(sent))
-            while (await bad.receive()).type is WSMsgType.BINARY:
-                pass
-            assert bad.closed
-            await frames(good, 3)
-
-    run(work())
-
-
-def test_requests_that_make_no_sense_are_refused(live: Live) -> None:
-    asked: list[dict[str, Any]] = [
-        {"do": "set", "names": [SETPOINT], "values": [0.1, 0.2]},
-        {"do": "set", "names": ["alarms/x"], "values": [1]},
-        {"do": "set", "names": [SETPOINT], "values": [float("nan")]},
-        {"do": "set", "names": [SETPOINT], "values": ["0.1"]},
-        {"do": "set", "names": SETPOINT, "values": 1},
-        {"do": "set", "names": [SETPOINT] * 101, "values": [0.1] * 101},
-        {"do": "force", "names": ["x" * 1000], "values": [1]},
-        {"do": "force", "names": ["\ud800"], "values": [1]},
-        {"do": "set", "names": [SETPOINT], "values": [10**400]},
-        {"do": "x" * 10_000},
-        {"do": "control", "names": ["target"], "values": [5]},
-        {"do": "control", "names": [], "values": []},
-        {"do": "declare", "names": ["x"], "values": []},
-        {"do": 7},
-        {},
-    ]
-
-    async def work() -> list[str]:
-        async with ClientSession() as session, session.ws_connect(f"{live.url}/live", origin=live.url) as socket:
-            await socket.send_json({"do": "sign_in", "name": "tess", "password": PASSWORD, "id": 0})
-            assert (await next_text(socket, "reply"))["person"] == {"name": "tess", "role": "test"}
-            replies = []
-            for number, request in enumerate(asked, start=1):
-                await socket.send_json({**request, "id": number})
-                reply = await next_text(socket, "reply")
-                assert reply["id"] == number
-                replies.append(reply["refused"])
-            return replies
-
-    tick = live.source.shown.tick
-    assert all(run(work()))
-    assert live.source.shown.tick > tick and live.source.shown.values[SETPOINT] == 0.5
-
-
-def test_a_flood_of_requests_is_cut_off_and_holds_up_nobody(live: Live) -> None:
-    async def work() -> int | None:
-        async with (
-            ClientSession() as session,
-            session.ws_connect(f"{live.url}/live", origin=live.url) as flood,
-            session.ws_connect(f"{live.url}/live", origin=live.url) as good,
-        ):
-            with suppress(ConnectionError):
-                for number in range(10 * MOST_REQUESTS):
-                    await flood.send_json({"do": "set", "names": [SETPOINT], "values": [0.1], "id": number})
-            await frames(good, 5)
-            await messages(flood, PATIENCE)
-            return flood.close_code
-
-    assert run(work()) == WSCloseCode.POLICY_VIOLATION
-    assert live.source.shown.values[SETPOINT] == 0.5
-
-
-def test_who_shows_no_frames_gets_no_more_and_all_that_happened(live: Live) -> None:
-    async def work() -> tuple[int, int]:
-        async with (
-            ClientSession() as session,
-            session.ws_connect(f"{live.url}/live", origin=live.url) as slow,
-            session.ws_connect(f"{live.url}/live", origin=live.url) as good,
-        ):
-            await frames(good, 20)
-            got = await messages(slow, 0.3)
-            return sum(message[0] == 1 for message in got), sum(message[0] == 0 for message in got)
-
-    drawn, happened = run(work())
-    assert drawn == UNSEEN and happened >= 1
-
-
-def test_no_more_pages_look_than_may(live: Live) -> None:
-    async def work() -> None:
-        async with ClientSession() as session:
-            sockets = []
-            with pytest.raises(WSServerHandshakeError) as refused:
-                for _ in range(MOST_VIEWERS + 1):
-                    sockets.append(await session.ws_connect(f"{live.url}/live", origin=live.url))
-            assert refused.value.status == 503 and len(sockets) <= MOST_VIEWERS
-            for socket in sockets:
-                await socket.close()
-
-    run(work())
-
-
-def test_what_waits_for_a_page_is_bounded() -> None:
-    from conveyor_sim.scada.web.viewer import Viewer
-
-    async def work() -> None:
-        viewer = Viewer(None)  # type: ignore[arg-type]  # nothing is sent
-        viewer.tell(b"x" * 1000)
-        for _ in range(MOST_WAITING // 1000 + 10):
-            viewer.tell(b"x" * 1000)
-        assert viewer.lagging and viewer.waiting <= MOST_WAITING
-        viewer.begin(b"y")
-        assert not viewer.lagging and viewer.waiting == 1
-
-    run(work())
-
-
-def test_nobody_who_is_not_let_in_sees_anything(browser: Any, live: Live, users: Path) -> None:
-    settings = Settings(users=users / "users", anonymous=False)
-    with Serving(live.source, [(WEB, 0)], settings) as serving:
-        url = serving.faces[0].address.rstrip("/")
-
-        async def work() -> None:
-            async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url) as socket:
-                assert [json.loads(message[1:])["kind"] for message in await messages(socket, 0.5)] == ["locked"]
-
-        run(work())
-        page = browser.new_page()
-        page.set_default_timeout(PATIENCE * 1e3)
-        page.goto(url)
-        page.fill("#signing input[autocomplete=username]", "vic")
-        page.fill("#signing input[type=password]", PASSWORD)
-        page.click("#signing button.main")
-        page.wait_for_selector("body[data-link=live]")
-        page.click("#sign")
-        page.wait_for_selector("body[data-link=locked]")
-        page.close()
+def test_a_line_that_has_ended_says_so_and_begins_anew(open_page: Callable[[str], Any], users: Path) -> None:
+    with SceneSource(Task(load_scene(LINE, {"duration": 1.0}), None, 0, 1.0, 1), lambda text: None) as source:
+        source.wait_for_line()
+        with Serving(source, [(WEB, 0)], Settings(users=users / "users")) as serving:
+            page = open_page(serving.faces[0].address)
+            page.wait_for_selector("#run.stands:has-text('ended')")
+            assert clock(page) == 1.0 and not page.locator("text=Pause the line").is_visible()
+            signed_in(page, "jo")
+            page.click("text=Begin anew")
+            page.click("text=Begin anew: sure?")
+            page.wait_for_selector("#run:has-text('paused')")
+            page.click("text=Let it go on")
+            soon(page, lambda: 0.0 < clock(page) < 1.0, "time goes on")
 
 
 # By other ways
@@ -598,29 +282,3 @@ def test_a_recording_is_played_on_the_page(open_page: Callable[[str], Any], user
         soon(page, lambda: clock(page) < stands, "it went back")
         show_device(page, "belts/line")
         assert page.locator(f"[aria-label='Set {SETPOINT}']").count() == 0, "a recording can't be commanded"
-
-
-def test_other_machines_get_it_by_tls_alone(open_page: Callable[[str], Any], live: Live, users: Path) -> None:
-    settings = Settings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
-    with Serving(live.source, [(WEB, 0)], settings) as serving:
-        address = serving.faces[0].address
-        assert address.startswith("https://127.0.0.2:")
-        page = open_page(address)
-        signed_in(page, "jo")
-
-        async def plain() -> None:
-            async with ClientSession() as session:
-                await session.get(address.replace("https", "http"))
-
-        with pytest.raises(Exception, match=r"disconnected|reset|Bad status|Connection"):
-            run(plain())
-
-
-def test_a_certificate_that_cant_be_is_told_in_a_sentence(live: Live, tmp_path: Path) -> None:
-    settings = Settings(web_certificates=tmp_path)
-    with pytest.raises(FaceError, match=r"certificate\.pem: can't be read, expected a certificate and its key"):
-        Serving(live.source, [(WEB, 0)], settings)
-    (tmp_path / "certificate.pem").write_text("no")
-    (tmp_path / "key.pem").write_text("no")
-    with pytest.raises(FaceError, match=r"certificate\.pem: .*expected a certificate in PEM"):
-        Serving(live.source, [(WEB, 0)], settings)

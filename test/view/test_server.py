@@ -8,6 +8,7 @@ import threading
 import time
 import zlib
 from collections.abc import Iterator
+from contextlib import ExitStack
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,13 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from view.line import LINE
+from scada.waiting import until
+from view.line import LINE, record
 from view.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
 from view.test_page import clock
 
 from conveyor_sim.bag import own_source
+from conveyor_sim.bag.chunk import next_chunk
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
@@ -31,7 +34,7 @@ from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.view.one_file import write_page
 from conveyor_sim.view.recording import Recording
-from conveyor_sim.view.server import SERVED, RecordingServer
+from conveyor_sim.view.server import MOST_CONNECTIONS, SERVED, RecordingServer, _Handler
 
 
 @pytest.fixture
@@ -115,6 +118,49 @@ def test_the_page_draws_what_the_one_file_draws(
     assert np.array_equal(*pictures)
 
 
+def test_what_can_not_be_read_is_said_and_gone_over(browser: Any, tmp_path: Path) -> None:
+    folder = record(tmp_path / "bag", 90.0)
+    file = next(folder.glob("*.mcap"))
+    content = bytearray(file.read_bytes())
+    chunk = next_chunk(bytes(content), len(content) // 2, len(content))
+    assert chunk is not None
+    content[(chunk.content + chunk.stop) // 2] ^= 255
+    file.write_bytes(content)
+    asked: list[str] = []
+    with RecordingServer(folder) as server:
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(server.url)
+        page.wait_for_selector("body[data-told]", timeout=60_000)
+        assert "can't be read as a bag" in page.inner_text("#notice")
+        page.select_option("#speed", "30")
+        page.focus("#plan")
+        page.keyboard.press("Home")
+        page.keyboard.press("k")
+        until(lambda: page.inner_text("#clock") == "90.00 s" or page.wait_for_timeout(20), "the end, past the damage")
+        assert int(page.get_attribute("body", "data-bottles")) > 0
+        assert len(asked) == len(set(asked)), "each is asked for once"
+        page.close()
+
+
+def test_a_server_that_ends_is_waited_for(browser: Any, bag: Path) -> None:
+    with RecordingServer(bag) as server:
+        port = urlsplit(server.url).port
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(server.url)
+        page.wait_for_selector("body[data-told]", timeout=60_000)
+    assert port is not None
+    page.focus("#plan")
+    page.keyboard.press("End")
+    page.wait_for_selector("body[data-link=broken]", timeout=60_000)
+    assert page.inner_text("#notice") == "● No answer from the server: trying again"
+    with RecordingServer(bag, port):
+        page.wait_for_selector("body[data-link=served]", timeout=60_000)
+        settled(page)
+        assert page.inner_text("#notice") == "" and int(page.get_attribute("body", "data-bottles")) > 0
+        page.close()
+
+
 def written(folder: Path, seconds: float, bottles: int = 300) -> Path:
     """A recording of many bottles in rows of 60, 0.1 m apart, at 50 Hz on the small line, not simulated."""
     simulation = Simulation(load_scene(LINE))
@@ -171,6 +217,30 @@ def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(
     assert index is not None
     assert len(index._index.chunks) > 20, "there were others to be read"
     index.close()
+
+
+def test_connections_that_ask_for_nothing_make_room(server: RecordingServer) -> None:
+    address = urlsplit(server.url)
+    with ExitStack() as stack:
+        waiting = [
+            stack.enter_context(socket.create_connection((address.hostname, address.port), timeout=60))
+            for _ in range(MOST_CONNECTIONS + 5)
+        ]
+        assert get(server, "/")[0] == 200  # accepted behind them all
+        for connection in waiting[:6]:
+            assert connection.recv(1) == b"", "the oldest have ended"
+        waiting[-1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            waiting[-1].recv(1)
+
+
+def test_who_asks_for_nothing_is_not_waited_for_without_end(server: RecordingServer, monkeypatch: Any) -> None:
+    monkeypatch.setattr(_Handler, "timeout", 0.05)
+    address = urlsplit(server.url)
+    for asked in (b"", b"GET /data/hea"):
+        with socket.create_connection((address.hostname, address.port), timeout=60) as waiting:
+            waiting.sendall(asked)
+            assert waiting.recv(1) == b""
 
 
 def test_a_browser_that_leaves_while_it_is_answered_is_not_told_of(

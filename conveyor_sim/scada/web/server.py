@@ -25,6 +25,12 @@ from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
 MOST_VIEWERS = 64
 """Pages that look at once; one more is told so."""
 
+MOST_CONNECTIONS = 256
+"""At once, of pages and whatever else: for one more the oldest makes room that is no page."""
+
+HANDSHAKE = 5.0
+"""s of wall time in which a client has to agree on TLS."""
+
 LONGEST_REQUEST = 16_384
 """Bytes that a page sends at once, at most; who sends more is cut off."""
 
@@ -75,22 +81,24 @@ class WebServer:
         )
         self._files = page_files()
         self._runner: web.AppRunner | None = None
+        self._listening: asyncio.Server | None = None
         self._sockets: set[web.WebSocketResponse] = set()
+        self._pages: set[asyncio.BaseProtocol] = set()
         self._password = asyncio.Lock()
 
     @property
     def port(self) -> int:
         """On which it listens. RuntimeError before `start`."""
-        if self._runner is None or not self._runner.addresses:
+        if self._listening is None:
             raise RuntimeError("the server was not started")
-        return int(self._runner.addresses[0][1])
+        return int(self._listening.sockets[0].getsockname()[1])
 
     @property
     def address(self) -> str:
         """Where the page is."""
         host, port = self._at
         where = f"[{host}]" if ":" in host else host
-        return f"http{'s' if self._secured else ''}://{where}:{port if self._runner is None else self.port}/"
+        return f"http{'s' if self._secured else ''}://{where}:{port if self._listening is None else self.port}/"
 
     def status(self) -> Status:
         """Pages that look; what was passed on to the line for them, and what was not."""
@@ -110,8 +118,11 @@ class WebServer:
             app, handle_signals=False, access_log=None, keepalive_timeout=HEARTBEAT, shutdown_timeout=1.0
         )
         await runner.setup()
+        patience = None if self._secured is None else HANDSHAKE
         try:
-            await web.TCPSite(runner, host, port, ssl_context=self._secured).start()
+            self._listening = await asyncio.get_running_loop().create_server(
+                self._connection, host, port, ssl=self._secured, ssl_handshake_timeout=patience
+            )
         except OSError as error:
             await runner.cleanup()
             raise FaceError(
@@ -122,11 +133,28 @@ class WebServer:
     async def stop(self) -> None:
         """End all connections."""
         runner, self._runner = self._runner, None
-        for socket in [*self._sockets]:
-            await socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends")
+        if self._listening is not None:
+            self._listening.close()
+            self._listening = None
+        ends = (socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends") for socket in self._sockets)
+        await asyncio.gather(*ends, return_exceptions=True)
         self._feed.close()
         if runner is not None:
             await runner.cleanup()
+
+    def _connection(self) -> asyncio.Protocol:
+        """Of one more client."""
+        assert self._runner is not None and self._runner.server is not None
+        asyncio.get_running_loop().call_soon(self._make_room)  # then those that come with it are known
+        return self._runner.server()
+
+    def _make_room(self) -> None:
+        """Have those go that hold a connection open for longest, and are no page, rather than those who come."""
+        known = [] if self._runner is None or self._runner.server is None else self._runner.server.connections
+        ways = {one: way for one in known if (way := one.transport) is not None and not way.is_closing()}
+        others = [way for one, way in ways.items() if one not in self._pages]
+        for way in others[: max(0, len(ways) - MOST_CONNECTIONS)]:
+            way.abort()
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -153,9 +181,10 @@ class WebServer:
         if len(self._sockets) >= MOST_VIEWERS:
             return web.Response(status=503, text=f"{MOST_VIEWERS} pages look already", headers=HEADERS)
         socket = web.WebSocketResponse(
-            heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False, timeout=CLOSING
+            heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False, timeout=CLOSING, autoping=False
         )
         self._sockets.add(socket)
+        self._pages.add(request.protocol)
         viewer = Viewer(socket)
         sending = None
         try:
@@ -166,6 +195,7 @@ class WebServer:
             pass
         finally:
             self._sockets.discard(socket)
+            self._pages.discard(request.protocol)
             self._feed.leave(viewer)
             if sending is not None:
                 sending.cancel()
@@ -183,6 +213,10 @@ class WebServer:
         async for message in socket:
             now = time.monotonic()
             left, before = min(left + RATE * (now - before), MOST_REQUESTS) - 1.0, now
+            if left >= 0.0 and message.type in (WSMsgType.PING, WSMsgType.PONG):  # of which there can be too many, too
+                if message.type is WSMsgType.PING:
+                    await socket.pong(message.data)
+                continue
             request = _request(message.data) if message.type is WSMsgType.TEXT and left >= 0.0 else None
             if request is None:
                 reason = "too many requests" if left < 0.0 else "expected an object in JSON"
