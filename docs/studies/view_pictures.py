@@ -20,6 +20,9 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
 from conveyor_sim.runs.runner import run_scene
+from conveyor_sim.scada.scene_messages import Task
+from conveyor_sim.scada.scene_source import SceneSource
+from conveyor_sim.scada.users import keep_user, new_user
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
 from conveyor_sim.view.one_file import Failure, write_page
@@ -40,7 +43,8 @@ def test_a_wedged_pair_is_alarmed_within_5_s(line):
 
 sys.path.insert(0, str(ROOT / "test"))
 from view.conftest import BROWSERS  # noqa: E402
-from view.line import record  # noqa: E402
+from view.line import LINE, record  # noqa: E402
+from view.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
 from view.states import STATES, State, at  # noqa: E402
 
 
@@ -48,20 +52,26 @@ class Studio:
     """A browser, and recordings that are made when a picture needs them."""
 
     def __init__(self, browser: Any, folder: Path) -> None:
-        self._browser, self._folder = browser, folder
+        self._browser, self.folder = browser, folder
 
     @contextmanager
     def page(self, html: Path, size: tuple[int, int]) -> Iterator[Any]:
         """A page, ready to be looked at."""
+        with self.opened(size) as page:
+            page.goto(html.as_uri())
+            page.wait_for_selector("body[data-told]")
+            yield page
+
+    @contextmanager
+    def opened(self, size: tuple[int, int]) -> Iterator[Any]:
+        """An empty page."""
         page = self._browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto(html.as_uri())
-        page.wait_for_selector("body[data-told]")
         yield page
         page.close()
 
     def bag(self, name: str) -> Path:
         """The line of the tests (`line`, `other`), or a shipped scene."""
-        bag = self._folder / "runs" / name
+        bag = self.folder / "runs" / name
         if not bag.exists():
             bag.parent.mkdir(exist_ok=True)
             if name in ("closes_at_6_s", "stays_open"):
@@ -72,23 +82,23 @@ class Studio:
 
     def state(self, state: State) -> Path:
         """The page of a state of the tests."""
-        html = self._folder / f"{state.of}.html"
+        html = self.folder / f"{state.of}.html"
         failures = [Failure(22.0, "always: no more than 20 bottles")] if state.of == "failed" else []
         other = self.bag("stays_open") if state.of == "pair" else None
         return write_page(self.bag("closes_at_6_s"), html, failures=failures, other=other)
 
     def shipped(self, scene: str) -> Path:
         """The page of a shipped scene."""
-        return write_page(self.bag(scene), self._folder / f"{scene}.html")
+        return write_page(self.bag(scene), self.folder / f"{scene}.html")
 
     def failure(self) -> Path:
         """The page that pytest leaves of a test that fails."""
-        file = self._folder / "test_late.py"
+        file = self.folder / "test_late.py"
         file.write_text(FAILING)
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--line-failures", "left", file.name]
         paths = os.pathsep.join([str(ROOT / "examples" / "scenarios"), str(ROOT)])
-        subprocess.run(command, cwd=self._folder, env={**os.environ, "PYTHONPATH": paths}, check=False)
-        return next(self._folder.glob("left/*/line.html"))
+        subprocess.run(command, cwd=self.folder, env={**os.environ, "PYTHONPATH": paths}, check=False)
+        return next(self.folder.glob("left/*/line.html"))
 
 
 def still(name: str) -> Callable[[Studio], None]:
@@ -168,6 +178,25 @@ def scrubbed(studio: Studio) -> None:
     save("view_scrubbed", pictures, each, lossless=True)
 
 
+def live(studio: Studio) -> None:
+    """A line that runs, on which an operator has put a belt into manual and slowed it down."""
+    keep_user(studio.folder / "users", "jo", new_user("operator", PASSWORD))
+    scene = load_scene(LINE, {"duration": 3600.0})
+    with SceneSource(Task(scene, None, 0, 1.0, 1), lambda text: None) as source, studio.opened((1280, 720)) as page:
+        source.wait_for_line()
+        served = Live(studio.folder, source)
+        served.serve()
+        page.goto(served.url)
+        page.wait_for_selector("body[data-told]")
+        signed_in(page, "jo")
+        soon(page, lambda: clock(page) > 15.0, "the capper has jammed")
+        put_into_mode(page, "3")
+        set_speed(page, "0.2")
+        soon(page, lambda: clock(page) > 18.0, "the belt is slow")
+        grab(page).save(IMAGES / "view_live.webp", lossless=True, method=6)
+        served.end()
+
+
 def with_pointer(picture: Image.Image, x: float, y: float) -> Image.Image:
     """With the pointer of a mouse, which is in no picture of a browser."""
     arrow = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]
@@ -180,6 +209,7 @@ PICTURES: dict[str, Callable[[Studio], None]] = {
     "view_plant": moving("view_plant", "paper_plant", (1050, 460), 14, 45, 2),
     "view_table": moving("view_table", "accumulation_table", (1050, 500), 1, 36, 1),
     "view_scrubbed": scrubbed,
+    "view_live": live,
 }
 
 

@@ -101,6 +101,27 @@ def test_what_differs_now_is_listed_coloured_and_put_on_the_trends(pair: Any) ->
     assert "50 mm" in pair.inner_text("#legend")
 
 
+def test_machines_alarms_and_devices_are_those_of_both(pair: Any) -> None:
+    seek(pair, 9.0)
+    pair.click("#tab_line")
+    heads = ["MACHINES OF A", "MACHINES OF B", "PRODUCTION OF A", "PRODUCTION OF B"]
+    assert pair.locator("#panel_line h2").all_inner_texts() == heads
+    pair.click("#tab_alarms")
+    assert pair.locator("#panel_alarms h2").all_inner_texts() == ["ALARMS OF A", "ALARMS OF B"]
+    assert pair.locator("#panel_alarms .alarm", has_text="capper_full").count() == 2
+    pair.click("#tab_device")
+    pair.select_option("#panel_device select", "gates/hold")
+    settled(pair)
+    row = pair.locator("#panel_device tr", has=pair.get_by_role("button", name="is_open"))
+    assert row.locator("td").all_inner_texts() == ["off", "on"]
+    row = pair.locator("#panel_device tr", has=pair.locator("th", has_text="open by test"))
+    assert row.count() == 0
+    assert "A: by test since 6" in pair.inner_text("#panel_device")
+    for panel, head in (("events", "EVENTS OF A"), ("bottle", "BOTTLE OF A")):
+        pair.click(f"#tab_{panel}")
+        assert pair.inner_text(f"#panel_{panel} h2") == head
+
+
 def test_it_fits_a_tablet_with_one_plan_above_the_other_or_beside(pair: Any) -> None:
     pair.set_viewport_size({"width": 820, "height": 1180})
     settled(pair)

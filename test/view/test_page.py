@@ -67,7 +67,8 @@ def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
     page.click("#plan", position={"x": 20, "y": 20})
     press(page, "k")
     stopped = clock(page)
-    page.wait_for_timeout(300)
+    for _ in range(10):  # so many frames would show time going on
+        settled(page)
     assert clock(page) == stopped
     press(page, "End")
     assert clock(page) == 24.0
@@ -76,6 +77,39 @@ def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
 def test_the_page_opens_before_what_failed_and_says_it_as_text(page: Any) -> None:
     assert clock(page) == pytest.approx(17.0, abs=0.05)
     assert page.inner_text("#notice") == "always: no more than 20 bottles <script>alert(3)</script>"
+
+
+def test_what_is_to_be_noticed_is_whole_and_dismissed(page: Any) -> None:
+    box, stage = page.locator("#notice").bounding_box(), page.locator("#stage").bounding_box()
+    assert stage["x"] < box["x"] and box["x"] + box["width"] < stage["x"] + stage["width"]
+    assert page.evaluate("notice.scrollHeight <= notice.clientHeight")
+    page.click("#dismiss")
+    assert page.inner_text("#notice") == "" and not page.locator("#dismiss").is_visible()
+
+
+def test_colours_of_states_and_of_where_the_time_went_are_explained(page: Any) -> None:
+    seek(page, 12.0)
+    page.click("#tab_line")
+    states, times = (" ".join(key.split()) for key in page.locator("#panel_line .key").all_inner_texts())
+    assert states == "Suspended Execute Held" and times == "running starved"
+
+
+def test_the_plan_stays_where_it_is_unless_the_place_is_out_of_sight(page: Any) -> None:
+    def camera() -> list[float]:
+        return [float(part) for part in page.get_attribute("#plan", "data-camera").split()][:3]
+
+    seek(page, 12.0)
+    before = camera()
+    page.click("#tab_alarms")
+    page.locator("#panel_alarms .alarm", has_text="queue_stands").click()
+    page.click("#tab_device")
+    page.select_option("#panel_device select", "machines/capper")
+    settled(page)
+    assert camera() == before
+    press(page, *"+" * 8)
+    page.select_option("#panel_device select", "photo_eyes/exit")
+    settled(page)
+    assert camera()[:2] == pytest.approx([4.45, 1.2], abs=0.01)
 
 
 def test_hostile_names_are_shown_as_text_under_a_policy(page: Any) -> None:

@@ -1,14 +1,14 @@
 // The alarm list: what is not normal now, the first-out marked; a click jumps to where and when it came.
 
 import { controlsOfAlarm } from "./controls.js";
-import { element, refill, seconds } from "./dom.js";
+import { element, refill, seconds, titled } from "./dom.js";
 import { ALARM_STATES } from "./story.js";
 
 export class Alarms {
   constructor(view) {
     this.view = view;
-    this.list = element("ul", { class: "rows", "aria-label": "Alarms" });
-    this.root = element("section", {}, element("h2", {}, "Alarms"), this.list);
+    this.list = element("ul", { class: "rows", "aria-label": titled("Alarms", view) });
+    this.root = element("section", {}, element("h2", {}, titled("Alarms", view)), this.list);
     this.drawn = null;
   }
 

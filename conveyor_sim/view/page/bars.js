@@ -3,25 +3,34 @@
 import { lastUpTo } from "./block.js";
 import { palette } from "./colours.js";
 import { stateColour } from "./devices.js";
-import { element, sharp } from "./dom.js";
+import { element, keyOf, sharp, titled } from "./dom.js";
 import { stateName } from "./story.js";
 
 const ROW = 26, NAME = 96;
+const STATE = /^machines\/.*\/state$/;
 
 export class Bars {
   constructor(view) {
     this.view = view;
     this.canvas = element("canvas", { class: "bars", height: 1, role: "button", tabindex: "0", onclick: (event) => this._jump(event), onkeydown: (event) => event.key === "Enter" && this._next() });
+    this.key = element("p", { class: "key" });
     this.note = element("p", { class: "muted" });
     this.named();
-    this.root = element("section", {}, element("h2", {}, "Machines"), this.canvas, this.note);
+    this.root = element("section", {}, element("h2", {}, titled("Machines", view)), this.canvas, this.key, this.note);
   }
 
   named() {
-    this.names = [...this.view.story.machines.keys()].sort();
-    this.canvas.setAttribute("aria-label", `States over time of ${this.names.join(", ") || "no machine"}. Enter goes to the next change.`);
+    const { story, recording: { head, tags } } = this.view;
+    const never = head.signals.filter((name) => STATE.test(name) && Number.isFinite(tags.get(name)?.initial)).map((name) => name.replace(/\/state$/, ""));
+    this.names = [...new Set([...story.machines.keys(), ...never])].sort();
+    const states = [...story.machines.values()].flat().map(({ state }) => state);
+    const initial = this.names.map((name) => tags.get(`${name}/state`)?.initial).filter(Number.isFinite);
+    this.key.replaceChildren(...keyOf([...new Set([...states, ...initial])].sort((a, b) => a - b).map((state) => [stateColour(state), stateName(state)])));
+    this.canvas.setAttribute("aria-label", `${titled("States over time", this.view)} of ${this.names.join(", ") || "no machine"}. Enter goes to the next change.`);
     this.canvas.style.height = `${this.names.length * ROW + 4}px`;
-    this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "No machine has changed its state.";
+    this.canvas.hidden = this.key.hidden = !this.names.length;
+    this.note.hidden = this.view.letter === "B"; // said once
+    this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "There is no machine.";
   }
 
   _span() {
@@ -49,10 +58,10 @@ export class Bars {
     context.font = "12px system-ui, sans-serif";
     context.textBaseline = "middle";
     this.names.forEach((name, row) => {
-      const changes = story.machines.get(name), top = row * ROW + 4;
+      const changes = story.machines.get(name) ?? [], top = row * ROW + 4;
       context.fillStyle = colours.ink;
       context.fillText(name.split("/").pop(), 0, top + 9, NAME - 6);
-      const initial = this.view.recording.tags.get(`${name}/state`)?.initial;
+      const initial = changes.length ? this.view.recording.tags.get(`${name}/state`)?.initial : this.view.signal(`${name}/state`);
       const all = initial === undefined || initial === null ? changes : [{ time: from, state: initial }, ...changes];
       all.forEach((change, i) => {
         const end = all[i + 1]?.time ?? to;

@@ -15,7 +15,8 @@ export class Beside {
     byId("plan").setAttribute("aria-label", "Plan of recording A. W, A, S and D move both plans, plus and minus zoom, B chooses a bottle.");
     // What is chosen and set is the first one's; the rest is its own.
     this.other = Object.create(view);
-    Object.assign(this.other, { recording, story, rival: view });
+    view.letter = "A";
+    Object.assign(this.other, { recording, story, rival: view, letter: "B", badge: () => {}, jump: (...where) => view.jump(...where) });
     this.other.wear = new Wear(this.other);
     this.plan = this.other.plan = new Plan(this.canvas, this.other);
     view.rival = this.other;

@@ -29,6 +29,12 @@ class Numbers {
   }
 }
 
+// One in which nothing is.
+export function emptyBlock() {
+  const table = () => ({ times: [], columns: [] });
+  return { times: [], tracks: [], byId: new Map(), contacts: [], belts: table(), signals: table(), measured: true };
+}
+
 // steps: head.steps; start: tick; tick: s. Times in s, lengths in m, forces in N.
 export function readBlock(bytes, steps, start, tick) {
   const numbers = new Numbers(bytes);

@@ -1,7 +1,7 @@
 // One bottle: what it is, how fast, and its forces over the last seconds.
 
 import { palette } from "./colours.js";
-import { element, seconds, sharp } from "./dom.js";
+import { element, seconds, sharp, titled } from "./dom.js";
 
 const SHOWN = 10; // s
 
@@ -12,7 +12,7 @@ export class Bottle {
     this.follow = element("input", { type: "checkbox", id: "follow", onchange: (event) => view.setFollowing(event.target.checked) });
     this.speed = element("canvas", { class: "spark", role: "img", "aria-label": "Speed over the last 10 s" });
     this.force = element("canvas", { class: "spark", role: "img", "aria-label": "Peak force over the last 10 s" });
-    this.root = element("section", {}, element("h2", {}, "Bottle"), this.facts,
+    this.root = element("section", {}, element("h2", {}, titled("Bottle", view)), this.facts,
       element("label", { class: "check" }, this.follow, " Follow it (F)"), this.speed, this.force);
   }
 
@@ -42,7 +42,7 @@ export class Bottle {
     const context = sharp(canvas);
     if (!context) return;
     const colours = palette(), { clientWidth: width, clientHeight: height } = canvas, to = this.view.clock.time;
-    const most = Math.max(1e-3, ...points.map(([, value]) => value));
+    const highest = Math.max(0, ...points.map(([, value]) => value)), most = Math.max(1e-3, highest);
     context.strokeStyle = "#0072b2";
     context.lineWidth = 1.5;
     context.beginPath();
@@ -50,6 +50,6 @@ export class Bottle {
     context.stroke();
     context.fillStyle = colours.muted;
     context.font = "12px system-ui, sans-serif";
-    context.fillText(`${name}, up to ${most.toPrecision(3)} ${unit}`, 4, 12);
+    context.fillText(`${name}, up to ${+highest.toPrecision(3)} ${unit}`, 4, 12);
   }
 }

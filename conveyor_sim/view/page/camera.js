@@ -59,6 +59,12 @@ export class Camera extends EventTarget {
     this._changed();
   }
 
+  // Where a place can be seen, and no more than that.
+  show(x, y, margin = 40) {
+    const [px, py] = [this.toX(x), this.toY(y)];
+    if (px < margin || py < margin || px > this.width - margin || py > this.height - margin) this.centre(x, y);
+  }
+
   _changed(fitted = false) {
     this.fitted = fitted;
     this.dispatchEvent(new Event("change"));

@@ -10,7 +10,7 @@ const APART = 1e-3; // m, of bottles that are told of
 
 export class Compare {
   constructor(view, compared) {
-    Object.assign(this, { view, compared, found: [], done: false });
+    Object.assign(this, { view, compared, found: [], done: false, failed: "" });
     this.first = element("ul", { class: "rows", "aria-label": "First differences" });
     this.bottles = element("p", {});
     this.table = element("table", {});
@@ -45,14 +45,14 @@ export class Compare {
   }
 
   _first() {
-    const key = `${this.found.map(({ tick }) => tick).join()} ${this.done}`;
+    const key = `${this.found.map(({ tick }) => tick).join()} ${this.done} ${this.failed}`;
     if (key === this.key) return;
     this.key = key;
     const rows = this.found.map(({ kind, time, texts, bottle }) => element("li", {},
       element("button", { class: "first", dataset: { key: kind }, onclick: () => this.view.jump(time, "", bottle ?? -1) },
         element("time", {}, seconds(time)),
         element("span", { class: "what" }, element("b", {}, TITLES[kind]), ...texts.map((text) => element("small", {}, text))))));
-    const nothing = this.done ? this.words() : "Looking for the first difference …";
+    const nothing = this.failed || (this.done ? this.words() : "Looking for the first difference …");
     refill(this.first, rows.length ? rows : [element("li", { class: "muted" }, nothing)]);
   }
 

@@ -4,6 +4,7 @@ import { byId, element, seconds } from "./dom.js";
 import { wallTime } from "./live.js";
 
 const SURE = 5000; // ms in which a second click counts
+const STANDS = ["paused", "ended", "stopped"]; // of a run
 const TOLD = 500; // ms between two latencies that are shown
 const REMEMBERED = 20; // s in which a refusal by the line is one of what was asked for here
 
@@ -48,7 +49,9 @@ export class Desk {
     this.link.textContent = { locked: "● Sign in to see the line", broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
     this.link.className = state;
     this.run.textContent = state === "live" ? `${run}${reason ? `: ${reason}` : ""}` : "";
-    const useful = { pause: run !== "paused", resume: run === "paused", step: run === "paused", reset: true };
+    const stands = STANDS.includes(run);
+    this.run.classList.toggle("stands", stands);
+    const useful = { pause: !stands, resume: run === "paused", step: run === "paused", reset: true };
     for (const [what, button] of this.buttons) button.hidden = state !== "live" || !useful[what];
     this.late.hidden = state !== "live";
     const { name, role } = line.person;

@@ -1,6 +1,7 @@
 // Eyes, zones, machines, counters, and gates, pushers and diverters where they are.
 
 import { CATEGORIES } from "./colours.js";
+import { outside, placeAt } from "./labels.js";
 import { stateName } from "./story.js";
 
 const FOLDERS = {
@@ -8,6 +9,7 @@ const FOLDERS = {
   station: "machines", source: "machines", sink: "machines", inspection: "machines", reject: "machines",
 };
 
+const LONG = 2; // regions so many times as wide as high have their names above or below
 const SHOWN_BAD = 0.5; // s that an inspection is lit after a bad bottle
 
 export const deviceOf = (mark) => `${FOLDERS[mark.kind] ?? `${mark.kind}s`}/${mark.name}`;
@@ -55,9 +57,13 @@ export function drawAreas(context, camera, colours, view) {
 }
 
 function label(view, camera, mark, note, importance, colour) {
-  const [x, y] = middle(mark.points);
-  const reach = Math.max(...mark.points.map(([, py]) => Math.abs(py - y))) * camera.scale;
-  view.labels.add(mark.name + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80), colour, bold: importance > 5 });
+  const [x, y] = middle(mark.points), isLine = mark.points.length === 2, [from, to] = mark.points;
+  const far = (point) => (isLine ? Math.hypot(point[0] - x, point[1] - y) : Math.abs(point[1] - y));
+  const reach = Math.max(...mark.points.map(far)) * camera.scale;
+  const width = Math.max(...mark.points.map((point) => Math.abs(point[0] - x))) * camera.scale;
+  const towards = isLine ? placeAt(Math.atan2(to[1] - from[1], to[0] - from[0])) // behind the end of a beam
+    : width > LONG * reach ? [0, -1] : null;
+  view.labels.add(mark.name + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80), colour, bold: importance > 5, towards });
 }
 
 export function drawLines(context, camera, colours, view) {
@@ -150,7 +156,9 @@ export function drawMovers(context, camera, colours, view) {
     }
     context.setLineDash([]);
     context.lineCap = "butt";
-    const [x, y] = middle(moverEnds(mover, position));
-    view.labels.add(mover.name.split("/")[1], camera.toX(x), camera.toY(y), { importance: 4, reach: 8, colour: colours.mover });
+    const ends = moverEnds(mover, position), [x, y] = middle(ends), [ax, ay] = mover.along;
+    const reach = 4 + 0.5 * camera.scale * Math.max(Math.abs(ends[1][0] - ends[0][0]), Math.abs(ends[1][1] - ends[0][1]));
+    const towards = ax || ay ? outside(Math.atan2(ay, ax)) : null; // where it goes
+    view.labels.add(mover.name.split("/")[1], camera.toX(x), camera.toY(y), { importance: 4, reach, colour: colours.mover, towards });
   }
 }

@@ -19,6 +19,24 @@ export function refill(list, rows) {
   if (key !== undefined) list.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus({ preventScroll: true });
 }
 
+// What colours mean: pairs of colour and name.
+export function keyOf(entries) {
+  return entries.map(([colour, name]) => {
+    const swatch = element("span", { class: "swatch" });
+    swatch.style.background = colour;
+    return element("span", { class: "entry" }, swatch, name);
+  });
+}
+
+// What heads a panel: where two recordings are shown, with whose it is.
+export const titled = (text, view) => (view.letter ? `${text} of ${view.letter}` : text);
+
+// What is to be noticed, over the plan; "": nothing.
+export function say(text) {
+  byId("notice").textContent = text;
+  byId("news").classList.toggle("none", !text);
+}
+
 export const byId = (id) => document.getElementById(id);
 
 export function seconds(time, digits = 2) {

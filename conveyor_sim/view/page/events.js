@@ -1,7 +1,7 @@
 // The event list: what happened around now, by kind and by words; a click jumps there.
 
 import { lastUpTo } from "./block.js";
-import { element, refill, seconds, shown } from "./dom.js";
+import { element, refill, seconds, shown, titled } from "./dom.js";
 
 const KINDS = {
   alarms: (kind) => kind.startsWith("alarm_"),
@@ -21,7 +21,7 @@ export class Events {
     const boxes = Object.keys(KINDS).map((kind) => element("label", { class: "check" },
       element("input", { type: "checkbox", checked: this.on.has(kind), value: kind, onchange: (event) => this._switch(kind, event.target.checked) }), ` ${kind}`));
     this.list = element("ol", { class: "rows", "aria-label": "Events" });
-    this.root = element("section", { class: "events" }, element("h2", {}, "Events"), element("div", { class: "filters" }, this.words, ...boxes), this.list);
+    this.root = element("section", { class: "events" }, element("h2", {}, titled("Events", view)), element("div", { class: "filters" }, this.words, ...boxes), this.list);
     this.filter();
   }
 
@@ -50,11 +50,11 @@ export class Events {
   }
 
   _row(event, place, now) {
-    const { tags } = this.view.recording, value = event.kind === "machine_state" ? ` ${shown(event.value, tags.get(event.name))}` : "";
+    const { tags } = this.view.recording, state = event.kind === "machine_state" ? shown(event.value, tags.get(event.name)) : "";
     const about = event.bottle >= 0 ? `${event.name} · bottle ${event.bottle}` : event.name;
     return element("li", {}, element("button", {
       class: `event${place === now ? " now" : ""}${place > now ? " later" : ""}`, "aria-current": place === now ? "true" : null, dataset: { key: place },
       onclick: () => this.view.jump(event.time, event.name, event.bottle),
-    }, element("time", {}, seconds(event.time)), element("span", { class: "what" }, element("b", {}, event.kind.replace("_", " ")), ` ${about}${value}`, event.text ? element("small", {}, event.text) : null)));
+    }, element("time", {}, seconds(event.time)), element("span", { class: "what" }, element("b", {}, event.kind.replace("_", " ")), ` ${about} ${state}`, event.text && event.text !== state ? element("small", {}, event.text) : null)));
   }
 }

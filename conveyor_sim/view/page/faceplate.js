@@ -1,4 +1,4 @@
-// Faceplates: all tags of a device as they are now; a click on a tag puts it on the trends.
+// Faceplates: all tags of a device as they are now, in two recordings in both; a click on a tag puts it on the trends.
 
 import { controlsOf } from "./controls.js";
 import { element, seconds, shown } from "./dom.js";
@@ -9,12 +9,13 @@ const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm:
 export class Faceplate {
   constructor(view) {
     this.view = view;
+    this.views = view.plans.map((plan) => plan.view);
     this.devices = [...new Set(view.recording.head.tags.map((tag) => tag.device).filter(Boolean))];
     this.choice = element("select", { "aria-label": "Device", onchange: () => view.selectDevice(this.choice.value) },
       ...this.devices.map((name) => element("option", { value: name }, name)));
     this.body = element("div", { class: "plate" });
     this.root = element("section", {}, element("h2", {}, "Device"), this.choice, this.body);
-    this.cells = [];
+    this.rows = [];
     if (this.devices.length) this.show(this.devices[0]);
   }
 
@@ -23,47 +24,66 @@ export class Faceplate {
     this.device = device;
     this.choice.value = device;
     const { recording } = this.view, tags = recording.head.tags.filter((tag) => tag.device === device);
-    this.cells = [];
+    this.rows = [];
     const groups = ORDER.filter((role) => tags.some((tag) => tag.role === role)).map((role) => element("div", {},
       element("h3", {}, TITLES[role]),
-      element("table", {}, ...tags.filter((tag) => tag.role === role).flatMap((tag) => this._row(tag, device)))));
+      element("table", {}, ...this._whose(), ...tags.filter((tag) => tag.role === role).flatMap((tag) => this._row(tag, device)))));
     this.body.replaceChildren(element("p", { class: "muted" }, tags[0]?.class?.replace("_", " ") ?? ""), ...groups);
     this.draw();
   }
 
+  // Of two recordings, which column is whose.
+  _whose() {
+    return this.views.length < 2 ? [] : [element("tr", { class: "whose" }, element("td", {}), ...this.views.map(({ letter }) => element("th", { scope: "col" }, letter)))];
+  }
+
   _row(tag, device) {
-    const { recording } = this.view, signal = recording.signalIndex.get(tag.name), command = recording.head.commands.indexOf(tag.name);
-    const value = element("td", { class: "value" }), note = element("small", {});
-    this.cells.push({ tag, signal, command, value, note });
+    const signal = this.view.recording.signalIndex.get(tag.name), note = element("small", {});
+    const cells = this.views.map((view) => {
+      const { recording: { signalIndex, head } } = view, value = element("td", { class: "value" });
+      return { view, value, signal: signalIndex.get(tag.name), command: head.commands.indexOf(tag.name) };
+    });
+    const hands = controlsOf(tag, this.view), choice = hands?.querySelector("select");
+    this.rows.push({ tag, cells, note, choice });
     const name = tag.name.slice(device.length + 1) || tag.name;
     const head = signal === undefined ? name : element("button", { class: "link", title: "Put on the trends", onclick: () => this.view.trends.add(tag.name) }, name);
     const watch = signal === undefined || !this.view.watch ? "" : element("button", { class: "quiet", title: "Put on the watch table", "aria-label": `Watch ${tag.name}`, onclick: () => this.view.watch.add(tag.name) }, "◎");
-    const row = element("tr", { title: tag.description ?? "" }, element("th", { scope: "row" }, head, watch, note), value), hands = controlsOf(tag, this.view);
+    const row = element("tr", { title: tag.description ?? "" }, element("th", { scope: "row" }, head, watch, note), ...cells.map(({ value }) => value));
     return hands ? [row, element("tr", { class: "hands" }, element("td", { colspan: "2" }, hands))] : [row];
   }
 
   draw() {
-    const { clock, recording, story } = this.view, forced = story.forcedAt(clock.time);
-    for (const { tag, signal, command, value, note } of this.cells) {
-      let now = tag.initial, said = "";
-      if (signal !== undefined) {
-        now = recording.at("signals", signal, clock.time);
-        if (forced.has(tag.name)) said = "forced";
-      } else if (command >= 0) {
-        const read = story.readBackAt(command, clock.time);
-        if (read) [now, said] = [read.value, `by ${read.writer} since ${seconds(read.since)}`];
-      } else if (tag.role === "fault") now = this._fault(tag.name) ?? tag.initial;
-      const text = shown(now, tag);
-      if (value.textContent !== text) value.textContent = text;
+    const { time } = this.view.clock, forced = new Map(this.views.map((view) => [view, view.story.forcedAt(time)]));
+    for (const row of this.rows) {
+      const { tag, cells, note, choice } = row;
+      const notes = cells.map((cell) => {
+        const [now, said] = this._now(tag, cell, forced.get(cell.view)), text = shown(now, tag), { value } = cell;
+        if (choice && Number.isFinite(now) && now !== row.chosen && choice !== document.activeElement) choice.value = row.chosen = now; // by whomever
+        if (value.textContent !== text) value.textContent = text;
+        value.classList.toggle("on", tag.kind === "bool" && now === 1);
+        value.classList.toggle("forced", said === "forced");
+        return said;
+      });
+      const isOne = notes.every((said) => said === notes[0]);
+      const said = isOne ? notes[0] : notes.map((one, i) => (one ? `${this.views[i].letter}: ${one}` : "")).filter(Boolean).join(", ");
       if (note.textContent !== said) note.textContent = said;
-      value.classList.toggle("on", tag.kind === "bool" && now === 1);
-      value.classList.toggle("forced", said === "forced");
     }
   }
 
-  _fault(name) {
+  // The value of a tag in a recording, and what there is to say of it.
+  _now(tag, { view: { recording, story, clock }, signal, command }, forced) {
+    if (signal !== undefined) return [recording.at("signals", signal, clock.time), forced.has(tag.name) ? "forced" : ""];
+    if (command >= 0) {
+      const read = story.readBackAt(command, clock.time);
+      return read ? [read.value, `by ${read.writer} since ${seconds(read.since)}`] : [tag.initial, ""];
+    }
+    if (!recording.tags.has(tag.name)) return [null, ""];
+    return [(tag.role === "fault" ? this._fault(story, tag.name) : undefined) ?? tag.initial, ""];
+  }
+
+  _fault(story, name) {
     let now;
-    for (const event of this.view.story.events) {
+    for (const event of story.events) {
       if (event.time > this.view.clock.time + 1e-6) break;
       if (event.name === name && event.kind === "fault_injected") now = event.value;
       if (event.name === name && event.kind === "fault_cleared") now = 0;

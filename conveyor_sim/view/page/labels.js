@@ -2,6 +2,18 @@
 
 const PLACES = [[0, -1], [0, 1], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1, 1]];
 const GAP = 5;
+const snapped = (part) => (Math.abs(part) < Math.sin(Math.PI / 8) ? 0 : Math.sign(part));
+
+const placesTowards = ([x, y]) => [[x, y], [-x, -y], ...PLACES.filter(([dx, dy]) => dx * x + dy * y)];
+
+// The place in a direction of the plan (rad).
+export const outside = (angle) => [snapped(Math.cos(angle)), snapped(-Math.sin(angle))];
+
+// The same along a line, whichever way it runs: rather up than down, rather right than left.
+export function placeAt(angle) {
+  const [dx, dy] = outside(angle);
+  return dy > 0 || (dy === 0 && dx < 0) ? [-dx, -dy] : [dx, dy];
+}
 
 export class Labels {
   constructor() {
@@ -12,9 +24,10 @@ export class Labels {
     this.wanted.length = 0;
   }
 
-  // x, y: px; reach: px from there to where it may stand; the most important first.
-  add(text, x, y, { importance = 0, reach = 6, colour = null, bold = false } = {}) {
-    this.wanted.push({ text, x, y, importance, reach, colour, bold });
+  // x, y: px; reach: px from there to where it may stand; the most important first. towards: the best of PLACES; what lies
+  // across to it is on what is named.
+  add(text, x, y, { importance = 0, reach = 6, colour = null, bold = false, towards = null } = {}) {
+    this.wanted.push({ text, x, y, importance, reach, colour, bold, places: towards ? placesTowards(towards) : PLACES });
   }
 
   draw(context, camera, colours) {
@@ -26,7 +39,7 @@ export class Labels {
       if (label.x < -50 || label.y < -20 || label.x > camera.width + 50 || label.y > camera.height + 20) continue;
       context.font = `${label.bold ? "600 " : ""}12px system-ui, sans-serif`;
       const width = context.measureText(label.text).width + 6, height = 16;
-      for (const [dx, dy] of PLACES) {
+      for (const [dx, dy] of label.places) {
         const beside = label.x + dx * (label.reach + GAP + width / 2);
         const x = dy ? Math.min(camera.width - width / 2, Math.max(width / 2, beside)) : beside, y = label.y + dy * (label.reach + GAP + height / 2);
         const box = [x - width / 2, y - height / 2, x + width / 2, y + height / 2];

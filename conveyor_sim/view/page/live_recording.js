@@ -1,11 +1,12 @@
 // What has been received of a line that runs, as a recording that grows at its end and is forgotten at its beginning.
 
+import { emptyBlock } from "./block.js";
 import { Recording } from "./recording.js";
 
 const MOST = 300; // blocks that are kept
 const MOST_POINTS = 6e6; // bottles and contacts in all of them
 
-const nothing = () => ({ times: [], tracks: [], byId: new Map(), last: new Map(), contacts: [], belts: { times: [], columns: [] }, signals: { times: [], columns: [] }, points: 0, measured: true });
+const nothing = () => ({ ...emptyBlock(), last: new Map(), points: 0 });
 const NOTHING = nothing();
 
 export class LiveRecording extends Recording {

@@ -2,7 +2,7 @@
 
 import { SPEEDS } from "./clock.js";
 import { COLOURINGS, colourings, isDark } from "./colours.js";
-import { byId, element, seconds } from "./dom.js";
+import { byId, element, say, seconds } from "./dom.js";
 import { listenToKeys } from "./keys.js";
 import { Line } from "./live.js";
 import { LiveRecording } from "./live_recording.js";
@@ -25,6 +25,7 @@ function wire(view) {
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
   const clicks = {
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
+    dismiss: () => say(""),
     to_start: () => { clock.seek(clock.recording.start); view.snap(); },
     theme: () => { document.documentElement.dataset.theme = isDark() ? "light" : "dark"; view.touch(); },
     toggle_trends: () => {
@@ -49,8 +50,18 @@ function wire(view) {
 // A recording and what happened; of a long one that is read later.
 async function opened(source) {
   const head = await read(source, "head"), story = new Story(head);
-  if (head.times.stories === 1) story.add(await read(source, "story/0"));
-  return { recording: new Recording(source, head), story };
+  const failed = head.times.stories === 1 ? await told(source, 0, (part) => story.add(part)) : "";
+  return { recording: new Recording(source, head), story, failed };
+}
+
+// Reads what happened in a part of a recording; why that can't be, or "".
+async function told(source, part, take) {
+  try {
+    take(await read(source, `story/${part}`));
+    return "";
+  } catch (error) {
+    return error.message;
+  }
 }
 
 async function read(source, name) {
@@ -62,7 +73,13 @@ async function compare(view, source, { stretches }) {
   const untouched = !view.clock.playing && view.clock.time === view.clock.recording.start;
   for (let part = 0; part < stretches && !view.compare.complete; part++) {
     const before = view.compare.found.length;
-    view.compare.add(await read(source, `difference/${part}`));
+    try {
+      view.compare.add(await read(source, `difference/${part}`));
+    } catch (error) {
+      view.compare.failed = `They can't be compared further: ${error.message}`;
+      view.say(view.compare.failed);
+      return;
+    }
     if (view.compare.found.length === before) continue;
     view.compared();
     for (const { signals } of view.compare.found) for (const name of signals.slice(0, 3)) view.trends.add(name);
@@ -82,13 +99,13 @@ async function start() {
     return;
   }
   const line = new Line();
-  byId("notice").textContent = "Waiting for the line.";
+  say("Waiting for the line.");
   line.addEventListener("locked", () => {
-    byId("notice").textContent = "Sign in to see the line.";
+    say("Sign in to see the line.");
     line.signing.open();
   });
   line.addEventListener("begin", ({ detail }) => {
-    byId("notice").textContent = "";
+    say("");
     const story = new Story(detail.head), recording = new LiveRecording(detail.head);
     story.add(detail.story);
     const view = new View(recording, story, null, line, detail);
@@ -116,11 +133,13 @@ function run(view) {
 }
 
 async function startRecording() {
-  const source = openSource(), { recording, story } = await opened(source), { head } = recording, parts = head.times.stories;
+  const source = openSource(), { recording, story, failed } = await opened(source), { head } = recording, parts = head.times.stories;
   const behind = { bytes: (name) => source.bytes(`other/${name}`) }, other = head.compared ? await opened(behind) : null;
   const view = new View(recording, story, other);
   wire(view);
   view.resize();
+  let unread = failed || other?.failed || "";
+  view.say(unread);
   const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
   if (failure) {
     view.say(failure.text);
@@ -132,16 +151,16 @@ async function startRecording() {
   // A long recording is gone through while one looks at it already.
   for (let part = 0; parts > 1 && part < parts; part++) {
     view.say(`reading what happened: ${Math.round((100 * part) / parts)} %`);
-    view.toldMore(await read(source, `story/${part}`));
+    unread = await told(source, part, (more) => view.toldMore(more)) || unread;
   }
-  if (parts > 1) view.say("");
+  if (parts > 1) view.say(unread);
   document.body.dataset.told = "yes";
   for (let part = 0; other && part < other.recording.head.times.stories; part++) {
-    if (other.recording.head.times.stories > 1) other.story.add(await read(behind, `story/${part}`));
+    if (other.recording.head.times.stories > 1) unread = await told(behind, part, (more) => view.toldMoreOf(other.story, more)) || unread;
   }
   if (other) await compare(view, source, head.compared);
 }
 
 start().catch((error) => {
-  byId("notice").textContent = `This recording can't be shown: ${error.message}`;
+  say(`This recording can't be shown: ${error.message}`);
 });

@@ -4,7 +4,7 @@ import { Belts } from "./belts.js";
 import { COLOURINGS, palette } from "./colours.js";
 import { Crowd, MANY } from "./crowd.js";
 import { drawAreas, drawLines, drawMovers } from "./devices.js";
-import { Labels } from "./labels.js";
+import { Labels, outside, placeAt } from "./labels.js";
 
 const WIDTHS = 6; // of lines of force
 
@@ -155,8 +155,10 @@ export class Plan {
       const [x, y] = belt.kind === "straight"
         ? [0, 1].map((k) => (belt.outline[0][k] + belt.outline[2][k]) / 2)
         : [belt.centre[0] + radius * Math.cos(angle), belt.centre[1] + radius * Math.sin(angle)];
+      const towards = belt.kind === "straight" ? placeAt(belt.angle + Math.PI / 2) : outside(angle);
       this.labels.add(`${belt.name} ${speeds[i].toFixed(2)} m/s`, camera.toX(x), camera.toY(y), {
         importance: 2, reach: Math.min(60, 0.5 * belt.width * camera.scale), colour: colours.muted,
+        towards,
       });
     });
   }

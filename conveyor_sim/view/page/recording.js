@@ -1,6 +1,6 @@
 // A recording by time: frames of bottles, signals, contacts, in blocks that are loaded as they are asked for.
 
-import { lastUpTo, readBlock } from "./block.js";
+import { emptyBlock, lastUpTo, readBlock } from "./block.js";
 
 const KEPT = 60; // blocks
 const NEAR = 1e-6; // s
@@ -65,7 +65,9 @@ export class Recording extends EventTarget {
       return read;
     } catch (error) {
       this.dispatchEvent(new CustomEvent("failed", { detail: error.message }));
-      return null;
+      const empty = emptyBlock(); // it can't be read: time goes on over it
+      this.blocks.set(number, empty);
+      return empty;
     } finally {
       this.pending.delete(number);
       reading(-1);

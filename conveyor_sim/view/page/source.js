@@ -1,5 +1,10 @@
 // Where a page's data comes from: bytes by name ("head", "story", "block/0"). A recording in the page itself, or a server.
 
+import { byId, say } from "./dom.js";
+
+const AGAIN = 2000; // ms
+const NO_ANSWER = "● No answer from the server: trying again";
+
 async function inflated(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
@@ -18,9 +23,29 @@ class Embedded {
 
 class Served {
   async bytes(name) {
-    const answer = await fetch(`data/${name}`);
-    if (!answer.ok) throw new Error((await answer.text()).trim() || `${name}: ${answer.status}`);
-    return inflated(new Uint8Array(await answer.arrayBuffer()));
+    const [answer, bytes] = await this._answer(name);
+    if (!answer.ok) throw new Error(new TextDecoder().decode(bytes).trim() || `${name}: ${answer.status}`);
+    return inflated(bytes);
+  }
+
+  // Of a server that does not answer it is asked again, and the page says so meanwhile.
+  async _answer(name) {
+    for (;;) {
+      try {
+        const answer = await fetch(`data/${name}`), bytes = new Uint8Array(await answer.arrayBuffer());
+        this._link(true);
+        return [answer, bytes];
+      } catch {
+        this._link(false);
+        await new Promise((over) => setTimeout(over, AGAIN));
+      }
+    }
+  }
+
+  _link(there) {
+    if (!there) say(NO_ANSWER);
+    else if (byId("notice").textContent === NO_ANSWER) say("");
+    document.body.dataset.link = there ? "served" : "broken";
   }
 }
 

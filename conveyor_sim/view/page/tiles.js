@@ -1,7 +1,7 @@
 // OEE tiles: what each machine and the line have made since their last reset.
 
 import { CATEGORIES } from "./colours.js";
-import { element } from "./dom.js";
+import { element, keyOf, titled } from "./dom.js";
 
 const NOTHING = "–";
 const percent = (share) => (share === null || share === undefined ? NOTHING : `${(100 * share).toFixed(1)} %`);
@@ -10,7 +10,8 @@ export class Tiles {
   constructor(view) {
     this.view = view;
     this.list = element("div", { class: "tiles" });
-    this.root = element("section", {}, element("h2", {}, "Production"), this.list);
+    this.key = element("p", { class: "key" });
+    this.root = element("section", {}, element("h2", {}, titled("Production", view)), this.key, this.list);
     this.drawn = null;
   }
 
@@ -18,14 +19,16 @@ export class Tiles {
     const { story, clock, recording } = this.view, entry = story.countersAt(clock.time);
     if (entry === this.drawn && entry !== null) return;
     this.drawn = entry;
+    this.key.hidden = !entry;
     if (!entry) {
       this.list.replaceChildren(element("p", { class: "muted" }, "No counters were recorded up to here."));
       return;
     }
-    const fields = recording.head.fields.counters;
+    const fields = recording.head.fields.counters, seen = new Set();
     this.list.replaceChildren(...entry.name.map((name, i) => {
       const row = Object.fromEntries(fields.map((field, k) => [field, entry.rows[i][k]]));
       const times = Object.keys(CATEGORIES).map((category) => [category, row[category]]).filter(([, time]) => time > 0);
+      for (const [category] of times) seen.add(category);
       const all = times.reduce((sum, [, time]) => sum + time, 0);
       const bar = element("div", { class: "times", role: "img", "aria-label": times.map(([category, time]) => `${category} ${time.toFixed(0)} s`).join(", ") },
         ...times.map(([category, time]) => {
@@ -41,7 +44,8 @@ export class Tiles {
           ...[["availability", percent(row.availability)], ["effectiveness", percent(row.effectiveness)], ["quality", percent(row.quality)],
             ["bottles", `${row.processed}`]].filter(([, value]) => value !== NOTHING).flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
         all ? bar : null,
-        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, `${row.category}: ${row.stop_reason}`) : null);
+        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, row.category === row.stop_reason ? row.category : `${row.category}: ${row.stop_reason}`) : null);
     }));
+    this.key.replaceChildren(...keyOf(Object.entries(CATEGORIES).filter(([name]) => seen.has(name)).map(([name, colour]) => [colour, name])));
   }
 }

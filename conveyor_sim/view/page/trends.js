@@ -107,7 +107,7 @@ export class Trends {
   _marks(plot) {
     const { ctx: context, bbox } = plot, { clock, story } = this.view, [from, to] = this._span(), colours = palette();
     let free = 0; // px from which on there is room for a text
-    const line = (time, colour, dash, text) => {
+    const line = (time, colour, dash) => {
       const x = plot.valToPos(time, "x", true);
       context.strokeStyle = colour;
       context.lineWidth = devicePixelRatio;
@@ -117,13 +117,19 @@ export class Trends {
       context.lineTo(x, bbox.top + bbox.height);
       context.stroke();
       context.setLineDash([]);
-      if (!text || x < free) return;
-      context.fillStyle = colours.muted;
+    };
+    const say = (time, text) => {
+      const x = plot.valToPos(time, "x", true);
+      if (x < free) return;
+      context.fillStyle = colours.ink;
+      context.strokeStyle = colours.halo;
+      context.lineWidth = 4 * devicePixelRatio;
+      context.lineJoin = "round";
       context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
       const long = context.measureText(text).width, fits = x + 3 + long < bbox.left + bbox.width;
       if (!fits && x - 3 - long < free) return;
       context.textAlign = fits ? "left" : "right";
-      context.fillText(text, fits ? x + 3 : x - 3, bbox.top + 12 * devicePixelRatio);
+      for (const write of ["strokeText", "fillText"]) context[write](text, fits ? x + 3 : x - 3, bbox.top + 12 * devicePixelRatio);
       free = fits ? x + 8 + long : x;
     };
     context.save();
@@ -133,8 +139,9 @@ export class Trends {
       ...given.map(([time, place, value]) => ({ time, kind: "command", text: `${recording.head.commands[place].split("/").slice(-2).join("/")} = ${value}` })),
       ...story.marks,
     ].filter(({ time }) => time >= from && time <= to).sort((one, other) => one.time - other.time);
-    for (const { time, kind, text } of marks) line(time, MARKS[kind] ?? colours.muted, kind === "command" ? [3, 3] : [6, 3], text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text);
-    line(clock.time, colours.ink, [], "");
+    for (const { time, kind } of marks) line(time, MARKS[kind] ?? colours.muted, kind === "command" ? [3, 3] : [6, 3]);
+    line(clock.time, colours.ink, []);
+    for (const { time, text } of marks) say(time, text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text);
     context.restore();
   }
 

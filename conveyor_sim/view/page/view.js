@@ -10,7 +10,7 @@ import { COLOURINGS, SCALES, colourings } from "./colours.js";
 import { Compare } from "./compare.js";
 import { Desk } from "./desk.js";
 import { deviceOf, middle } from "./devices.js";
-import { byId, element, seconds } from "./dom.js";
+import { byId, element, keyOf, say, seconds } from "./dom.js";
 import { Events } from "./events.js";
 import { Faceplate } from "./faceplate.js";
 import { LiveClock } from "./live_clock.js";
@@ -33,6 +33,7 @@ export class View {
   constructor(recording, story, other, line = null, about = null) {
     Object.assign(this, { recording, story, line, bottle: null, following: false, colouring: "type", shownWear: "", showForces: true, showNames: true, dirty: true });
     this.rival = null; // what is shown beside this
+    this.letter = ""; // of two that are shown side by side, A
     this.fastest = 0.1;
     this.strongest = 1;
     this.oldest = line ? 60 : Math.max(1, Math.min(60, recording.end - recording.start));
@@ -51,11 +52,12 @@ export class View {
     this.scrubber = new Scrubber(this);
     this.trends = new Trends(this);
     this.faceplate = new Faceplate(this);
-    this.alarms = new Alarms(this);
-    this.bars = new Bars(this);
+    const shown = this.plans.map(({ view }) => view);
+    this.alarms = shown.map((one) => new Alarms(one));
+    this.bars = shown.map((one) => new Bars(one));
     this.events = new Events(this);
-    const production = { title: "Line", parts: [this.bars, new Tiles(this)] };
-    const panels = { line: production, alarms: { title: "Alarms", parts: [this.alarms] }, events: { title: "Events", parts: [this.events] },
+    const production = { title: "Line", parts: [...this.bars, ...shown.map((one) => new Tiles(one))] };
+    const panels = { line: production, alarms: { title: "Alarms", parts: this.alarms }, events: { title: "Events", parts: [this.events] },
       device: { title: "Device", parts: [this.faceplate] }, ...(line ? { watch: { title: "Watch", parts: [this.watch] } } : {}), bottle: { title: "Bottle", parts: [new Bottle(this)] } };
     this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : "line");
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
@@ -71,7 +73,7 @@ export class View {
   }
 
   say(text) {
-    byId("notice").textContent = byId("notice").title = text;
+    say(text);
   }
 
   badge(name, count) {
@@ -83,9 +85,14 @@ export class View {
   }
 
   toldMore(part) {
-    this.story.add(part);
+    this.toldMoreOf(this.story, part);
+  }
+
+  // The same of the recording beside.
+  toldMoreOf(story, part) {
+    story.add(part);
     this.events.filter();
-    this.bars.named();
+    for (const bars of this.bars) bars.named();
     this.worn();
     this.touch();
   }
@@ -176,9 +183,8 @@ export class View {
     if (bottle >= 0) this.selectBottle(bottle, false);
     const mark = this.recording.head.marks.find((other) => tag && (tag === deviceOf(other) || tag.startsWith(`${deviceOf(other)}/`)));
     if (!mark) return;
-    const [x, y] = middle(mark.points);
     this.setFollowing(false);
-    this.camera.centre(x, y);
+    this.camera.show(...middle(mark.points));
     this.faceplate.show(deviceOf(mark));
   }
 
@@ -206,7 +212,7 @@ export class View {
   selectDevice(name) {
     this.faceplate.show(name);
     const mark = this.recording.head.marks.find((other) => deviceOf(other) === name);
-    if (mark) this.camera.centre(...middle(mark.points));
+    if (mark) this.camera.show(...middle(mark.points));
     this.touch();
   }
 
@@ -244,13 +250,7 @@ export class View {
       return element("span", { class: "entry" }, `${low} `, bar, ` ${high}`);
     };
     if (colouring.ramp) entries.push(ramp(colouring.ramp, ...colouring.ends(this)));
-    else {
-      entries.push(...colouring.legend(this).map(([colour, name]) => {
-        const swatch = element("span", { class: "swatch" });
-        swatch.style.background = colour;
-        return element("span", { class: "entry" }, swatch, name);
-      }));
-    }
+    else entries.push(...keyOf(colouring.legend(this)));
     if (shown) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
     byId("legend").replaceChildren(...entries);
   }
@@ -295,7 +295,7 @@ export class View {
     document.body.dataset.bottles = this.plan.frame?.bottles.length ?? "";
     if (clock.playing && now - (this.panelsDrawn ?? 0) < PANELS_EVERY) return;
     this.panelsDrawn = now;
-    this.alarms.draw();
+    for (const alarms of this.alarms) alarms.draw();
     this.tabs.draw();
     this.trends.draw();
   }
