@@ -9,19 +9,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from conveyor_sim.accuracy import closed_forms
 from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import candidates, compared, forbidden, own_setting, preset_setting
-from conveyor_sim.accuracy.cpu import Meter
+from conveyor_sim.accuracy.cases import closed_forms
 from conveyor_sim.accuracy.effort import PROCESSORS, Effort, bars_with_left
-from conveyor_sim.accuracy.forecast import forecast, foretold
-from conveyor_sim.accuracy.no_contact import NoContact
-from conveyor_sim.accuracy.plain import Unlike, plain, typed
-from conveyor_sim.accuracy.precision import COST_BUDGET, FIRST_COST_BUDGET, FIRST_WORK, MOST_WORK, WorkPrecision
+from conveyor_sim.accuracy.measure.cpu import Meter
+from conveyor_sim.accuracy.measure.precision import COST_BUDGET, FIRST_COST_BUDGET, FIRST_WORK, MOST_WORK, WorkPrecision
+from conveyor_sim.accuracy.measure.sample_file import check_origin
+from conveyor_sim.accuracy.report.forecast import forecast, foretold
+from conveyor_sim.accuracy.report.no_contact import NoContact
+from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
+from conveyor_sim.accuracy.report.words import setting_name
 from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
-from conveyor_sim.accuracy.sample_file import check_origin
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.words import setting_name
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model.remedies import STEP_COST
 from conveyor_sim.scene import Scene

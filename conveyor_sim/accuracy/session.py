@@ -10,10 +10,10 @@ from types import FrameType
 
 from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.effort import PROCESSORS, Effort
-from conveyor_sim.accuracy.forecast import forecast
-from conveyor_sim.accuracy.interim import PRELIMINARY, Interim, predicted
-from conveyor_sim.accuracy.lines import summary
-from conveyor_sim.accuracy.no_contact import NoContact, without_contact
+from conveyor_sim.accuracy.report.forecast import forecast
+from conveyor_sim.accuracy.report.interim import PRELIMINARY, Interim, predicted
+from conveyor_sim.accuracy.report.lines import summary
+from conveyor_sim.accuracy.report.no_contact import NoContact, without_contact
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.study import run_study

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from conveyor_sim.accuracy.answer import eligible, find_answer, largest_error
 from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import own_setting, softer
 from conveyor_sim.accuracy.effort import Effort
-from conveyor_sim.accuracy.equivalence import decide, run_until_decided
-from conveyor_sim.accuracy.files import write_study
-from conveyor_sim.accuracy.interim import Interim, after_measuring, preliminary, unfinished
-from conveyor_sim.accuracy.lines import FEW
+from conveyor_sim.accuracy.measure.equivalence import decide, run_until_decided
+from conveyor_sim.accuracy.measure.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.measured import Measured, measured_once
+from conveyor_sim.accuracy.report.answer import eligible, find_answer, largest_error
+from conveyor_sim.accuracy.report.files import write_study
+from conveyor_sim.accuracy.report.interim import Interim, after_measuring, preliminary, unfinished
+from conveyor_sim.accuracy.report.lines import FEW
 from conveyor_sim.accuracy.results import Answer, Comparison, Point, Sample, StiffnessRow, Study
-from conveyor_sim.accuracy.sample_file import SampleFile, fingerprint
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene

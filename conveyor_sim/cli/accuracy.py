@@ -40,11 +40,11 @@ def accuracy(
     if not 0.0 < tolerance <= 0.5:
         raise ConveyorError(f"--tolerance: {tolerance:g} given, expected a number greater than 0, at most 0.5")
     with held_back():
-        from conveyor_sim.accuracy.apply import apply
         from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH
+        from conveyor_sim.accuracy.report.apply import apply
+        from conveyor_sim.accuracy.report.tables import terminal
         from conveyor_sim.accuracy.session import Session
         from conveyor_sim.accuracy.study import study_folder
-        from conveyor_sim.accuracy.tables import terminal
         from conveyor_sim.runs.report import plot_function
         from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from conveyor_sim.accuracy.report.words import percent, spread, with_unit
 from conveyor_sim.accuracy.results import Comparison, Study
-from conveyor_sim.accuracy.words import percent, spread, with_unit
 from conveyor_sim.plot import style
 from conveyor_sim.plot.heading import heading
 from conveyor_sim.plot.integrators import setting_text

@@ -7,8 +7,8 @@ from typing import Final, Literal
 
 from matplotlib.colors import to_hex, to_rgb
 
+from conveyor_sim.accuracy.report.words import digits, duration
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.words import digits, duration
 from conveyor_sim.plot import style
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from conveyor_sim.accuracy.words import digits
+from conveyor_sim.accuracy.report.words import digits
 
 _MOST = 9  # ticks
 

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
+from conveyor_sim.accuracy.report.words import digits
 from conveyor_sim.accuracy.results import Order
-from conveyor_sim.accuracy.words import digits
 from conveyor_sim.plot import style
 from conveyor_sim.plot.heading import heading
 from conveyor_sim.plot.integrators import look_of, order_of

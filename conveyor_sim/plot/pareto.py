@@ -14,10 +14,10 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from conveyor_sim.accuracy.pareto import front, place_of
+from conveyor_sim.accuracy.report.pareto import front, place_of
+from conveyor_sim.accuracy.report.words import digits, percent
 from conveyor_sim.accuracy.results import Point, Study
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.words import digits, percent
 from conveyor_sim.plot import style
 from conveyor_sim.plot.data import Floats
 from conveyor_sim.plot.heading import heading

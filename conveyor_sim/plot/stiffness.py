@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy.measure.observables import OBSERVABLES
+from conveyor_sim.accuracy.report.words import percent, unit_of
 from conveyor_sim.accuracy.results import DEEP, StiffnessRow
-from conveyor_sim.accuracy.words import percent, unit_of
 from conveyor_sim.plot import style
 from conveyor_sim.plot.heading import heading
 from conveyor_sim.plot.logarithmic import logarithmic_x, logarithmic_y

@@ -21,13 +21,13 @@ with while_importing():
     import click
     from page_parts import with_parts
 
-    from conveyor_sim.accuracy.answer import find_answer
-    from conveyor_sim.accuracy.apply import line
-    from conveyor_sim.accuracy.files import STUDY, read_study
-    from conveyor_sim.accuracy.forecast import foretold
-    from conveyor_sim.accuracy.lines import three_lines
+    from conveyor_sim.accuracy.report.answer import find_answer
+    from conveyor_sim.accuracy.report.apply import line
+    from conveyor_sim.accuracy.report.files import STUDY, read_study
+    from conveyor_sim.accuracy.report.forecast import foretold
+    from conveyor_sim.accuracy.report.lines import three_lines
+    from conveyor_sim.accuracy.report.tables import markdown
     from conveyor_sim.accuracy.results import Study
-    from conveyor_sim.accuracy.tables import markdown
     from conveyor_sim.plot import plot_accuracy
     from conveyor_sim.scene import load_scene
     from conveyor_sim.timestep.presets import table

@@ -24,9 +24,9 @@ with while_importing():
     from unseen_scenes import FIRST, LATER, write
 
     from conveyor_sim.accuracy.candidates import compared
-    from conveyor_sim.accuracy.cpu import Meter
-    from conveyor_sim.accuracy.forecast import foretold
-    from conveyor_sim.accuracy.precision import WorkPrecision
+    from conveyor_sim.accuracy.measure.cpu import Meter
+    from conveyor_sim.accuracy.measure.precision import WorkPrecision
+    from conveyor_sim.accuracy.report.forecast import foretold
     from conveyor_sim.accuracy.results import Point
     from conveyor_sim.accuracy.setting import Setting
     from conveyor_sim.errors import ConveyorError

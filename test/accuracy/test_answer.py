@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from conveyor_sim.accuracy.answer import eligible, find_answer, foretelling
+from conveyor_sim.accuracy.report.answer import eligible, find_answer, foretelling
 from conveyor_sim.accuracy.results import Comparison, Cost, Errors, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
 

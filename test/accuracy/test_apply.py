@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.accuracy.apply import apply
+from conveyor_sim.accuracy.report.apply import apply
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import load_scene

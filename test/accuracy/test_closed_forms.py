@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scenes import base, belt, bottle, kind, scene, segment, stiffness_for
 
-from conveyor_sim.accuracy.closed_forms import cases_of, orders
-from conveyor_sim.accuracy.collision import Collision, collision_of, duration, terms_of
-from conveyor_sim.accuracy.head_on import HeadOn
+from conveyor_sim.accuracy.cases.closed_forms import cases_of, orders
+from conveyor_sim.accuracy.cases.collision import Collision, collision_of, duration, terms_of
+from conveyor_sim.accuracy.cases.head_on import HeadOn
 from conveyor_sim.accuracy.results import Order
 from conveyor_sim.effects.terms import meetings
 from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time

@@ -7,7 +7,7 @@ import time
 import numba
 import pytest
 
-from conveyor_sim.accuracy.cpu import Meter
+from conveyor_sim.accuracy.measure.cpu import Meter
 
 
 def test_to_wait_costs_nothing_and_to_compile_is_told_apart() -> None:

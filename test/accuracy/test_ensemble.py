@@ -15,12 +15,12 @@ import pytest
 from scenes import RADIUS, base, belt, bottle, contact, scene, segment
 
 import conveyor_sim
-from conveyor_sim.accuracy.ensemble import Ensemble
-from conveyor_sim.accuracy.equivalence import LOOKS, run_until_decided
-from conveyor_sim.accuracy.jitter import disturb, jittered
-from conveyor_sim.accuracy.observables import measuring, observe
+from conveyor_sim.accuracy.measure.ensemble import Ensemble
+from conveyor_sim.accuracy.measure.equivalence import LOOKS, run_until_decided
+from conveyor_sim.accuracy.measure.jitter import disturb, jittered
+from conveyor_sim.accuracy.measure.observables import measuring, observe
+from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.results import Sample
-from conveyor_sim.accuracy.sample_file import SAMPLES
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene
@@ -39,7 +39,7 @@ PATIENCE = 60.0
 STUDY = """
 import sys
 from pathlib import Path
-from conveyor_sim.accuracy.equivalence import run_until_decided
+from conveyor_sim.accuracy.measure.equivalence import run_until_decided
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.scene import load_scene
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conveyor_sim.accuracy.equivalence import CONFIDENCE, ERROR_RATE, LOOKS, compare, decide
+from conveyor_sim.accuracy.measure.equivalence import CONFIDENCE, ERROR_RATE, LOOKS, compare, decide
 from conveyor_sim.accuracy.results import Comparison, Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from accuracy.studies import errors, point, study
 
-from conveyor_sim.accuracy.files import STUDY, read_study, write_study
-from conveyor_sim.accuracy.pareto import front
+from conveyor_sim.accuracy.report.files import STUDY, read_study, write_study
+from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.results import Cost, Study
 from conveyor_sim.errors import ConveyorError
 

@@ -8,8 +8,8 @@ import pytest
 from scenes import NO_FLOOR, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.accuracy.candidates import candidates
-from conveyor_sim.accuracy.forecast import TICK, TRUSTED, forecast, foretold, predicted_error, seconds
-from conveyor_sim.accuracy.interim import PREDICTED, predicted
+from conveyor_sim.accuracy.report.forecast import TICK, TRUSTED, forecast, foretold, predicted_error, seconds
+from conveyor_sim.accuracy.report.interim import PREDICTED, predicted
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.model.remedies import BESIDE, BOTTLE_STEP

@@ -7,7 +7,7 @@ from dataclasses import replace
 from accuracy.studies import study
 from accuracy.test_lines import row, with_runs
 
-from conveyor_sim.accuracy.interim import (
+from conveyor_sim.accuracy.report.interim import (
     MEASURED,
     PRELIMINARY,
     UNFINISHED,
@@ -15,7 +15,7 @@ from conveyor_sim.accuracy.interim import (
     preliminary,
     unfinished,
 )
-from conveyor_sim.accuracy.lines import three_lines
+from conveyor_sim.accuracy.report.lines import three_lines
 
 
 def test_a_preliminary_answer_has_measured_impacts_alone() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import NO_FLOOR, RADIUS, bottle, contact, line, scene, segment
 
-from conveyor_sim.accuracy.jitter import NUDGE, PLACE, TIMING, disturb, jittered
+from conveyor_sim.accuracy.measure.jitter import NUDGE, PLACE, TIMING, disturb, jittered
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.scene import Scene, initial_bottles
 from conveyor_sim.simulation import Simulation

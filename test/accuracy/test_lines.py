@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from accuracy.studies import CHOSEN, study
 
-from conveyor_sim.accuracy.lines import summary, three_lines
+from conveyor_sim.accuracy.report.lines import summary, three_lines
 from conveyor_sim.accuracy.results import Comparison, Study
 
 JARGON = ("integrator", "euler", "verlet", "rk4", "step", "rms", "dt", "order", "convergence")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, scene, segment
 
-from conveyor_sim.accuracy.observables import OBSERVABLES, measuring, observe
+from conveyor_sim.accuracy.measure.observables import OBSERVABLES, measuring, observe
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from accuracy.studies import errors, failed, point, points
 
-from conveyor_sim.accuracy.pareto import front
+from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.results import Cost, Point
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import arc, base, belt, bottle, contact, scene, segment
 
-from conveyor_sim.accuracy.resting import Loads, RestingLoad, difference, loads_from, mean_loads, resting_error
+from conveyor_sim.accuracy.measure.resting import Loads, RestingLoad, difference, loads_from, mean_loads, resting_error
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.scene import Scene

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from scenes import belt, scene
 
-from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy.measure.observables import OBSERVABLES
+from conveyor_sim.accuracy.measure.sample_file import ORIGIN, SAMPLES, SampleFile, check_origin
 from conveyor_sim.accuracy.results import Sample
-from conveyor_sim.accuracy.sample_file import ORIGIN, SAMPLES, SampleFile, check_origin
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene, parse_scene

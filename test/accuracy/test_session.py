@@ -17,11 +17,11 @@ from click.testing import CliRunner
 
 from conveyor_sim.accuracy.candidates import own_setting, preset_setting
 from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH, Effort
-from conveyor_sim.accuracy.files import read_study
-from conveyor_sim.accuracy.interim import MEASURED, PREDICTED, PRELIMINARY, UNFINISHED
-from conveyor_sim.accuracy.lines import summary
+from conveyor_sim.accuracy.measure.sample_file import SAMPLES
+from conveyor_sim.accuracy.report.files import read_study
+from conveyor_sim.accuracy.report.interim import MEASURED, PREDICTED, PRELIMINARY, UNFINISHED
+from conveyor_sim.accuracy.report.lines import summary
 from conveyor_sim.accuracy.results import Study
-from conveyor_sim.accuracy.sample_file import SAMPLES
 from conveyor_sim.accuracy.session import ANSWER, Session
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.cli import main

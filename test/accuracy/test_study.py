@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.accuracy.effort import Effort
-from conveyor_sim.accuracy.files import read_study
-from conveyor_sim.accuracy.forecast import forecast
+from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.measured import MEASURED, first_settings
+from conveyor_sim.accuracy.report.files import read_study
+from conveyor_sim.accuracy.report.forecast import forecast
 from conveyor_sim.accuracy.results import Study
-from conveyor_sim.accuracy.sample_file import SAMPLES
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.study import FIRST_RUNS, affordable, run_study, study_folder
 from conveyor_sim.errors import ConveyorError

@@ -10,12 +10,12 @@ import pytest
 from accuracy.studies import BLOWN, CHOSEN, OWN, REFERENCE, failed, study
 from rich.console import Console
 
-from conveyor_sim.accuracy.block import Block, Column
-from conveyor_sim.accuracy.lines import three_lines
+from conveyor_sim.accuracy.report.block import Block, Column
+from conveyor_sim.accuracy.report.lines import three_lines
+from conveyor_sim.accuracy.report.tables import blocks, markdown, terminal
+from conveyor_sim.accuracy.report.words import digits, duration, percent, setting_name, spread
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.tables import blocks, markdown, terminal
-from conveyor_sim.accuracy.words import digits, duration, percent, setting_name, spread
 
 
 def printed(of: Study, width: int = 80) -> str:

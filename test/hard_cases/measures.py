@@ -14,8 +14,8 @@ import numpy as np
 from hard_cases.case import Case
 from numpy.typing import NDArray
 
-from conveyor_sim.accuracy.chatter import STEPS
 from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.accuracy.measure.chatter import STEPS
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.engine.lists.riding import left_out

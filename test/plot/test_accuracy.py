@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from conveyor_sim.accuracy.pareto import front
+from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.results import Point, Study
 from conveyor_sim.plot import plot_accuracy, style
 from conveyor_sim.plot.accuracy import accuracy_figures

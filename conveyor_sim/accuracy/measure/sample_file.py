@@ -11,8 +11,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from conveyor_sim.accuracy import jitter, observables, setting, stiffness
-from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy import setting, stiffness
+from conveyor_sim.accuracy.measure import jitter, observables
+from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH

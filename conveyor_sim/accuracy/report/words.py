@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.setting import Setting
 
 

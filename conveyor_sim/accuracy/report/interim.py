@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from conveyor_sim.accuracy.apply import line
-from conveyor_sim.accuracy.forecast import Forecast
-from conveyor_sim.accuracy.lines import three_lines
+from conveyor_sim.accuracy.report.apply import line
+from conveyor_sim.accuracy.report.forecast import Forecast
+from conveyor_sim.accuracy.report.lines import three_lines
+from conveyor_sim.accuracy.report.words import digits, percent
 from conveyor_sim.accuracy.results import Study
-from conveyor_sim.accuracy.words import digits, percent
 
 PREDICTED = "Predicted, not measured:"
 PRELIMINARY = "Preliminary, measured in part:"

@@ -9,10 +9,11 @@ from typing import TypeVar
 
 from rich.console import Group
 
-from conveyor_sim.accuracy.answer import foretelling
-from conveyor_sim.accuracy.block import Block, Column
-from conveyor_sim.accuracy.lines import three_lines
-from conveyor_sim.accuracy.pareto import front, place_of
+from conveyor_sim.accuracy.report.answer import foretelling
+from conveyor_sim.accuracy.report.block import Block, Column
+from conveyor_sim.accuracy.report.lines import three_lines
+from conveyor_sim.accuracy.report.pareto import front, place_of
+from conveyor_sim.accuracy.report.words import digits, percent, setting_name, spread, with_unit
 from conveyor_sim.accuracy.results import (
     DEEP,
     Comparison,
@@ -26,7 +27,6 @@ from conveyor_sim.accuracy.results import (
     Study,
 )
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.words import digits, percent, setting_name, spread, with_unit
 
 Row = TypeVar("Row")
 Placed = tuple[Point, Errors, Cost]

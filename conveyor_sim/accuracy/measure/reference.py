@@ -3,7 +3,7 @@
 import math
 
 from conveyor_sim.accuracy.candidates import forbidden, standard_steps
-from conveyor_sim.accuracy.collision import collision_of, duration, terms_of
+from conveyor_sim.accuracy.cases.collision import collision_of, duration, terms_of
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.effects.terms import impact_speed, meetings

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.accuracy.candidates import standard_steps
-from conveyor_sim.accuracy.collision import collision_of, duration, terms_of
-from conveyor_sim.accuracy.exercise import Exercise
+from conveyor_sim.accuracy.cases.collision import collision_of, duration, terms_of
+from conveyor_sim.accuracy.measure.exercise import Exercise
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.effects.terms import impact_speed, meetings

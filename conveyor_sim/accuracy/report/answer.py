@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from conveyor_sim.accuracy.report.words import digits, duration, percent
 from conveyor_sim.accuracy.results import Answer, Comparison, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.words import digits, duration, percent
 
 EXACTER = 10.0
 """How many times more exact the setting is whose cost stands beside."""

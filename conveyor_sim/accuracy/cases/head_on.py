@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from conveyor_sim.accuracy.aside import PHASES, RAIL, corner, phases, pitch, rms, simulation_aside
-from conveyor_sim.accuracy.collision import Collision, damping_ratio, duration, peak_force, rebound
+from conveyor_sim.accuracy.cases.aside import PHASES, RAIL, corner, phases, pitch, rms, simulation_aside
+from conveyor_sim.accuracy.cases.collision import Collision, damping_ratio, duration, peak_force, rebound
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.contact.laws.hertz import HERTZ

@@ -9,8 +9,8 @@ import math
 import os
 from pathlib import Path
 
-from conveyor_sim.accuracy.pareto import front
-from conveyor_sim.accuracy.plain import Unlike, plain, typed
+from conveyor_sim.accuracy.report.pareto import front
+from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conveyor_sim.accuracy.aside import PHASES, phases, rms, simulation_aside
+from conveyor_sim.accuracy.cases.aside import PHASES, phases, rms, simulation_aside
+from conveyor_sim.accuracy.cases.root import root
 from conveyor_sim.accuracy.displacement import displace
-from conveyor_sim.accuracy.root import root
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

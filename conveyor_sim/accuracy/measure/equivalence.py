@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.effort import PROCESSORS
-from conveyor_sim.accuracy.ensemble import Ensemble, Progress, Run
-from conveyor_sim.accuracy.observables import OBSERVABLES
+from conveyor_sim.accuracy.measure.ensemble import Ensemble, Progress, Run
+from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Comparison, Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError

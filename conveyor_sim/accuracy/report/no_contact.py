@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from conveyor_sim.accuracy.apply import line
 from conveyor_sim.accuracy.candidates import own_setting, preset_setting
-from conveyor_sim.accuracy.forecast import Forecast, seconds
+from conveyor_sim.accuracy.report.apply import line
+from conveyor_sim.accuracy.report.forecast import Forecast, seconds
+from conveyor_sim.accuracy.report.words import digits, percent
 from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.accuracy.words import digits, percent
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 

@@ -3,16 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from conveyor_sim.accuracy.chatter import ChatterProbe
-from conveyor_sim.accuracy.deviation import errors_of
-from conveyor_sim.accuracy.failures import failure_of
-from conveyor_sim.accuracy.horizon import HorizonFinder
-from conveyor_sim.accuracy.reference import reference_setting, reference_simulation
-from conveyor_sim.accuracy.resting import RestingLoad
+from conveyor_sim.accuracy.measure.chatter import ChatterProbe
+from conveyor_sim.accuracy.measure.deviation import errors_of
+from conveyor_sim.accuracy.measure.failures import failure_of
+from conveyor_sim.accuracy.measure.horizon import HorizonFinder
+from conveyor_sim.accuracy.measure.reference import reference_setting, reference_simulation
+from conveyor_sim.accuracy.measure.resting import RestingLoad
+from conveyor_sim.accuracy.measure.starts import Start, find_starts
+from conveyor_sim.accuracy.measure.timing import costs_of
 from conveyor_sim.accuracy.results import Errors, Horizon, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.accuracy.starts import Start, find_starts
-from conveyor_sim.accuracy.timing import costs_of
 from conveyor_sim.accuracy.trajectory import Trajectory, follow, variant
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene

@@ -1,6 +1,6 @@
 """Chatter (`guard/chatter.py`) of a scene with a setting, looked for from a state of the scene on."""
 
-from conveyor_sim.accuracy.failures import place
+from conveyor_sim.accuracy.measure.failures import place
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.errors import SimulationError

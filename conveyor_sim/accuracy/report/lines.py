@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from conveyor_sim.accuracy.answer import eligible, largest_error
-from conveyor_sim.accuracy.apply import line
+from conveyor_sim.accuracy.report.answer import eligible, largest_error
+from conveyor_sim.accuracy.report.apply import line
+from conveyor_sim.accuracy.report.words import digits, duration, percent
 from conveyor_sim.accuracy.results import Answer, Comparison, Study
-from conveyor_sim.accuracy.words import digits, duration, percent
 
 FEW = 2
 """Runs of a setting, fewer of which compare nothing."""

@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from conveyor_sim.accuracy.aside import PHASES
-from conveyor_sim.accuracy.collision import collision_of, rail_materials, terms_of
-from conveyor_sim.accuracy.head_on import HeadOn, restitution_of, slip_for_sliding
+from conveyor_sim.accuracy.cases.aside import PHASES
+from conveyor_sim.accuracy.cases.collision import collision_of, rail_materials, terms_of
+from conveyor_sim.accuracy.cases.head_on import HeadOn, restitution_of, slip_for_sliding
+from conveyor_sim.accuracy.cases.set_down import SetDown
 from conveyor_sim.accuracy.results import Order
-from conveyor_sim.accuracy.set_down import SetDown
 from conveyor_sim.effects.terms import Meeting, Terms, impact_speed, meetings
 from conveyor_sim.scene import Scene
 

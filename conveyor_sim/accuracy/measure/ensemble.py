@@ -10,10 +10,10 @@ from functools import cache
 from pathlib import Path
 from statistics import fmean
 
-from conveyor_sim.accuracy.jitter import disturb, jittered
-from conveyor_sim.accuracy.observables import measuring, observe
+from conveyor_sim.accuracy.measure.jitter import disturb, jittered
+from conveyor_sim.accuracy.measure.observables import measuring, observe
+from conveyor_sim.accuracy.measure.sample_file import SampleFile
 from conveyor_sim.accuracy.results import Sample
-from conveyor_sim.accuracy.sample_file import SampleFile
 from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene

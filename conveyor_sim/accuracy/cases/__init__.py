@@ -1,0 +1,1 @@
+"""Closed forms of a scene's laws, and how far its settings are off in them."""

@@ -1,0 +1,1 @@
+"""Errors and cost of settings, measured on a scene."""

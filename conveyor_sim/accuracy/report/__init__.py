@@ -1,0 +1,1 @@
+"""What a study says: forecasts, answers, tables and files."""
