@@ -176,6 +176,55 @@ def written(folder: Path, seconds: float, bottles: int = 300) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def minutes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four minutes of few bottles: 120 blocks."""
+    return written(tmp_path_factory.mktemp("minutes") / "bag", 240.0, 20)
+
+
+def test_who_seeks_wildly_sees_where_he_stops_before_where_he_went_by(browser: Any, minutes: Path) -> None:
+    with RecordingServer(minutes) as server:
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(server.url)
+        page.wait_for_selector("body[data-told]", timeout=60_000)
+        page.click("#toggle_trends")  # which read, too
+        settled(page)
+        held: list[Any] = []
+        is_held = True
+        page.route("**/data/block/*", lambda route: held.append(route) if is_held else route.continue_())
+        page.focus("#scrubber")
+        for key in "2468":
+            page.keyboard.press(key)
+            page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        until(lambda: len(held) >= 2 or page.wait_for_timeout(5), "two are asked for")
+        assert len(held) == 2
+        is_held = False
+        with page.expect_request("**/data/block/*") as asked:
+            for route in held:
+                route.continue_()
+        assert asked.value.url.endswith(f"/data/block/{round(0.8 * 240 / 2)}")
+        settled(page)
+        assert float(page.get_attribute("#plan", "data-frame")) == clock(page)
+        page.close()
+
+
+def test_a_page_that_stands_reads_nothing_however_long_its_trends_are(browser: Any, minutes: Path) -> None:
+    with RecordingServer(minutes) as server:
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(server.url)
+        page.wait_for_selector("body[data-told]", timeout=60_000)
+        page.select_option("#trendbar select", "120")
+        page.focus("#scrubber")
+        page.keyboard.press("6")
+        settled(page)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        for _ in range(5):
+            settled(page)
+        assert asked == []
+        page.close()
+
+
 def test_thousands_of_bottles_are_drawn_where_they_are_too(browser: Any, tmp_path: Path) -> None:
     """From 2000 on, another way."""
     html = write_page(written(tmp_path / "bag", 0.2, 2100), tmp_path / "page.html")

@@ -2,7 +2,9 @@
 
 import { emptyBlock, lastUpTo, readBlock } from "./block.js";
 
-const KEPT = 60; // blocks
+const KEPT = 64; // blocks: more than trends show
+const AT_ONCE = 2; // blocks that are read
+const FAR = 50; // blocks from the one that is shown: what is farther is not waited for
 const NEAR = 1e-6; // s
 const SPAN = 2; // frames to either side by which a speed is measured
 
@@ -25,6 +27,9 @@ export class Recording extends EventTarget {
     this.count = blocks;
     this.blocks = new Map();
     this.pending = new Map();
+    this.waiting = []; // to be read: number, and who is told
+    this.reading = 0;
+    this.near = null; // number of the block that is shown
     this.signalIndex = new Map(head.signals.map((name, index) => [name, index]));
     this.tags = new Map(head.tags.map((tag) => [tag.name, tag]));
   }
@@ -47,37 +52,54 @@ export class Recording extends EventTarget {
   }
 
   load(number) {
-    if (!this.blocks.has(number) && !this.pending.has(number)) this.pending.set(number, this._read(number));
+    if (!this.blocks.has(number) && !this.pending.has(number)) {
+      this.pending.set(number, new Promise((read) => this.waiting.push({ number, read })));
+      reading(1);
+      this._readNext();
+    }
     return this.pending.get(number) ?? Promise.resolve(this.blocks.get(number));
   }
 
-  async _read(number) {
-    const { first, block } = this.head.times;
-    reading(1);
+  // What is nearest to the time that is shown comes first; where somebody only went by is forgotten.
+  _readNext() {
+    const far = ({ number }) => (this.near === null ? 0 : Math.abs(number - this.near));
+    this.waiting.sort((one, other) => far(other) - far(one));
+    while (this.waiting.length && far(this.waiting[0]) > FAR) this._done(this.waiting.shift(), null);
+    while (this.reading < AT_ONCE && this.waiting.length) this._read(this.waiting.pop());
+  }
+
+  _done({ number, read }, block) {
+    this.pending.delete(number);
+    reading(-1);
+    read(block);
+  }
+
+  async _read(wanted) {
+    const { first, block: length } = this.head.times, { number } = wanted;
+    let block;
+    this.reading++;
     try {
       const bytes = await this.source.bytes(`block/${number}`);
-      const read = readBlock(bytes, this.head.steps, first + number * block, this.head.tick);
-      this.blocks.set(number, read);
-      for (const old of this.blocks.keys()) {
-        if (this.blocks.size <= KEPT) break;
-        this.blocks.delete(old);
-      }
-      return read;
+      block = readBlock(bytes, this.head.steps, first + number * length, this.head.tick);
     } catch (error) {
       this.dispatchEvent(new CustomEvent("failed", { detail: error.message }));
-      const empty = emptyBlock(); // it can't be read: time goes on over it
-      this.blocks.set(number, empty);
-      return empty;
-    } finally {
-      this.pending.delete(number);
-      reading(-1);
-      this.dispatchEvent(new Event("loaded"));
+      block = emptyBlock(); // it can't be read: time goes on over it
     }
+    this.blocks.set(number, block);
+    for (const old of this.blocks.keys()) {
+      if (this.blocks.size <= KEPT) break;
+      this.blocks.delete(old);
+    }
+    this.reading--;
+    this._done(wanted, block);
+    this._readNext();
+    this.dispatchEvent(new Event("loaded"));
   }
 
   // The block and the place in it of the last frame up to a time; null while it is loading, or before the first.
   place(time) {
-    for (let number = this.number(time); number >= 0; number--) {
+    this.near = this.number(time);
+    for (let number = this.near; number >= 0; number--) {
       const block = this.block(number);
       if (!block) return null;
       const frame = lastUpTo(block.times, time + NEAR);
