@@ -113,14 +113,13 @@ def _contacts(
     ticks = np.array([tick for tick, _ in frames], dtype=np.int64)
     counts, firsts, others, points, forces = [], [], [], [], []
     for _, contacts in frames:
-        a, b = contacts.a.astype(np.int64), contacts.b.astype(np.int64)
-        pair = contacts.kind == 0
-        known = np.isin(a, ids) & (~pair | np.isin(b, ids))
-        a, b, pair = a[known], b[known], pair[known]
-        place = np.searchsorted(ids, a)
-        counts.append(len(a))
+        a, b, pair = contacts.a.astype(np.int64), contacts.b.astype(np.int64), contacts.kind == 0
+        place, other = (np.searchsorted(ids, bottle) for bottle in (a, b))
+        known = (_those(ids, place) == a) & (~pair | (_those(ids, other) == b))
+        place, other, pair = place[known], other[known], pair[known]
+        counts.append(len(place))
         firsts.append(differences(place))
-        others.append(np.where(pair, np.searchsorted(ids, b) - place, 0))
+        others.append(np.where(pair, other - place, 0))
         points.append(np.round(np.stack([contacts.x, contacts.y], axis=1)[known][~pair] * MM).astype(np.int64).ravel())
         forces.append(levels(contacts.normal_force[known]))
     lists = (firsts, others, points, forces)
@@ -131,13 +130,19 @@ def _contacts(
     ]
 
 
+def _those(ids: Integers, places: Integers) -> Integers:
+    """Those at places, of which some may lie behind the last; -1 without any."""
+    return ids[places.clip(max=len(ids) - 1)] if len(ids) else np.full(len(places), -1)
+
+
 def _columns(rows: Sequence[tuple[int, Floats]], start: int) -> list[Integers]:
     """Ticks; then, of each column, how often it changes, at which rows (each less the one before), by how much."""
     ticks = np.array([tick for tick, _ in rows], dtype=np.int64)
     if not rows:
         return [ticks] * 4
-    wide = max(len(values) for _, values in rows)
-    table = np.stack([np.pad(values, (0, wide - len(values)), constant_values=np.nan) for _, values in rows])
+    table = np.full((len(rows), max(len(values) for _, values in rows)), np.nan)
+    for row, (_, values) in zip(table, rows, strict=True):
+        row[: len(values)] = values
     strange = ~np.isfinite(table) | (np.abs(table) >= -UNKNOWN)
     table = np.where(strange, UNKNOWN, table).astype(np.int64)
     steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), np.int64))
