@@ -46,6 +46,16 @@ def test_a_page_comes_back_when_its_server_does(page: Any, live: Live) -> None:
     assert page.get_attribute("body", "data-person") == "", "who was signed in is so no longer"
 
 
+def test_a_picture_that_is_old_is_not_called_new(page: Any, live: Live) -> None:
+    soon(page, lambda: page.inner_text("#latency").endswith(" ms behind"), "how late it is")
+    os.kill(live.source.pid, signal.SIGSTOP)
+    try:
+        soon(page, lambda: "nothing new for" in page.inner_text("#latency"), "that nothing comes")
+    finally:
+        os.kill(live.source.pid, signal.SIGCONT)
+    soon(page, lambda: page.inner_text("#latency").endswith(" ms behind"), "new pictures")
+
+
 def test_a_line_whose_process_dies_is_lost_and_begins_anew(page: Any, live: Live) -> None:
     soon(page, lambda: clock(page) > 2.0, "some time has passed")
     os.kill(live.source.pid, signal.SIGKILL)

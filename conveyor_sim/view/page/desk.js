@@ -6,6 +6,7 @@ import { wallTime } from "./live.js";
 const SURE = 5000; // ms in which a second click counts
 const STANDS = ["paused", "ended", "stopped"]; // of a run
 const TOLD = 500; // ms between two latencies that are shown
+const STALE = 2; // s without a picture of a line that does not stand, after which that is said
 const REMEMBERED = 20; // s in which a refusal by the line is one of what was asked for here
 
 export class Desk {
@@ -33,6 +34,7 @@ export class Desk {
     line.addEventListener("connection", () => { this.at = this.before = null; this.connection(); });
     line.addEventListener("locked", () => this.connection());
     line.addEventListener("status", ({ detail }) => { this.status = detail.status; this.connection(); });
+    setInterval(() => view.touch(), 1000 * STALE / 2); // that nothing comes is shown, too
     line.addEventListener("frame", ({ detail }) => { [this.before, this.at] = [this.at, detail.at]; });
     this.connection();
   }
@@ -49,9 +51,9 @@ export class Desk {
     this.link.textContent = { locked: "● Sign in to see the line", broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
     this.link.className = state;
     this.run.textContent = state === "live" ? `${run}${reason ? `: ${reason}` : ""}` : "";
-    const stands = STANDS.includes(run);
-    this.run.classList.toggle("stands", stands);
-    const useful = { pause: !stands, resume: run === "paused", step: run === "paused", reset: true };
+    this.stands = STANDS.includes(run);
+    this.run.classList.toggle("stands", this.stands);
+    const useful = { pause: !this.stands, resume: run === "paused", step: run === "paused", reset: true };
     for (const [what, button] of this.buttons) button.hidden = state !== "live" || !useful[what];
     this.late.hidden = state !== "live";
     const { name, role } = line.person;
@@ -72,7 +74,9 @@ export class Desk {
     }
     if (now - this.told < TOLD) return;
     this.told = now;
-    const late = this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
+    const age = !this.at || this.stands ? 0 : wallTime() + this.view.line.offset - this.at;
+    this.late.classList.toggle("stale", clock.live && age > STALE);
+    const late = age > STALE ? `nothing new for ${age.toFixed(0)} s` : this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
     const text = clock.live ? late : `${seconds(this.view.recording.end - clock.time, 1)} ago`;
     if (this.late.textContent !== text) this.late.textContent = text;
   }
