@@ -50,8 +50,8 @@ SETTLE = 5.0
 MB = 1 << 20
 
 
-class Changing:
-    """A source whose tags change by themselves."""
+class Counting:
+    """A source of tags, some of which go up by one every EVERY ticks."""
 
     controls: frozenset[Control] = frozenset()
     past = None
@@ -64,21 +64,16 @@ class Changing:
             "bench", "", TICK, "2025-01-01T00:00:00Z", [replace(tag, device_class="belt") for tag in tags]
         )
         self._listeners = Listeners()
-        self._stop = threading.Event()
         self.shown = self._at(0)
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+
+    def show(self, tick: int) -> None:
+        """The line is at a tick."""
+        self.shown = self._at(tick)
+        self._listeners.tell()
 
     def _at(self, tick: int) -> Shown:
         values = {tag.name: float(tick // EVERY if n < CHANGING else n) for n, tag in enumerate(self.about.tags)}
         return Shown(tick, values, run=RunState(RUNNING))
-
-    def _run(self) -> None:
-        tick, due = 0, time.monotonic()
-        while not self._stop.wait(max(0.0, due - time.monotonic())):
-            tick, due = tick + 1, due + TICK
-            self.shown = self._at(tick)
-            self._listeners.tell()
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         return 0, ()
@@ -91,6 +86,25 @@ class Changing:
 
     def control(self, what: Control, value: float, by: str) -> str:
         return "nothing can be asked for"
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Changing(Counting):
+    """One that goes on by itself, as the clock does."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        tick, due = 0, time.monotonic()
+        while not self._stop.wait(max(0.0, due - time.monotonic())):
+            tick, due = tick + 1, due + TICK
+            self.show(tick)
 
     def close(self) -> None:
         self._stop.set()

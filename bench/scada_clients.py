@@ -42,6 +42,11 @@ class Seen:
         self.changes = self.lost = 0
 
     @property
+    def lowest(self) -> int:
+        """What all tags have reached; -1: not all have been seen."""
+        return min(self._last.values()) if len(self._last) == CHANGING else -1
+
+    @property
     def told(self) -> tuple[int, int]:
         """Changes seen, and lost."""
         return self.changes, self.lost
