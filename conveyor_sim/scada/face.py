@@ -60,6 +60,8 @@ class Status:
     latency: float
     """s of wall time, the longest since the status was last asked for: from a request to its answer, or from a change
     of the source to its being shown, whichever took longer; 0 without any."""
+    left_out: int = 0
+    """Ticks so far that it never showed, being too far behind: their changes are missed by whoever follows all."""
 
 
 class Face(Protocol):

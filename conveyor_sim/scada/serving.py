@@ -82,7 +82,9 @@ class Serving(AbstractContextManager["Serving"]):
 
 def _told(name: str, status: Status) -> str:
     subscriptions = f", {_many(status.subscriptions, 'subscription')}" if status.subscriptions else ""
-    return f"{name}: {_many(status.clients, 'client')}{subscriptions}, {_writes(status)}, {status.latency * 1e3:.1f} ms"
+    left_out = f", {_many(status.left_out, 'tick')} left out" if status.left_out else ""
+    clients = f"{_many(status.clients, 'client')}{subscriptions}"
+    return f"{name}: {clients}, {_writes(status)}, {status.latency * 1e3:.1f} ms{left_out}"
 
 
 def _many(count: int, what: str) -> str:

@@ -92,11 +92,13 @@ class OpcUaServer:
         if server is None or server.bserver is None:
             return Status(0, 0, requests.writes, requests.refused, 0.0)
         longest, server.longest[0] = server.longest[0], 0.0
+        left_out = 0
         if self._updates is not None:
             longest, self._updates.longest = max(longest, self._updates.longest), 0.0
+            left_out = self._updates.left_out
         subscriptions = server.iserver.subscription_service.subscriptions.values()
         items = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
-        return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest)
+        return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest, left_out)
 
     async def start(self) -> None:
         """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""

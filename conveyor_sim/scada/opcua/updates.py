@@ -43,6 +43,8 @@ class Updates:
         self._read_back: ReadBackColumns | None = None
         self.longest = 0.0
         """s of wall time from a change of the source to its being in the nodes, the longest since this was set to 0."""
+        self.left_out = 0
+        """Ticks so far that were not brought in."""
         self._written: dict[str, tuple[int, str]] = {}
 
     async def bring_present(self) -> None:
@@ -71,6 +73,7 @@ class Updates:
         if len(self._waiting) >= MOST_BEHIND:
             with suppress(IndexError):
                 self._waiting.pop()
+                self.left_out += 1
         self._waiting.append((self._source.shown, datetime.now(timezone.utc)))
         if not self._told:
             self._told = True

@@ -113,8 +113,8 @@ def test_who_keeps_up_misses_no_change(line: Line) -> None:
 
 
 def test_who_is_far_behind_gets_what_is_latest(line: Line) -> None:
-    """More ticks than wait for the loop: those in between are left out, the last one never is."""
-    heard = Heard()
+    """More ticks than wait for the loop: those in between are left out, and counted; the last one never is."""
+    heard, before = Heard(), line.server.status().left_out
     subscription = line.client().create_subscription(10, heard)
     subscription.subscribe_data_change(line.node("run/tick"), queuesize=10_000)
     line.until(lambda: heard.values == [0])
@@ -123,3 +123,4 @@ def test_who_is_far_behind_gets_what_is_latest(line: Line) -> None:
         line.source.show(tick=tick)
     line.until(lambda: heard.values[-1] == most)
     assert heard.values == sorted(set(heard.values))
+    assert line.server.status().left_out - before == most + 1 - len(heard.values)
