@@ -10,9 +10,9 @@ from conveyor_sim.simulation import Simulation
 LINE = Path(__file__).parent / "line.yaml"
 
 
-def record(folder: Path, seconds: float = 24.0, closes: bool = True) -> Path:
+def record(folder: Path, seconds: float = 24.0, closes: bool = True, line: Path = LINE) -> Path:
     """The line with a fault, a refused command, and a gate that closes at 6 s, if it does, and opens."""
-    scene = load_scene(LINE)
+    scene = load_scene(line)
     simulation = Simulation(scene)
     with Recorder(folder) as recorder:
         outputs = Outputs(simulation, [recorder], run_id="run")

@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from view.conftest import opened_page
+from view.line import LINE, record
 from view.pixels import canvas, count_where_they_are, settled, to_pixels
 
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.view.one_file import write_page
 
 
 def clock(page: Any) -> float:
@@ -257,6 +260,19 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
     )
     assert nameless == []
     assert page.locator("#plan").bounding_box()["height"] > 200
+
+
+def test_long_names_stay_where_they_belong(browser: Any, tmp_path: Path) -> None:
+    name = "capper_" + "that_has_a_long_name_" * 3
+    line = tmp_path / "line.yaml"
+    line.write_text(LINE.read_text().replace("  capper:", f"  {name}:").replace("small_packaging", name))
+    html = write_page(record(tmp_path / "bag", 4.0, line=line), tmp_path / "page.html")
+    with opened_page(browser, html) as page:
+        press(page, "End")
+        wide = (
+            "Array.from(document.querySelectorAll('.tile, header')).filter((one) => one.scrollWidth > one.clientWidth)"
+        )
+        assert page.locator(".tile h3", has_text=name).count() == 1 and page.evaluate(f"{wide}.length") == 0
 
 
 def test_dark_is_dark(page: Any) -> None:

@@ -3,10 +3,10 @@
 import { lastUpTo } from "./block.js";
 import { palette } from "./colours.js";
 import { stateColour } from "./devices.js";
-import { element, keyOf, sharp, titled } from "./dom.js";
+import { element, keyOf, sharp, short, titled } from "./dom.js";
 import { stateName } from "./story.js";
 
-const ROW = 26, NAME = 96;
+const ROW = 26, NAME = 96, LETTERS = 14; // of a name
 const STATE = /^machines\/.*\/state$/;
 
 export class Bars {
@@ -60,7 +60,7 @@ export class Bars {
     this.names.forEach((name, row) => {
       const changes = story.machines.get(name) ?? [], top = row * ROW + 4;
       context.fillStyle = colours.ink;
-      context.fillText(name.split("/").pop(), 0, top + 9, NAME - 6);
+      context.fillText(short(name.split("/").pop(), LETTERS), 0, top + 9, NAME - 6);
       const initial = changes.length ? this.view.recording.tags.get(`${name}/state`)?.initial : this.view.signal(`${name}/state`);
       const all = initial === undefined || initial === null ? changes : [{ time: from, state: initial }, ...changes];
       all.forEach((change, i) => {

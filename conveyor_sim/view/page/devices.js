@@ -1,6 +1,7 @@
 // Eyes, zones, machines, counters, and gates, pushers and diverters where they are.
 
 import { CATEGORIES } from "./colours.js";
+import { short } from "./dom.js";
 import { outside, placeAt } from "./labels.js";
 import { stateName } from "./story.js";
 
@@ -63,7 +64,7 @@ function label(view, camera, mark, note, importance, colour) {
   const width = Math.max(...mark.points.map((point) => Math.abs(point[0] - x))) * camera.scale;
   const towards = isLine ? placeAt(Math.atan2(to[1] - from[1], to[0] - from[0])) // behind the end of a beam
     : width > LONG * reach ? [0, -1] : null;
-  view.labels.add(mark.name + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80), colour, bold: importance > 5, towards });
+  view.labels.add(short(mark.name) + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80), colour, bold: importance > 5, towards });
 }
 
 export function drawLines(context, camera, colours, view) {
@@ -159,6 +160,6 @@ export function drawMovers(context, camera, colours, view) {
     const ends = moverEnds(mover, position), [x, y] = middle(ends), [ax, ay] = mover.along;
     const reach = 4 + 0.5 * camera.scale * Math.max(Math.abs(ends[1][0] - ends[0][0]), Math.abs(ends[1][1] - ends[0][1]));
     const towards = ax || ay ? outside(Math.atan2(ay, ax)) : null; // where it goes
-    view.labels.add(mover.name.split("/")[1], camera.toX(x), camera.toY(y), { importance: 4, reach, colour: colours.mover, towards });
+    view.labels.add(short(mover.name.split("/")[1]), camera.toX(x), camera.toY(y), { importance: 4, reach, colour: colours.mover, towards });
   }
 }

@@ -28,6 +28,9 @@ export function keyOf(entries) {
   });
 }
 
+// A name where there is room for so many letters.
+export const short = (name, most = 28) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
+
 // What heads a panel: where two recordings are shown, with whose it is.
 export const titled = (text, view) => (view.letter ? `${text} of ${view.letter}` : text);
 

@@ -30,8 +30,9 @@ export class Labels {
     this.wanted.push({ text, x, y, importance, reach, colour, bold, places: towards ? placesTowards(towards) : PLACES });
   }
 
-  draw(context, camera, colours) {
-    const taken = [];
+  // covered: boxes where none is to stand, px.
+  draw(context, camera, colours, covered) {
+    const taken = [...covered];
     context.textBaseline = "middle";
     context.textAlign = "center";
     context.lineJoin = "round";

@@ -4,6 +4,7 @@ import { Belts } from "./belts.js";
 import { COLOURINGS, palette } from "./colours.js";
 import { Crowd, MANY } from "./crowd.js";
 import { drawAreas, drawLines, drawMovers } from "./devices.js";
+import { byId, short } from "./dom.js";
 import { Labels, outside, placeAt } from "./labels.js";
 
 const WIDTHS = 6; // of lines of force
@@ -20,6 +21,13 @@ export class Plan {
     this.look = ""; // what they were made for
     this.last = null; // time of the last picture
     this.frame = null;
+    this.covered = [];
+  }
+
+  // What the legend hides of it: no name is to stand there.
+  cover() {
+    const { left, top } = this.canvas.getBoundingClientRect(), box = byId("legend").getBoundingClientRect();
+    this.covered = [[box.left - left, box.top - top, box.right - left, box.bottom - top]];
   }
 
   resize() {
@@ -28,6 +36,7 @@ export class Plan {
     this.canvas.height = Math.round(clientHeight * ratio);
     this.ratio = ratio;
     this.look = "";
+    this.cover();
     this.view.camera.resize(clientWidth, clientHeight);
   }
 
@@ -57,7 +66,7 @@ export class Plan {
     drawLines(context, camera, colours, view);
     this._beltNames(colours, speeds);
     if (frame) this._selected(frame, colours);
-    if (view.showNames) this.labels.draw(context, camera, colours);
+    if (view.showNames) this.labels.draw(context, camera, colours, this.covered);
   }
 
   _rails(colours) {
@@ -156,7 +165,7 @@ export class Plan {
         ? [0, 1].map((k) => (belt.outline[0][k] + belt.outline[2][k]) / 2)
         : [belt.centre[0] + radius * Math.cos(angle), belt.centre[1] + radius * Math.sin(angle)];
       const towards = belt.kind === "straight" ? placeAt(belt.angle + Math.PI / 2) : outside(angle);
-      this.labels.add(`${belt.name} ${speeds[i].toFixed(2)} m/s`, camera.toX(x), camera.toY(y), {
+      this.labels.add(`${short(belt.name)} ${speeds[i].toFixed(2)} m/s`, camera.toX(x), camera.toY(y), {
         importance: 2, reach: Math.min(60, 0.5 * belt.width * camera.scale), colour: colours.muted,
         towards,
       });

@@ -38,13 +38,13 @@ export class Tiles {
           return part;
         }));
       return element("article", { class: "tile" },
-        element("h3", {}, name.replace("machines/", "")),
+        element("h3", { title: name }, name.replace("machines/", "")),
         row.oee === null ? null : element("div", { class: "oee" }, element("strong", {}, percent(row.oee)), element("span", {}, "OEE")),
         element("dl", {},
           ...[["availability", percent(row.availability)], ["effectiveness", percent(row.effectiveness)], ["quality", percent(row.quality)],
             ["bottles", `${row.processed}`]].filter(([, value]) => value !== NOTHING).flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
         all ? bar : null,
-        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, row.category === row.stop_reason ? row.category : `${row.category}: ${row.stop_reason}`) : null);
+        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, [row.category, "none"].includes(row.stop_reason) ? row.category : `${row.category}: ${row.stop_reason}`) : null);
     }));
     this.key.replaceChildren(...keyOf(Object.entries(CATEGORIES).filter(([name]) => seen.has(name)).map(([name, colour]) => [colour, name])));
   }

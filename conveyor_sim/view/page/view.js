@@ -253,6 +253,7 @@ export class View {
     else entries.push(...keyOf(colouring.legend(this)));
     if (shown) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
     byId("legend").replaceChildren(...entries);
+    for (const plan of this.plans) plan.cover();
   }
 
   clicked(px, py, plan = this.plan) {
