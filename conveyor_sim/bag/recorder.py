@@ -7,17 +7,18 @@ import errno
 import os
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
+from conveyor_sim.bag.input_log import START_NAME
 from conveyor_sim.bag.lock import claim
 from conveyor_sim.bag.mcap_file import McapFile
 from conveyor_sim.bag.metadata import write_metadata
 from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.errors import BagError
+from conveyor_sim.errors import BagError, CheckpointError
 
 FLUSH_INTERVAL = 0.5
 """s of wall time that a message waits at most to be handed to the operating system. A killed process loses these, and
@@ -28,11 +29,19 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
     """A sink that records every message it is given; use it as a context manager.
 
     path: the folder to create, which must not exist or be empty. topics: names of OUTPUTS to record (default: all).
+    start: of a run that begins from a checkpoint, writes it to a path, for a replay begins there; None: from tick 0.
     A thread of its own flushes, whether more messages come or not; any thread may call the methods.
     Raises BagError, before anything is simulated, if the folder can't be written; then nothing is left of it.
     """
 
-    def __init__(self, path: str | Path, *, topics: Iterable[str] | None = None, distro: str | None = None) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        topics: Iterable[str] | None = None,
+        distro: str | None = None,
+        start: Callable[[Path], object] | None = None,
+    ) -> None:
         self.path = Path(path)
         self._distro = distro or default_distro()
         self._ended = False
@@ -52,9 +61,12 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             self._file = McapFile(self._stream, name, self._distro)
             self._channels = {topic: self._register(topic) for topic in (OUTPUTS if topics is None else topics)}
             self._file.flush()  # a disk without room is noticed here
-        except OSError as error:
+            if start is not None:
+                start(self.path / START_NAME)
+        except (OSError, CheckpointError) as error:
             self._leave_nothing()
-            raise BagError(f"{self._storage}: can't be written ({error.strerror})") from error
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise BagError(f"{self._storage}: can't be written ({reason})") from error
         self._begun = False  # the first message, the line, is flushed at once: without it a bag can't be understood
         self._flusher = threading.Thread(target=self._keep_flushing, name="recorder", daemon=True)
         self._flusher.start()
@@ -171,8 +183,9 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         """Removes what was made before the first message, so that the same folder can be recorded to later."""
         with contextlib.suppress(OSError):
             self._stream.close()
-        with contextlib.suppress(OSError):
-            self._storage.unlink(missing_ok=True)
+        for file in (self._storage, self.path / START_NAME):
+            with contextlib.suppress(OSError):
+                file.unlink(missing_ok=True)
         remove_folders(self._made)
 
 

@@ -7,6 +7,7 @@ import shutil
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -93,12 +94,10 @@ def rerun(
             simulation = Simulation(run.scene)
         if run.last < simulation.tick:
             raise BagError(f"{path}: ends at tick {run.last}, expected the start, tick {simulation.tick}, or later")
-        recorder = Recorder(bag)
+        recorder = Recorder(bag, start=partial(shutil.copyfile, start) if run.from_checkpoint else None)
         try:
             with recorder:
                 departure = _simulate(run, simulation, recorder, progress, watch)
-            if run.from_checkpoint:
-                shutil.copyfile(start, bag / START_NAME)
         except BaseException:
             shutil.rmtree(bag, ignore_errors=True)
             raise

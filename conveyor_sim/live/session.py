@@ -33,7 +33,8 @@ class Session:
         self._first_tick_at: float | None = None
         self.simulation = simulation
         self._began = simulation.time
-        self._recorder = Recorder(bag, distro=distro) if bag else None
+        keep_start = simulation.save if simulation.tick > 0 else None
+        self._recorder = Recorder(bag, distro=distro, start=keep_start) if bag else None
         sinks = [sink] if self._recorder is None else [self._recorder, sink]
         self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
         self.outputs.start()

@@ -103,7 +103,8 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
     simulation = begun(scene, work.start)
     with nullcontext() if clock is None else clock.standing():
         load_kernels(simulation)
-    recorder = None if bag is None else Recorder(bag)
+    keep_start = None if work.start is None else simulation.save
+    recorder = None if bag is None else Recorder(bag, start=keep_start)
     try:
         outputs = Outputs(simulation, [recorder] if recorder else [], run_id=uuid.uuid4().hex)
         if work.start is not None:

@@ -96,6 +96,9 @@ def test_what_was_saved_goes_on_to_the_same_bits(
     with open_bag(tmp_path / "bag_1") as bag:
         ticks = [frame.tick for frame in bag.signals()]
     assert (ticks[0], ticks[-1]) == (150, 250)
+    report = replay(tmp_path / "bag_1")  # from the checkpoint, which lies in it
+    assert (report.difference, report.last_tick) == (None, 250)
+    (tmp_path / "bag_1" / "start.npz").unlink()
     with pytest.raises(BagError, match=r"bag_1: began from a checkpoint at tick 150, expected a run from tick 0"):
         replay(tmp_path / "bag_1")
 

@@ -29,7 +29,6 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.errors import BagError
 from conveyor_sim.line.authority import MAY
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import in_environment, own_domain
@@ -225,15 +224,10 @@ class Station:
         bags = sorted(self._bag.parent.glob("bag*"), key=lambda path: path.stat().st_mtime_ns)
         numbers = {path: int(path.name.partition("_")[2] or 0) for path in bags}
         for path in sorted(bags, key=lambda path: numbers[path])[:-1]:
-            try:
-                report = replay(path)
-            except BagError as error:
-                if "began from a checkpoint" not in str(error):
-                    raise
-            else:
-                if report.difference is not None or not report.exact:
-                    kept = shutil.copytree(path, Path(tempfile.mkdtemp()) / path.name)
-                    raise Violation("replay", f"{report.difference}; {kept}")
+            report = replay(path)
+            if report.difference is not None or not report.exact:
+                kept = shutil.copytree(path, Path(tempfile.mkdtemp()) / path.name)
+                raise Violation("replay", f"{report.difference}; {kept}")
             shutil.rmtree(path)
 
     def _resident(self) -> int:
