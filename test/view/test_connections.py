@@ -23,6 +23,7 @@ from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeErro
 
 from conveyor_sim.scada.face import FaceError, Settings
 from conveyor_sim.scada.serving import Serving
+from conveyor_sim.scada.web import server
 from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, MOST_VIEWERS
 from conveyor_sim.scada.web.viewer import MOST_WAITING, UNSEEN
 
@@ -264,6 +265,15 @@ def test_connections_that_only_wait_make_room(live: Live) -> None:
                 await frames(page, 3)
 
     run(work())
+
+
+def test_who_does_not_agree_on_tls_is_not_waited_for(live: Live, users: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "HANDSHAKE", 0.05)
+    settings = Settings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
+    with Serving(live.source, [(WEB, 0)], settings) as serving:
+        port = int(serving.faces[0].address.rstrip("/").rpartition(":")[2])
+        with socket.create_connection(("127.0.0.2", port), timeout=PATIENCE / 2) as waiting:
+            assert waiting.recv(1) == b""
 
 
 def test_who_shows_no_frames_gets_no_more_and_all_that_happened(live: Live) -> None:
