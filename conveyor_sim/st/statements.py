@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 MOST_LOOPS = 15
 """One within the other; Python has 20."""
 
+MOST_BRANCHES = 1000
+"""Of one IF or CASE; Python's compiler takes each for one level more, and has some 2900."""
+
 
 class Lines:
     """Python source as it grows; `positions[n]` is where line n + 1 comes from, None for what is not of the program."""
@@ -118,6 +121,7 @@ class Statements:
 
     def _if(self, node: tree.If) -> None:
         word = "if"
+        _require_few(node.at, "branches of one IF", len(node.branches))
         for condition, body in node.branches:
             self._lines.add(f"{word} {self._expressions.condition(condition)}:", condition.at)
             self.block(body)
@@ -137,6 +141,7 @@ class Statements:
         self._lines.add(f"{name} = {selector.code}", node.at)
         taken: list[tuple[int, int]] = []  # rising
         word = "if"
+        _require_few(node.at, "choices of one CASE", len(node.choices))
         for labels, body in node.choices:
             tests = []
             for first, last in labels:
@@ -223,3 +228,9 @@ class Statements:
     def _name(self, letter: str) -> str:
         self._names += 1
         return f"_{letter}{self._names}"
+
+
+def _require_few(at: Position, what: str, count: int) -> None:
+    """Raises SourceError for more than MOST_BRANCHES."""
+    if count > MOST_BRANCHES:
+        raise SourceError(at, f"found {count} {what}, expected at most {MOST_BRANCHES}")

@@ -258,6 +258,14 @@ def test_a_number_that_goes_on_for_ever_is_refused(tmp_path: Path, number: str) 
         ("n := n" + " + n" * 1000 + ";", r":2:4004: found 1001 operands in one expression, expected at most 1000"),
         ("n := " + "7" * 900 + ";", r":2:6: found 7{900}, expected a number of at most 64 bits"),
         ("n := 16#" + "7" * 90_000 + ";", r":2:6: found a number of 90003 characters, expected at most 1000"),
+        (
+            "IF n = 0 THEN ; " + "ELSIF n = 1 THEN ; " * 1000 + "END_IF",
+            r":2:1: found 1001 branches of one IF, expected at most 1000",
+        ),
+        (
+            "CASE n OF " + " ".join(f"{label}: ;" for label in range(3000)) + " END_CASE",
+            r":2:1: found 3000 choices of one CASE, expected at most 1000",
+        ),
         ("CASE n OF 1..9, 20: ; 12..15: ; 15: ; END_CASE", r":2:33: found 15, expected a label that no other choice"),
     ],
 )
