@@ -13,7 +13,9 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +36,11 @@ FLUSH_INTERVAL = 1.0
 """s, simulated: a killed process loses the inputs of less than that."""
 
 _NONE = repr(())
+
+
+def copier(start: str | PathLike[str] | None) -> Callable[[Path], object] | None:
+    """What copies the checkpoint that a run begins from to where it is recorded; None: it begins at tick 0."""
+    return None if start is None else partial(shutil.copyfile, start)
 
 
 class InputLog(contextlib.AbstractContextManager["InputLog"]):

@@ -7,11 +7,10 @@ import shutil
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, environment_of
+from conveyor_sim.bag.input_log import FILE_NAME, FORMAT, START_NAME, copier, environment_of
 from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
@@ -94,7 +93,7 @@ def rerun(
             simulation = Simulation(run.scene)
         if run.last < simulation.tick:
             raise BagError(f"{path}: ends at tick {run.last}, expected the start, tick {simulation.tick}, or later")
-        recorder = Recorder(bag, start=partial(shutil.copyfile, start) if run.from_checkpoint else None)
+        recorder = Recorder(bag, start=copier(start if run.from_checkpoint else None))
         try:
             with recorder:
                 departure = _simulate(run, simulation, recorder, progress, watch)

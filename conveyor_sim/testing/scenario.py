@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import secrets
-import shutil
 import uuid
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
 
-from conveyor_sim.bag.input_log import InputLog
+from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
@@ -77,8 +75,7 @@ class Scenario(AbstractContextManager["Scenario"]):
         self.failure = ""
         """What became of it, in words."""
         self._read: dict[str, None] = {}
-        keep_start = None if start is None else partial(shutil.copyfile, start)
-        self._recorder = None if bag is None else Recorder(bag, start=keep_start)
+        self._recorder = None if bag is None else Recorder(bag, start=copier(start))
         self._outputs = Outputs(self.simulation, [self._recorder] if self._recorder else [], run_id=uuid.uuid4().hex)
         began = self._began = None if start is None else Path(start)
         if began is not None:
