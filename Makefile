@@ -1,6 +1,6 @@
 # make run     sets up an environment, then runs a scene as a ROS 2 node with a controller (SCENE=..., one with belts feeder and table; DISTRO=kilted)
 # make test    sets up the same, then runs the tests (ARGS="-k bag" hands options to pytest, ARGS="-m quick" is the inner loop)
-# make bench   sets up the same, then measures speed against others, about 20 minutes (ARGS="dense plant" or ARGS=--quick)
+# make bench   sets up the same, then measures speed against others, about 40 minutes (ARGS="dense plant" or ARGS=--quick)
 # make accuracy  sets up the same, then makes the studies of docs/accuracy.md, about an hour (ARGS=funnel for one)
 # make promises  sets up the same, then holds all shipped scenes and fifteen unseen ones to the presets' promises, 5 to 25 minutes
 # make fuzz    sets up the same, then attacks with random input (ARGS="--minutes 60 --jobs 2"; --target bags for one; failures are kept)

@@ -13,6 +13,8 @@ with while_importing():
     import click
 
     from bench import (
+        accuracy,
+        compiling,
         control,
         dense,
         growth,
@@ -57,6 +59,7 @@ PARTS: dict[str, Part] = {
     "growth": growth,
     "memory": memory,
     "start": start,
+    "compile": compiling,
     "node": node,
     "control": control,
     "riding": riding,
@@ -66,6 +69,7 @@ PARTS: dict[str, Part] = {
     "view": view,
     "studies": studies,
     "whole": whole,
+    "accuracy": accuracy,
 }
 
 
@@ -75,7 +79,7 @@ PARTS: dict[str, Part] = {
 @click.option("--quick", is_flag=True, help=f"Little of everything, to see that it works: to {QUICK_FOLDER} only.")
 @click.option("--tables", "only_tables", is_flag=True, help="Measure nothing, renew the tables from the raw numbers.")
 def main(parts: tuple[str, ...], quick: bool, only_tables: bool) -> None:
-    """Measure PARTS (default: all, about 20 minutes) on a machine that does nothing else."""
+    """Measure PARTS (default: all, about 40 minutes) on a machine that does nothing else."""
     folder = QUICK_FOLDER if quick else DOCUMENT.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
     for name in [] if only_tables else parts or PARTS:

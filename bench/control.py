@@ -12,7 +12,7 @@ from typing import Any
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
-from conveyor_sim.scene import load_scene
+from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
 from conveyor_sim.testing import Scenario
@@ -23,10 +23,13 @@ BEFORE = ROOT / "docs" / "performance" / "control_before.csv"
 
 CASE = "control"
 FACTOR, OUTSIDE, WHOLE = "times real time", "us a tick outside the step kernels", "us a tick"
+BESIDE = "us a tick of scan, conditions, history and outputs"
 LINES = ("zoned_line", "reject_line", "buffer_lane", "watched_eyes")
 DOWNSTREAM_STOP = "scenario of a stopped packer"
 WITH_EVIDENCE = f"{DOWNSTREAM_STOP}, with evidence"
 """As the fixture `line` runs it; before, it was recorded to a bag meanwhile."""
+FEW, MANY = 6, 60
+"""Photo-eyes behind the outfeed, where no bottle comes."""
 SECONDS, QUICK_SECONDS = 60.0, 2.0
 """Simulated, from the start of the scene."""
 
@@ -35,9 +38,15 @@ def measure(effort: Effort) -> list[Row]:
     """Lines alone, then a scenario with its controller, conditions and history, without and with evidence."""
     rows = []
     for turn in range(1 if effort.quick else effort.rounds):
+        seconds = QUICK_SECONDS if effort.quick else SECONDS
         for name in LINES:
-            say(f"control, round {turn + 1}: {name}")
-            rows += _line(name, QUICK_SECONDS if effort.quick else SECONDS, turn)
+            for riding in (True, False):
+                say(f"control, round {turn + 1}: {line_name(name, riding)}")
+                scene = load_scene(scene_path(f"scenarios/{name}"), {} if riding else {"effects": {"riding": "off"}})
+                rows += _line(line_name(name, riding), scene, seconds, turn)
+        for number in (FEW, MANY):
+            say(f"control, round {turn + 1}: {eyes_name(number)}")
+            rows += _line(eyes_name(number), _with_eyes(number), seconds, turn)
         if not effort.quick:
             say(f"control, round {turn + 1}: {DOWNSTREAM_STOP}")
             rows += _scenario(turn, DOWNSTREAM_STOP, None)
@@ -46,8 +55,23 @@ def measure(effort: Effort) -> list[Row]:
     return rows
 
 
-def _line(name: str, seconds: float, turn: int) -> list[Row]:
-    scene = load_scene(scene_path(f"scenarios/{name}"))
+def line_name(name: str, riding: bool) -> str:
+    """What a line is called in tables."""
+    return name if riding else f"{name}, riding off"
+
+
+def eyes_name(number: int) -> str:
+    """What a line with so many more photo-eyes is called in tables."""
+    return f"{number} photo-eyes that see nothing"
+
+
+def _with_eyes(number: int) -> Scene:
+    places = [2.31 + 0.08 * i / number for i in range(number)]
+    eyes = {f"eye{i}": {"from": [x, -0.05], "to": [x, 0.05]} for i, x in enumerate(places)}
+    return load_scene(scene_path("scenarios/watched_eyes"), {"photo_eyes": eyes})
+
+
+def _line(name: str, scene: Scene, seconds: float, turn: int) -> list[Row]:
     simulation = Simulation(scene, threads=1)
     simulation.advance(1)
     kernels = _Clock()
@@ -67,11 +91,15 @@ def _scenario(turn: int, contestant: str, inputs: Path | None) -> list[Row]:
     example = runpy.run_path(str(ROOT / "examples" / "scenarios" / "test_downstream_stop.py"))
     with Scenario("scenarios/zoned_line", inputs=inputs) as plant:
         plant.attach(example["cascade"]())
-        clock = _Clock()
+        clock, line = _Clock(), _Clock()
+        simulation: Any = plant.simulation
+        simulation.advance = line.around(simulation.advance)
         clock.around(example["check"])(plant)
+        ticks = simulation.tick
         return [
             Row(CASE, 0.0, contestant, FACTOR, turn, plant.time / clock.seconds),
-            Row(CASE, 0.0, contestant, WHOLE, turn, 1e6 * clock.seconds / plant.simulation.tick),
+            Row(CASE, 0.0, contestant, WHOLE, turn, 1e6 * clock.seconds / ticks),
+            Row(CASE, 0.0, contestant, BESIDE, turn, 1e6 * (clock.seconds - line.seconds) / ticks),
         ]
 
 
@@ -99,7 +127,7 @@ def tables(rows: Rows) -> str:
     before = Rows.read(BEFORE)
     body = []
     for name in rows.contestants(CASE):
-        for quantity in (FACTOR, WHOLE, OUTSIDE):
+        for quantity in (FACTOR, WHOLE, OUTSIDE, BESIDE):
             now = rows.spread(CASE, 0.0, name, quantity)
             if now is not None:
                 body.append([name, quantity, before.spread(CASE, 0.0, name, quantity), now])

@@ -5,7 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bench import control, dense, growth, lockstep, node, plant, start, structured_text, studies, view, whole
+from bench import (
+    accuracy,
+    compiling,
+    control,
+    dense,
+    growth,
+    lockstep,
+    node,
+    plant,
+    start,
+    structured_text,
+    studies,
+    view,
+    whole,
+)
 from bench.markdown import table as markdown
 from bench.measure import RATE
 from bench.rows import Rows, Spread
@@ -53,6 +67,19 @@ def _node(rows: Rows) -> float | None:
 
 def _control(contestant: str, quantity: str) -> Callable[[Rows], float | None]:
     return lambda rows: _middle(rows.spread(control.CASE, 0, contestant, quantity))
+
+
+def _eyes(rows: Rows) -> float | None:
+    many, few = (control.eyes_name(number) for number in (control.MANY, control.FEW))
+    return _middle(rows.ratio(control.CASE, 0, many, few, control.WHOLE))
+
+
+def _compile(name: str) -> Callable[[Rows], float | None]:
+    return lambda rows: compiling.of_before(rows, name)
+
+
+def _accuracy(scene: str, quantity: str) -> Callable[[Rows], float | None]:
+    return lambda rows: _middle(rows.spread(accuracy.CASE, 0, scene, quantity))
 
 
 def _lockstep(quantity: str) -> Callable[[Rows], float | None]:
@@ -138,29 +165,43 @@ TARGETS = (
     Target("rise of the cost from 1 to 1 000 belts", "growth", MOST, 0.15, _rise(growth.BELTS, 1, 1_000)),
     Target("rise of the cost from 1 to 1 000 rails", "growth", MOST, 0.15, _rise(growth.RAILS, 1, 1_000)),
     Target("s to the first step, cached", "start", MOST, 1.0, _first_step),
+    *(
+        Target(f"first tick from an empty cache, {name}, of that before", "compile", MOST, v, _compile(name))
+        for name, v in (
+            *((first, 0.5) for first in compiling.FIRST),
+            *((later, 0.25) for later in (compiling.SECOND, compiling.THIRD)),
+        )
+    ),
     Target("cores of the node beside the kernels, N = 1 000, 50 Hz, real time", "node", MOST, 0.1, _node),
     *(
-        Target(f"{name}, {quantity}", "control", bound, value, _control(name, quantity))
-        for quantity, bound, values in (
-            (control.FACTOR, LEAST, (105.0, 150.0, 85.0, 150.0)),
-            (control.OUTSIDE, MOST, (30.0, 30.0, 30.0, 30.0)),
+        Target(f"{line}, {quantity}", "control", bound, value, _control(line, quantity))
+        for quantity, bound, riding, values in (
+            (control.FACTOR, LEAST, True, (150.0, 150.0, 85.0, 150.0)),
+            (control.FACTOR, LEAST, False, (105.0, 150.0, 85.0, 150.0)),
+            (control.OUTSIDE, MOST, False, (30.0, 30.0, 30.0, 30.0)),
         )
         for name, value in zip(control.LINES, values, strict=True)
+        for line in (control.line_name(name, riding),)
     ),
-    Target(
-        "a scenario of a stopped packer, times real time",
-        "control",
-        LEAST,
-        40.0,
-        _control(control.DOWNSTREAM_STOP, control.FACTOR),
+    Target(f"{control.MANY} photo-eyes that see nothing, over {control.FEW}", "control", MOST, 2.0, _eyes),
+    *(
+        Target(
+            f"a {control.DOWNSTREAM_STOP}, {quantity}", "control", bound, v, _control(control.DOWNSTREAM_STOP, quantity)
+        )
+        for quantity, bound, v in ((control.FACTOR, LEAST, 60.0), (control.BESIDE, MOST, 60.0))
     ),
+    Target("what evidence adds to it", "control", MOST, 0.2, _evidence),
     Target("scans a second in lockstep over DDS", "lockstep", LEAST, 1500.0, _lockstep(lockstep.RATE)),
     Target("s from the start of both nodes to the first scans", "lockstep", MOST, 2.0, _lockstep(lockstep.START)),
     *(
         Target(f"s of wall time, {command}", "whole", MOST, most, _whole(command))
         for command, most in ((whole.RUN, 4.0), (whole.MAKE_RUN, 7.0))
     ),
-    Target("what evidence adds to it", "control", MOST, 0.2, _evidence),
+    *(
+        Target(f"{quantity}, conveyor-sim accuracy {scene}", "accuracy", MOST, most, _accuracy(scene, quantity))
+        for scene in accuracy.SCENES
+        for quantity, most in ((accuracy.PREDICTED, 10.0), (accuracy.PRELIMINARY, 60.0), (accuracy.ANSWER, 300.0))
+    ),
     *(
         Target(f"ms of CPU a frame of the page, N = {n}", "view", MOST, v, _view(view.FRAME, n, "page", view.CPU))
         for n, v in ((1_000, 1e3 / 60.0), (10_000, 1e3 / 20.0))

@@ -30,6 +30,11 @@ ALONE = workers(1)[0]
 """A thread by itself."""
 
 
+def callable_part(function: Any) -> Any:
+    """A part of kernels as a kernel of its own, to be called from Python."""
+    return kernel(function.py_func)
+
+
 def evaluate(world: World, dt: float = 1e-5) -> None:
     """Evaluate all forces of the present state into `world.load`; springs stay as they are."""
     _evaluate(world, ALONE, dt)

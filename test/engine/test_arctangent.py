@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from worlds import callable_part
 
-from conveyor_sim.engine.contact.arctangent import arctangent
+from conveyor_sim.engine.contact.arctangent import arctangent as arctangent_part
+
+arctangent = callable_part(arctangent_part)
 
 
 def test_it_is_the_arctangent_to_the_last_places() -> None:

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from worlds import callable_part
 
 from conveyor_sim.engine.arrays.beams import LightBeams, Ways
-from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams, cubic, within_reach
+from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams
+from conveyor_sim.engine.sensors.beams import cubic as cubic_part
+from conveyor_sim.engine.sensors.beams import within_reach as within_reach_part
+
+cubic = callable_part(cubic_part)
+within_reach = callable_part(within_reach_part)
 
 F8 = NDArray[np.float64]
 

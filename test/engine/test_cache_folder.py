@@ -17,7 +17,9 @@ needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make fi
 FORCE = """
 import numpy as np
 from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.contact.contact import contact_force
+contact_force = kernel(contact_force.py_func)
 law = ContactLaw(stiffness=np.array([5000.0]), friction=np.array([0.3]))
 print(contact_force(law, np.uint64(0), None, 0.01, None, 0.002, 1.0, 0.0, 1.0, None, None)[1])
 """

@@ -5,9 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from worlds import callable_part
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
-from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after
+from conveyor_sim.engine.contact.contact import carried as carried_part
+from conveyor_sim.engine.contact.contact import contact_force as contact_force_part
+from conveyor_sim.engine.contact.contact import spring_after as spring_after_part
+
+carried = callable_part(carried_part)
+contact_force = callable_part(contact_force_part)
+spring_after = callable_part(spring_after_part)
 
 K, C, MU, LIMIT = 5000.0, 2.0, 0.3, 0.01
 K_HERTZ = 3e6

@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from worlds import callable_part
 
-from conveyor_sim.engine.contact.friction import (
-    friction_share,
-    implicit_regularisation,
-    implicit_share,
-    implicit_slip,
-    regularisation,
-)
+from conveyor_sim.engine.contact import friction
+
+friction_share = callable_part(friction.friction_share)
+implicit_share = callable_part(friction.implicit_share)
+implicit_slip = callable_part(friction.implicit_slip)
+implicit_regularisation = callable_part(friction.implicit_regularisation)
+regularisation = callable_part(friction.regularisation)
 
 LIMIT = 0.01
 CURVES = [None, 1]

@@ -6,12 +6,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scenes import RADIUS, arc, bottle, contact, kind, polyline, scene, segment
-from worlds import FAR, nearest_on_arc, nearest_on_segment, rail_scene, state_of
+from worlds import FAR, callable_part, nearest_on_arc, nearest_on_segment, rail_scene, state_of
 
-from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
+from conveyor_sim.engine.lists.rebuild import moved_too_far as moved_too_far_part
+from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.world_views import lists_of
 from conveyor_sim.state import State
 from conveyor_sim.state.empty_world import empty_pairs
+
+moved_too_far = callable_part(moved_too_far_part)
 
 RANDOM = np.random.default_rng(3)
 RADII = np.array([RADIUS, 0.03, 0.11])

@@ -10,6 +10,7 @@ from scenes import RADIUS, arc, polyline, segment
 from worlds import (
     ALONE,
     STIFFNESS,
+    callable_part,
     nearest_of,
     nearest_on_arc,
     nearest_on_segment,
@@ -18,9 +19,11 @@ from worlds import (
     rail_scene,
 )
 
-from conveyor_sim.engine.rails.deepest_contacts import keep_deepest
+from conveyor_sim.engine.rails.deepest_contacts import keep_deepest as keep_deepest_part
 from conveyor_sim.engine.threads.workers import MOST_CONTACTS
 from conveyor_sim.model import build_model
+
+keep_deepest = callable_part(keep_deepest_part)
 
 RANDOM = np.random.default_rng(20240229)
 ROUNDING = 1e-9

@@ -6,13 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from worlds import callable_part
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import Listed
 from conveyor_sim.engine.arrays.support import Belts, Ring, Sectors, Surface
 from conveyor_sim.engine.arrays.world import Settings, World
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.support.ring import POINTS, ring_means, ring_share, straddling_ring
+from conveyor_sim.engine.support.ring import POINTS, straddling_ring
+from conveyor_sim.engine.support.ring import ring_means as ring_means_part
+from conveyor_sim.engine.support.ring import ring_share as ring_share_part
+
+ring_means = callable_part(ring_means_part)
+ring_share = callable_part(ring_share_part)
 
 LIMIT = 0.01
 FINE = 1 << 16

@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from worlds import callable_part
 
-from conveyor_sim.engine.support.sector import span_distance
+from conveyor_sim.engine.support.sector import span_distance as span_distance_part
 from conveyor_sim.model.plant import reach_code
+
+span_distance = callable_part(span_distance_part)
 
 RANDOM = np.random.default_rng(5)
 SPANS = [0.1, 1.0, 3.0, math.pi, 3.3, 5.0, 2.0 * math.pi - 0.2]

@@ -4,13 +4,18 @@ A World has some 150 arrays, of seven values each. Numba takes a NamedTuple apar
 again in what is called, value by value. A group is passed on by its address instead, and so are the groups in it. A
 kernel begins by copying them: LLVM knows then that no array overlaps what it has of them, and once all is inlined,
 nothing is left of the copies but the few values that are used.
+
+What is at the address is laid out in Python, once for each group (`address`): the code that numba writes to take 150
+arrays apart at every call was up to half of a kernel.
 """
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, TypeVar
 
+import numpy as np
+from numba import typeof
 from numba.core import cgutils, types
 from numba.core.datamodel.models import TupleModel
 from numba.core.imputils import lower_getattr_generic
@@ -24,12 +29,52 @@ COPIES_GROUPS = "copies_groups"
 
 def group(cls: Class) -> Class:
     """Declare a NamedTuple as a group."""
+    body = {"__doc__": cls.__doc__, "__module__": cls.__module__, "__qualname__": cls.__qualname__}
+    kept: Any = type(cls.__name__, (_Laid, cls), body)
 
-    @typeof_impl.register(cls)
-    def _typeof(value: Any, context: Any) -> Any:
-        return Group([typeof_impl(member, context) for member in value], cls)
+    @typeof_impl.register(kept)
+    def _typeof(value: Any, _context: Any) -> Any:
+        return value.group_type
 
-    return cls
+    return kept
+
+
+class _Laid(tuple):
+    """A group in memory, laid out as `_GroupModel.struct` has it: each value in words of 8 bytes."""
+
+    _words: Any
+
+    @cached_property
+    def group_type(self) -> Any:
+        """Its type: that of the members."""
+        return Group([typeof(member) for member in self], type(self))
+
+    @cached_property
+    def address(self) -> int:
+        """Of the layout, which lives as long as the group. Raises TypeError for a member that is none of those."""
+        words: list[int] = []
+        for member in self:
+            words += _words(member)
+        self._words = np.array(words, np.int64)
+        found: int = self._words.ctypes.data
+        return found
+
+    def __reduce__(self) -> Any:
+        # A copy has arrays, and an address, of its own.
+        return type(self), tuple(self)
+
+
+def _words(member: Any) -> Sequence[int]:
+    if member is None:
+        return (0,)
+    if isinstance(member, np.ndarray):
+        # Nobody owns what a kernel sees of an array (meminfo, parent): the group does.
+        return (0, 0, member.size, member.itemsize, member.ctypes.data, *member.shape, *member.strides)
+    if isinstance(member, _Laid):
+        return (member.address,)
+    if type(member) in (int, float):
+        return np.array([member], np.int64 if type(member) is int else np.float64).view(np.int64).tolist()
+    raise TypeError(f"member {member!r} of a group, expected an array, a group, an int, a float or None")
 
 
 def without(names: Iterable[str]) -> Any:
@@ -161,16 +206,11 @@ def _lower_member(context: Any, builder: Any, group_type: Group, value: Any, nam
 
 
 @unbox(Group)
-def _unbox(group_type: Group, given: Any, c: Any) -> Any:
-    members = [c.unbox(member, c.pyapi.tuple_getitem(given, place)) for place, member in enumerate(group_type.types)]
-    failed = cgutils.false_bit
-    for member in members:
-        failed = c.builder.or_(failed, member.is_error)
-
-    def clean_up() -> None:
-        for member in members:
-            if member.cleanup is not None:
-                member.cleanup()
-
-    value = _store(c.context, c.builder, group_type, [member.value for member in members])
-    return NativeValue(value, is_error=failed, cleanup=clean_up)
+def _unbox(_group_type: Group, given: Any, c: Any) -> Any:
+    address = cgutils.alloca_once_value(c.builder, cgutils.get_null_value(cgutils.voidptr_t))
+    found = c.pyapi.object_getattr_string(given, "address")
+    with c.builder.if_then(cgutils.is_not_null(c.builder, found)):
+        c.builder.store(c.pyapi.long_as_voidptr(found), address)
+        c.pyapi.decref(found)
+    value = c.builder.load(address)
+    return NativeValue(value, is_error=cgutils.is_null(c.builder, value))

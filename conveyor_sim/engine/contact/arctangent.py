@@ -2,7 +2,7 @@
 
 import math
 
-from conveyor_sim.engine.compiler.compile import kernel
+from conveyor_sim.engine.compiler.compile import part
 
 _TAN_PI_8 = math.sqrt(2.0) - 1.0
 _TAN_3_PI_8 = math.sqrt(2.0) + 1.0
@@ -14,7 +14,7 @@ _Q4, _Q5, _Q6, _Q7 = -0.09090904578123903, 0.07692183190826087, -0.0666451144738
 _Q8, _Q9, _Q10 = -0.0508544973794026, 0.03923165829558719, -0.019176887119062257
 
 
-@kernel
+@part
 def arctangent(x: float) -> float:
     """Return atan(x) in rad for x >= 0, to two units in the last place."""
     steep = x > _TAN_3_PI_8

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.contacts import ContactLaw
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import friction_share, implicit_share
 from conveyor_sim.engine.contact.law_sums import (
     add_damping,
@@ -21,7 +21,7 @@ from conveyor_sim.engine.contact.law_sums import (
 )
 
 
-@kernel
+@part
 def contact_force(
     law: ContactLaw,
     e: int,
@@ -130,7 +130,7 @@ def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float
     return 0.5 * _tangential_stiffness(law, e, depth) * spring * spring
 
 
-@kernel
+@part
 def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, way: float) -> Any:
     """Elongation (m), or None, of a spring at an overlap (m) that is by so much deeper (m) than where it was kept.
 
@@ -163,7 +163,7 @@ def stretched(spring: Any, slip: float, dt: float) -> Any:
     return spring + dt * slip
 
 
-@kernel
+@part
 def spring_after(
     law: ContactLaw, e: int, spring: float, overlap: float, slip: float, dt: float, normal: float, share: float
 ) -> float:

@@ -19,14 +19,14 @@ Formulas without branches and without a division by a slip that may be 0, so tha
 import math
 from typing import Any
 
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.arctangent import arctangent
 
 _LEAST = 1e-100
 """Share of v_lim that a slip is taken for at least where a quotient by it is asked for."""
 
 
-@kernel
+@part
 def regularisation(slip: float, slip_limit: float, atan: Any) -> float:
     """p(s)/s in s/m for a slip speed s >= 0: times -mu N v it is the force. At rest it is 2/v_lim."""
     if atan is not None:
@@ -37,7 +37,7 @@ def regularisation(slip: float, slip_limit: float, atan: Any) -> float:
     return (2.0 - slip * quotient) * quotient
 
 
-@kernel
+@part
 def friction_share(slip: float, slip_limit: float, atan: Any) -> float:
     """p(|s|), with the sign of the slip s (m/s), of a contact, whose slip has one dimension."""
     t = abs(slip) * (1.0 / slip_limit)
@@ -47,7 +47,7 @@ def friction_share(slip: float, slip_limit: float, atan: Any) -> float:
     return math.copysign(t * (2.0 - t), slip)
 
 
-@kernel
+@part
 def implicit_regularisation(slip: float, b: float, slip_limit: float, atan: Any) -> float:
     """p(s)/s_0 in s/m, s the slip speed after the step, s_0 = slip >= 0 before it; b = 0 is the explicit quotient."""
     t = slip / slip_limit
@@ -59,7 +59,7 @@ def implicit_regularisation(slip: float, b: float, slip_limit: float, atan: Any)
     return (2.0 - t * quotient) * quotient / slip_limit
 
 
-@kernel
+@part
 def implicit_share(slip: float, b: float, slip_limit: float, atan: Any) -> float:
     """p(s), s the slip speed after the step, with the sign of the slip (m/s) before it."""
     t = abs(slip) * (1.0 / slip_limit)
@@ -70,7 +70,7 @@ def implicit_share(slip: float, b: float, slip_limit: float, atan: Any) -> float
     return math.copysign(t * (2.0 - t), slip)
 
 
-@kernel
+@part
 def implicit_slip(slip: float, b: float, slip_limit: float, atan: Any) -> float:
     """The slip (m/s, signed) after the step, from that before it."""
     t = abs(slip) / slip_limit

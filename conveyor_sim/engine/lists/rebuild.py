@@ -71,7 +71,7 @@ def _fits_belts(needed: int, belts: Any) -> bool:
     return needed <= belts.candidate.size
 
 
-@kernel
+@part
 def moved_too_far(bottles: Bottles, hood: Neighbourhood, skin: float, first: int, end: int) -> bool:
     """Whether some bottle of first to end has moved by more than half the skin since the last rebuild."""
     limit = 0.25 * skin * skin

@@ -2,11 +2,11 @@
 
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.threads.workers import MOST_CONTACTS
 
 
-@kernel
+@part
 def keep_deepest(
     found: RailContacts,
     count: int,

@@ -135,7 +135,7 @@ def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> 
     return True
 
 
-@kernel
+@part
 def cubic(c0: float, c1: float, c2: float, c3: float, s: float) -> float:
     """Where a cubic with these control points is at a parameter."""
     r = 1.0 - s
@@ -165,7 +165,7 @@ def _join(spans: F8, count: int) -> int:
     return kept
 
 
-@kernel
+@part
 def within_reach(a: float, b: float, next_a: float, next_b: float, length: float, radius: float) -> tuple[float, float]:
     """Shares of a chord at which a point comes within a radius of a segment and leaves; enter > leave if never.
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.support import Belts
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.lists.near import end_list
 from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.support.sector import span_distance
@@ -54,7 +54,7 @@ def carrier(i: int, belts: Any, floor: int, x: float, y: float) -> int:
     return floor
 
 
-@kernel
+@part
 def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tuple[float, float]:
     """Velocity of surface h at a point, m/s: uniform on a straight belt, Omega x (r - C) on a curved one."""
     ux, uy = surface.ux[h], surface.uy[h]

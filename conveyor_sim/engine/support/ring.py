@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.support.belts import carrier, surface_velocity
 from conveyor_sim.engine.threads.workers import UNIT
 
@@ -26,7 +26,7 @@ _ANGLES = 2.0 * np.pi * np.arange(POINTS) / POINTS
 _COS, _SIN = np.cos(_ANGLES), np.sin(_ANGLES)
 
 
-@kernel
+@part
 def ring_means(slide: float, spin: float, slip_limit: float) -> tuple[float, float, float]:
     """What `ring_share` needs of a ring on one belt: (limit, first, rest), m/s, m/s, m^2/s^2.
 
@@ -61,7 +61,7 @@ def _mean(a: float, b: float, rest: float, weight: float) -> tuple[float, float,
     return 0.5 * (a + b), math.sqrt(a * b), rest + weight * c * c
 
 
-@kernel
+@part
 def ring_share(own: float, other: float, limit: float, first: float, rest: float) -> float:
     """F/(mu m g s_v) for own s_v and other s_w, M/(mu m g R_b s_w) for own s_w and other s_v; s/m, finite at rest.
 

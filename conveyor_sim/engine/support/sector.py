@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from conveyor_sim.engine.compiler.compile import kernel
+from conveyor_sim.engine.compiler.compile import part
 
 UP_TO_HALF, BEYOND_HALF, FULL_CIRCLE = 0, 1, 2
 
 
-@kernel
+@part
 def span_distance(x: float, y: float, start_x: float, start_y: float, end_x: float, end_y: float, reach: Any) -> float:
     """Signed distance in m of (x, y), relative to the centre, from the span's edges: >= 0 inside.
 
