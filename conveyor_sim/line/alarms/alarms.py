@@ -151,19 +151,18 @@ class Alarms:
     def say(self, tick: int, said: Mapping[str, bool]) -> None:
         """Whether the conditions of some alarms hold as of a tick; all of them at once.
 
-        One that nobody has declared is as by default; if there is no room for it, it is left out.
+        One that nobody has declared is as by default; if there is no room for all, those that hold come first.
         """
         new = [id for id in said if id not in self._all]
         turned = [self._all[id] for id, on in said.items() if id in self._all and self._say(id, on, tick)]
         if turned:
             self.settle(tick, turned)
         # Only then, for it may be forgotten what has just ended.
-        made = []
-        for id in new:
-            if self._make_room(1):
-                made.append(self._add(id, UNDECLARED, "", False))
+        if room := self._make_room(len(new)) if new else 0:
+            first = new if room == len(new) else sorted(new, key=lambda id: not said[id])[:room]
+            made = [self._add(id, UNDECLARED, "", False) for id in first]
+            for id in first:
                 self._say(id, said[id], tick)
-        if made:
             self.settle(tick, made)
 
     def end(self, tick: int) -> None:
@@ -341,15 +340,15 @@ class Alarms:
         """Ids of the controllers' alarms that can't be forgotten."""
         return {alarm.id for alarm in self if not alarm.own and not self._spare(alarm)}
 
-    def _make_room(self, wanted: int, keep: Collection[str] = ()) -> bool:
-        """Forget as many alarms as it takes, the oldest first; whether there is room then."""
+    def _make_room(self, wanted: int, keep: Collection[str] = ()) -> int:
+        """Forget as many alarms as it takes, the oldest first; for how many of those wanted there is room then."""
         full = sum(not alarm.own for alarm in self) + wanted - MOST_ALARMS
         if full > 0:
             spare = [alarm.id for alarm in self if self._spare(alarm) and alarm.id not in keep][:full]
             for id in spare:
                 del self._all[id]
             full -= len(spare)
-        return full <= 0
+        return wanted - max(full, 0)
 
 
 def _hint(given: str, known: Iterable[str]) -> str:

@@ -232,6 +232,22 @@ def test_only_so_many() -> None:
     assert board.alarms.numbered == MOST_ALARMS + 2
 
 
+def test_more_alarms_at_once_than_there_can_be() -> None:
+    """Those that hold are taken first, wherever they are in the message; the others as far as there is room."""
+    board = Board()
+    said = {f"a{n}": n >= MOST_ALARMS + 400 for n in range(MOST_ALARMS + 500)}
+    assert board.alarms.room_problem(said) == ""
+    board.say(**said)
+    assert len(board.alarms) == MOST_ALARMS and {id for id in said if id in board.alarms} >= {
+        id for id, on in said.items() if on
+    }
+    assert board.alarms.counts()[1] == 100
+    board.say(**dict.fromkeys(said, False))
+    assert len(board.alarms) == MOST_ALARMS and board.alarms.counts()[1] == 0
+    board.say(**{f"b{n}": True for n in range(MOST_ALARMS + 1)})  # of which the line refuses the message
+    assert len(board.alarms) == MOST_ALARMS and f"b{MOST_ALARMS}" not in board.alarms
+
+
 def test_one_that_others_follow_from_is_not_forgotten() -> None:
     board = Board()
     board.say(cause=False)
