@@ -32,6 +32,8 @@ class ScanContext:
     speeds: F8
     """(belts,), m/s, of the belts through a tick; those that drive them set it as the tick begins."""
     tick: int = 0
+    by_hand: bool = False
+    """Whether the command that is being taken was given by a person."""
     bad: set[int] = field(default_factory=set)
     """Ids of the bottles that an inspection would object to."""
     attributes: dict[str, dict[int, float]] = field(default_factory=dict)

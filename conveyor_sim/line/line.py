@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.line.alarms.system import AlarmSystem
-from conveyor_sim.line.authority import unauthorized
+from conveyor_sim.line.authority import PEOPLE, unauthorized
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import refusal, shown
 from conveyor_sim.line.counters import RESET_COUNTERS, Counters
@@ -174,6 +174,7 @@ class Line:
 
     def _set(self, given: Input, now: ScanContext) -> None:
         by_hand = self.modes.stops_by_hand(given)
+        now.by_hand = given.writer_kind in PEOPLE
         for name, value in zip(given.names, given.values, strict=True):
             if name in by_hand:
                 self._owner[name].stop_by_hand(name, value)

@@ -12,6 +12,7 @@ from conveyor_sim.line.packml import COMMAND_TEXTS, STATE_TEXTS, Command, State,
 from conveyor_sim.line.setup import Setup
 from conveyor_sim.line.stop_reason import (
     BLOCKED,
+    BY_HAND,
     COMMANDED,
     FAULT,
     FIRST_FAILURE,
@@ -157,7 +158,7 @@ class MachineDevice(Device):
 
     def stop_by_hand(self, name: str, value: float) -> None:
         """Take Stop or Abort; cntrl_cmd stays as who has control gave it."""
-        self._take(int(value))
+        self._take(int(value), by_hand=True)
         self._settle_state()
 
     def command(self, name: str, value: float, now: ScanContext) -> None:
@@ -171,29 +172,29 @@ class MachineDevice(Device):
             self.stop = value != 0.0
             self._note_failures()
         elif what == "run":
-            self._switch(value != 0.0)
+            self._switch(value != 0.0, now.by_hand)
         elif value != self.cntrl_cmd:
             self.cntrl_cmd = int(value)
-            self._take(self.cntrl_cmd)
+            self._take(self.cntrl_cmd, now.by_hand)
         self._settle_state()
 
-    def _switch(self, run: bool) -> None:
+    def _switch(self, run: bool, by_hand: bool) -> None:
         """Stop as the switch `run` goes off; be reset and started as it comes on, unless it was aborted."""
         before, self.run = self.run, run
         if before and not run:
             self.restart = False
-            self._stand(Command.STOP, RUN)
+            self._stand(Command.STOP, RUN + BY_HAND * by_hand)
         elif run and not before:
             self.restart = self.state not in (State.ABORTING, State.ABORTED, State.CLEARING)
 
-    def _take(self, command: int) -> None:
+    def _take(self, command: int, by_hand: bool) -> None:
         """Take a command of PackML, unless what was commanded beside it has led elsewhere."""
         if command == 0 or not self.packml.takes(command):
             return
         if command in (Command.STOP, Command.ABORT, Command.RESET):
             self.restart, self.planned = False, NONE
         if command in COMMANDED:
-            self._stand(Command(command), COMMANDED[command])
+            self._stand(Command(command), COMMANDED[command] + BY_HAND * by_hand)
         else:
             self.packml.take(command)
 

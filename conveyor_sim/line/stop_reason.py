@@ -15,10 +15,22 @@ COMMANDED: Mapping[int, int] = {
 }  # fmt: skip
 """The reasons that commands are, by command."""
 
-_TEXTS = {
-    NONE: "none", RUN: "command run", 2: "command Stop", 3: "command Hold", 4: "command Suspend", 5: "command Abort",
-    6: "command Complete", STARVED: "starved", BLOCKED: "blocked", FAULT: "fault stop",
+BY_HAND = 10
+"""Added to the reason that a command is, and to RUN, where a person gave it and not a controller."""
+
+_COMMANDS = {
+    RUN: "command run", 2: "command Stop", 3: "command Hold", 4: "command Suspend", 5: "command Abort",
+    6: "command Complete",
 }  # fmt: skip
+
+_TEXTS = {
+    NONE: "none",
+    **_COMMANDS,
+    **{reason + BY_HAND: f"{text} by hand" for reason, text in _COMMANDS.items()},
+    STARVED: "starved",
+    BLOCKED: "blocked",
+    FAULT: "fault stop",
+}
 
 WAITING = frozenset({State.SUSPENDED, State.SUSPENDING, State.UNSUSPENDING})
 FAILED = frozenset({State.HOLDING, State.HELD, State.UNHOLDING, State.ABORTING, State.ABORTED, State.CLEARING})

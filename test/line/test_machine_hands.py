@@ -41,6 +41,12 @@ def state(sim: Simulation) -> int:
     return int(signals(sim)[f"{FILLER}/state"])
 
 
+def reason(sim: Simulation) -> str:
+    """Why it stands, or last stood."""
+    says = sim.process_image.signals[sim.process_image.signal_names.index(f"{FILLER}/stop_reason")]
+    return says.texts[int(signals(sim)[says.name])]
+
+
 @pytest.mark.parametrize("kind", ["operator", "engineer"])
 @pytest.mark.parametrize(("word", "then"), [(Command.STOP, State.STOPPED), (Command.ABORT, State.ABORTED)])
 @pytest.mark.parametrize("number", [AUTOMATIC, MAINTENANCE, MANUAL])
@@ -53,8 +59,31 @@ def test_a_person_stops_a_machine_in_whatever_mode(kind: str, word: Command, the
     assert command(sim, kind, word) == [True]
     assert state(sim) == then
     assert signals(sim)[f"{FILLER}/mode"] == number
-    says = sim.process_image.signals[sim.process_image.signal_names.index(f"{FILLER}/stop_reason")]
-    assert says.texts[int(signals(sim)[says.name])] == f"command {word.name.capitalize()}"
+    assert reason(sim) == f"command {word.name.capitalize()} by hand"
+
+
+def test_the_stop_reason_tells_a_person_s_command_from_a_controller_s() -> None:
+    """By the writer of the input, whoever has control; a test commands as a controller does."""
+    sim = filling()
+    for kind, ending in (("controller", ""), ("test", ""), ("operator", " by hand"), ("engineer", " by hand")):
+        if kind == "operator":
+            command(sim, "test", Command.STOP)
+            assert mode(sim, kind, MANUAL) == ""
+            command(sim, kind, Command.RESET, Command.START)
+        for word, back in (
+            (Command.HOLD, [Command.UNHOLD]),
+            (Command.SUSPEND, [Command.UNSUSPEND]),
+            (Command.STOP, [Command.RESET, Command.START]),
+            (Command.ABORT, [Command.CLEAR, Command.RESET, Command.START]),
+            (Command.COMPLETE, [Command.RESET, Command.START]),
+        ):
+            assert command(sim, kind, word) == [True]
+            assert reason(sim) == f"command {word.name.capitalize()}{ending}", kind
+            assert all(command(sim, kind, *back))
+        assert act(sim, kind, SET, (RUN, 0.0)).accepted
+        assert (state(sim), reason(sim)) == (State.STOPPED, f"command run{ending}")
+        assert act(sim, kind, SET, (RUN, 1.0)).accepted
+        assert (state(sim), reason(sim)) == (State.EXECUTE, f"command run{ending}")
 
 
 @pytest.mark.parametrize("word", [word for word in Command if word not in (Command.STOP, Command.ABORT)])
