@@ -35,10 +35,12 @@ def refusal(known: Mapping[str, Tag], what: str, names: Sequence[str], values: S
         if command.kind == "bool" and value not in (0.0, 1.0):
             return f"{name}: {value:g} given, expected 0 or 1"
         if command.kind in ("count", "enumeration") and not float(value).is_integer():
-            return f"{name}: {value:g} given, expected a whole number from {command.low:g} to {command.high:g}"
+            limits = "" if math.isinf(command.low) else f" from {command.low:g} to {command.high:g}"
+            return f"{name}: {value:g} given, expected a whole number{limits}"
         unit = "" if command.unit == "1" else f" {command.unit}"
         if not math.isfinite(value) or not command.low <= value <= command.high:
-            return f"{name}: {value:g} given, expected {command.low:g} to {command.high:g}{unit}"
+            limits = "a finite number" if math.isinf(command.low) else f"{command.low:g} to {command.high:g}{unit}"
+            return f"{name}: {value:g} given, expected {limits}"
     return ""
 
 

@@ -8,6 +8,7 @@ line stands after those before it. Watchdogs act after all inputs, devices after
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
+from conveyor_sim.errors import CommandError
 from conveyor_sim.line.alarms.declaration import as_sent
 from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.scene.types import Unchecked
@@ -121,8 +122,18 @@ class CommandOutcome:
 def as_kept(given: Input) -> Input:
     """An input as it can be shown, and as a replay will find it: what does not print is escaped, what is too long cut.
 
-    Commands are not: a name that is none of the line's is refused as it is.
+    Commands are not: a name that is none of the line's is refused as it is. Raises CommandError for what is of another
+    type than its field.
     """
+    try:
+        return _kept(given)
+    except (AttributeError, OverflowError, TypeError, ValueError):
+        if (wrong := _of_wrong_type(given)) is None:
+            raise
+        raise CommandError(wrong) from None
+
+
+def _kept(given: Input) -> Input:
     source, writer, kind, operation, names, values, texts = given
     # Whoever names an alarm makes it up.
     alarms = operation not in (SET, INJECT)
@@ -133,6 +144,21 @@ def as_kept(given: Input) -> Input:
     source = printable(source)
     writer = source if writer == source else printable(writer)
     return Input(source, writer, printable(kind), printable(operation), kept, numbers, texts)
+
+
+def _of_wrong_type(given: Input) -> str | None:
+    """What of an input is no text or no number, in words; None: nothing."""
+    for field, texts in (("names", given.names), ("texts", given.texts)):
+        for text in texts:
+            if not isinstance(text, str):
+                return f"{field}: {printable(repr(text))} given, expected a text"
+    for index, value in enumerate(given.values):
+        try:
+            float(value)
+        except (OverflowError, TypeError, ValueError):
+            name = given.names[index] if index < len(given.names) else given.operation
+            return f"{printable(name)}: {printable(repr(value))} given, expected a number"
+    return None
 
 
 def recorded_input(source: str, names: tuple[str, ...], values: tuple[float, ...]) -> Input:

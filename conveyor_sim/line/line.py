@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.line.alarms.system import AlarmSystem
-from conveyor_sim.line.authority import PEOPLE, unauthorized
+from conveyor_sim.line.authority import MAY, PEOPLE, unauthorized
 from conveyor_sim.line.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.commands import refusal, shown
 from conveyor_sim.line.counters import RESET_COUNTERS, Counters
@@ -93,7 +93,7 @@ class Line:
         self._counters = Counters(devices)
         self._operations = {
             SET: Operation(self._set_refusal, self._set),
-            INJECT: Operation(lambda given: refusal(self._faults, FAULT, given.names, given.values), self._set),
+            INJECT: Operation(self._inject_refusal, self._set),
             **self.modes.operations(),
             **self.forcing.operations(),
             **self._alarms.operations(),
@@ -165,12 +165,15 @@ class Line:
 
     def _set_refusal(self, given: Input) -> str:
         names, values = given.names, given.values
-        if reason := refusal(self._commands, "command", names, values):
+        if reason := _with_texts(given) or refusal(self._commands, "command", names, values):
             return reason
         for name, value in zip(names, values, strict=True) if self._objecting else ():
             if name in self._objecting and (reason := self._objecting[name].objection(name, value, self.now)):
                 return reason
         return self._alarms.said_problem(names, values)
+
+    def _inject_refusal(self, given: Input) -> str:
+        return _with_texts(given) or refusal(self._faults, FAULT, given.names, given.values)
 
     def _set(self, given: Input, now: ScanContext) -> None:
         by_hand = self.modes.stops_by_hand(given)
@@ -204,7 +207,7 @@ class Line:
                 if not reason:
                     self._operations[rest.operation].apply(rest, self.now)
                 self._note(CommandOutcome(tick, rest, not reason, reason))
-            if given.operation == SET:  # whatever became of the commands beside them
+            if given.operation == SET and given.writer_kind in MAY[SET].writers:  # whatever became of its commands
                 self._alarms.say(tick, given.names, given.values)
         for belt in self._watched:
             if name := belt.watch(self.now):
@@ -383,6 +386,10 @@ class Line:
     def _at(self, tick: int) -> None:
         self.now.tick = tick
         self.now.begin_scan()
+
+
+def _with_texts(given: Input) -> str:
+    return f"{len(given.texts)} texts given, expected none" if given.texts else ""
 
 
 def image_of(scene: Scene) -> ProcessImage:

@@ -58,6 +58,7 @@ class Modes:
         self.released = []
         self.reported = []
         self._look()
+        self._free = self._found_free()
 
     @property
     def tags(self) -> tuple[Tag, ...]:
@@ -143,6 +144,7 @@ class Modes:
         if any(text != printable(text, SENTENCE) for text in texts) or self.pattern_problem(self.released):
             raise ValueError("line.modes has texts that can't be")
         self._look()
+        self._free = self._found_free()
 
     @property
     def _owned(self) -> str:
@@ -157,8 +159,7 @@ class Modes:
             return f"{device}: is in {MODES[mode]}{taken}, expected {modes} for {article} {kind}'s commands"
         if kind != "controller" or self._is_free(given):
             return ""
-        released = any(self._fits(pattern, device) for pattern in self.released)
-        return "" if released else f"{device}: {self._owned}, expected its release"
+        return "" if device in self._free else f"{device}: {self._owned}, expected its release"
 
     def _stops(self, given: Input) -> Collection[str]:
         """Commands of an input that stop devices, and may be given in any mode: if a person gives them."""
@@ -222,12 +223,18 @@ class Modes:
         else:
             self.owner = given.writer if given.operation == OWN else ""
             self.released = list(given.texts)
+            self._free = self._found_free()
             self.reported = []
         self._look()
         return changed
 
     def _fits(self, pattern: str, device: str) -> bool:
         return fnmatchcase(device, pattern) or fnmatchcase(f"{self._where}/{device}", pattern)
+
+    def _found_free(self) -> frozenset[str]:
+        """The devices that the owner leaves to others."""
+        patterns = self.released
+        return frozenset(device for device in self.modes if any(self._fits(pattern, device) for pattern in patterns))
 
     def _look(self) -> None:
         self._values = [float(self.modes[tag.device]) for tag in self._tags]

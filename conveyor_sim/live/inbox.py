@@ -22,7 +22,7 @@ MOST_WAITING = 1000
 MOST_BYTES = 4 * 1024 * 1024
 """Of all that wait, as they were sent."""
 VALUE_BYTES = 16
-"""What a value takes beside the letters of its name, about."""
+"""What a value, or a text, takes beside its letters and those of its name, about."""
 
 FULL = (
     f"the queue was full, which holds {MOST_WAITING} commands and {MOST_BYTES} bytes until the next tick; "
@@ -118,7 +118,7 @@ class Inbox:
 def size_of(given: Input) -> int:
     """Bytes of an input, about as it is sent."""
     words = sum(map(len, given.names)) + sum(map(len, given.texts))
-    return words + VALUE_BYTES * max(len(given.names), len(given.values))
+    return words + VALUE_BYTES * max(len(given.names), len(given.values), len(given.texts))
 
 
 def sizes_of(inputs: Iterable[Input]) -> list[int]:

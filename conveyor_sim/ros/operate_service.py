@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from conveyor_sim.line.authority import PEOPLE
 from conveyor_sim.line.inputs import OPERATE, Input
-from conveyor_sim.live.inbox import size_of
+from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
 from conveyor_sim.live.lockstep import Refused
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.services import settled
@@ -38,6 +38,7 @@ class OperateService:
             response.reason = (
                 stepper.standstill
                 or _stranger(request)
+                or (TOO_LARGE if size > MESSAGE_BYTES else "")  # before it is looked at, name by name
                 or stepper.simulation.refusal(given)
                 or stepper.inbox.admit(size)
             )

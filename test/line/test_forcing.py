@@ -83,8 +83,9 @@ def test_commands_of_a_device_whose_mode_is_forced_are_taken_as_it_is() -> None:
     [
         (force((BLOCKED, 0.5)), "photo_eyes/e/blocked: 0.5 given, expected 0 or 1"),
         (force((REMOVED, 0.5)), "outfeeds/out/removed: 0.5 given, expected a whole number"),
-        (force((SPEED, math.nan)), "belts/one/speed: nan given"),
-        (force((SPEED, math.inf)), "belts/one/speed: inf given"),
+        (force((REMOVED, math.inf)), "outfeeds/out/removed: inf given, expected a whole number"),
+        (force((SPEED, math.nan)), "belts/one/speed: nan given, expected a finite number"),
+        (force((SPEED, math.inf)), "belts/one/speed: inf given, expected a finite number"),
         (force(("belts/one/mode", 9.0)), "belts/one/mode: 9 given, expected 1 to 3"),
         (force(("belts/one/cmd_speed", 0.1)), "belts/one/cmd_speed: no such signal, expected one of"),
         (force((SPEED, 0.1), (SPEED, 0.2)), "belts/one/speed: given twice"),

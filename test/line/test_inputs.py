@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from scenes import base, belt, bottle, simulation
 
+from conveyor_sim.errors import CommandError
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.drive import DriveDevice
 from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, SET, WATCHDOG, Input, arrival, as_kept, recorded_input
@@ -108,6 +109,8 @@ def test_watchdogs_come_after_all_inputs() -> None:
         ({"operation": INJECT}, "belts/one/cmd_speed: no such fault, expected one of belts/one/trip"),
         ({"operation": "\x1b"}, "\\x1b: no such operation"),
         ({"names": ()}, "0 names and 1 values given"),
+        ({"texts": ("x",)}, "1 texts given, expected none"),
+        ({"texts": ("x",), "operation": INJECT, "names": ("belts/one/trip",)}, "1 texts given, expected none"),
     ],
 )
 def test_what_cant_be_is_refused_with_the_reason_and_changes_nothing(changes: dict[str, str], reason: str) -> None:
@@ -123,6 +126,41 @@ def test_what_cant_be_is_refused_with_the_reason_and_changes_nothing(changes: di
     sim.advance()
     (again,) = sim.take_outcomes()
     assert (again.input, again.reason) == (outcome.input, outcome.reason)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"values": ("fast",)}, "belts/one/cmd_speed: 'fast' given, expected a number"),
+        ({"values": (None,)}, "belts/one/cmd_speed: None given, expected a number"),
+        ({"values": (10**400,)}, f"belts/one/cmd_speed: {'1' + '0' * 198}… given, expected a number"),
+        ({"names": (), "values": ([],)}, "set: [] given, expected a number"),
+        ({"names": (5,)}, "names: 5 given, expected a text"),
+        ({"names": ("x",), "operation": "declare", "texts": (5,)}, "texts: 5 given, expected a text"),
+    ],
+)
+def test_what_is_of_the_wrong_type_is_not_taken(changes: dict[str, object], message: str) -> None:
+    """Nor kept: a type checker would have found it."""
+    sim = two_drives()
+    given = setting("anna", (ONE, 0.9))._replace(**changes)  # type: ignore[arg-type]
+    for use in (sim.refusal, sim.give):
+        with pytest.raises(CommandError) as raised:
+            use(given)
+        assert str(raised.value) == message
+    sim.advance()
+    assert not sim.waiting and not sim.take_outcomes()
+
+
+def test_nobody_of_an_unknown_kind_says_an_alarm() -> None:
+    """Whatever becomes of the commands beside it, an alarm counts of those who may set commands alone."""
+    sim = two_drives()
+    for kind in ("ghost", "controller"):
+        given = Input("commands", "x", kind, SET, (ONE, "alarms/jam"), (99.0, 1.0))
+        sim.give(given)
+        sim.advance()
+        (outcome,) = sim.take_outcomes()
+        assert not outcome.accepted
+        assert sim.alarms == ({"jam"} if kind == "controller" else set())
 
 
 def test_short_forms_say_who_gave_them() -> None:
