@@ -30,7 +30,7 @@ class Period(NamedTuple):
     @property
     def why(self) -> str:
         """The reason, or else the category."""
-        return self.reason or self.category
+        return _why(self.category, self.reason)
 
 
 class StopReason(NamedTuple):
@@ -46,7 +46,14 @@ class StopReason(NamedTuple):
     @property
     def why(self) -> str:
         """The reason, or else the category."""
-        return self.reason or self.category
+        return _why(self.category, self.reason)
+
+
+def _why(category: str, reason: str) -> str:
+    """In words. One that is idle for what is no command stands on after it: a failure, or a stop by plan, is over."""
+    if category == "idle" and reason and not reason.startswith("command"):
+        return f"after {reason}"
+    return reason or category
 
 
 def stop_reasons(periods: Iterable[Period]) -> list[StopReason]:

@@ -57,15 +57,15 @@ def _draw_throughput(ax: Axes, counters: CounterColumns, time: Floats, good: Flo
 
 def _draw_factors(ax: Axes, counters: CounterColumns, machines: Sequence[int]) -> None:
     """Four short bars a machine."""
-    height = 0.8 / len(_FACTORS)
+    height, most = 0.8 / len(_FACTORS), 0.0
     for index, factor in enumerate(_FACTORS):
         values = np.nan_to_num(100.0 * getattr(counters, factor)[machines], posinf=0.0)
         places = np.arange(len(machines)) + (index - 1.5) * height
-        label = factor.replace("oee", "OEE")
+        label, most = factor.replace("oee", "OEE"), max(most, float(values.max(initial=0.0)))
         ax.barh(places, values, height=0.9 * height, color=style.SERIES[index], label=label, gid=factor)
     ax.set_yticks(range(len(machines)), [_short(counters.name[row]) for row in machines])
     ax.set_ylim(len(machines) - 0.5, -0.5)
-    ax.set_xlim(0.0, 105.0)
+    ax.set_xlim(0.0, max(105.0, most))
     ax.set_xlabel("%")
     ax.tick_params(axis="y", length=0.0)
     ax.grid(True, axis="x")

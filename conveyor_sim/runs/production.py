@@ -21,6 +21,9 @@ from conveyor_sim.support.printable import printable
 CATEGORY, REASON = "category", "stop_reason"
 """Ends of the signals whose changes are events, and of the columns of counters that say how they were at first."""
 
+NO_REASON = "none"
+"""What the latter says where nothing has stopped a machine yet."""
+
 
 def read_production(path: Path) -> Production:
     """Read a recording. Raises BagError for one without the topics `counters` and `events`."""
@@ -109,8 +112,9 @@ class _Follower:
     def _end(self, machine: str, time: float) -> None:
         begin, now = self._since[machine], self._now[machine]
         if time > begin:
-            # A machine that runs or waits still shows why it last stood.
-            reason = "" if now[CATEGORY] in ("running", "starved", "blocked") else now[REASON]
+            # A machine that runs or waits still shows why it last stood; one that has not been started, no reason.
+            reasonless = now[CATEGORY] in ("running", "starved", "blocked") or now[REASON] == NO_REASON
+            reason = "" if reasonless else now[REASON]
             done, period = self._done[machine], Period(machine, begin, time, now[CATEGORY], reason)
             if done and done[-1][3:] == period[3:]:  # only the reason of a wait has changed
                 period = done.pop()._replace(end=time)

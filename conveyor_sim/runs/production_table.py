@@ -11,7 +11,7 @@ from rich.table import Table
 
 from conveyor_sim.line.efficiency import DEFINITIONS
 from conveyor_sim.line.time_account import CATEGORIES
-from conveyor_sim.observe.alarm_figures import AlarmFigures
+from conveyor_sim.observe.alarm_figures import WINDOW, AlarmFigures
 from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.periods import longest_stops, stop_reasons
 from conveyor_sim.observe.production import Production
@@ -38,7 +38,8 @@ def render(production: Production) -> Group:
             longest.add_row(stop.machine, stop.why, f"{stop.begin:.2f}", f"{stop.length:.2f}")
         counters = production.counters
         parts += [_times(counters), _efficiency(counters), _failures(counters), reasons, longest]
-    return Group(*parts, *_alarms(production.alarms), *([_definitions()] if production.periods else []))
+    length = production.end - production.start
+    return Group(*parts, *_alarms(production.alarms, length), *([_definitions()] if production.periods else []))
 
 
 def _headline(production: Production) -> Table:
@@ -50,9 +51,9 @@ def _headline(production: Production) -> Table:
     rows.add_row("bottles", f"{left} left the line, {good} of them good; {rejected} were rejected")
     if counters.bottleneck:
         slowest = " and ".join(printable(name) for name in counters.bottleneck)
-        made = f"{_percent(counters.oee[-1])} of what the bottleneck makes in its planned busy time"
+        made = f"{_percent(counters.oee[-1])} of what the bottleneck makes in its planned busy time, running all of it"
         rows.add_row("bottleneck", f"{slowest}: {3600.0 * counters.rate[-1]:g} bottles an hour")
-        rows.add_row("efficiency", f"{made}, running all of it")
+        rows.add_row("efficiency", made if left else "not known: no bottle has left the line")
     if production.forced:
         more = f" and {len(production.forced) - MOST} more" if len(production.forced) > MOST else ""
         rows.add_row("forced", f"{', '.join(production.forced[:MOST])}{more} (all figures are of the true values)")
@@ -98,10 +99,11 @@ def _timed(counters: CounterColumns) -> list[int]:
     return [int(row) for row in np.flatnonzero(times > 0.0)]
 
 
-def _alarms(alarms: AlarmFigures) -> list[RenderableType]:
-    """Their rate, those that came most often, and those that stand."""
+def _alarms(alarms: AlarmFigures, length: float) -> list[RenderableType]:
+    """Their rate, those that came most often, and those that stand. length: of the recording, s."""
     rows = Table.grid(padding=(0, 2))
-    rate = f"{alarms.per_window:.1f} in ten minutes, {alarms.most_in_window} at most"
+    mean = f"{alarms.per_window:.1f} in ten minutes on average, " if length >= WINDOW else ""
+    rate = f"{mean}{alarms.most_in_window} at most in ten minutes"
     rows.add_row("alarms", f"{alarms.raised} came, {rate}{': a flood' if alarms.flood else ''}")
     parts: list[RenderableType] = [rows]
     if alarms.by_alarm:

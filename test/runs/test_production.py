@@ -21,7 +21,7 @@ from conveyor_sim.line.time_account import CATEGORIES
 from conveyor_sim.observe.periods import longest_stops, stop_reasons
 from conveyor_sim.observe.production import Production
 from conveyor_sim.runs.production import read_production
-from conveyor_sim.scene import load_scene
+from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 
 FAILING_LINE = Path(__file__).with_name("failing_line.yaml")
@@ -29,10 +29,15 @@ MACHINES = ("machines/filler", "machines/capper", "machines/packer")
 
 
 def record(
-    folder: Path, resets: tuple[int, ...] = (), ticks: int = 6000, start: Path | None = None, forced: str = ""
+    folder: Path,
+    resets: tuple[int, ...] = (),
+    ticks: int = 6000,
+    start: Path | None = None,
+    forced: str = "",
+    scene: Scene | None = None,
 ) -> Path:
     """The failing line, with its counters reset at some ticks, and a signal forced to 1 from the start."""
-    scene = load_scene(FAILING_LINE)
+    scene = scene or load_scene(FAILING_LINE)
     sim = Simulation(scene) if start is None else Simulation.load(start, scene=scene)
     with Recorder(folder) as recorder:
         outputs = Outputs(sim, [recorder], run_id="run")
@@ -132,6 +137,16 @@ def test_the_report_prints_and_draws_it(bag: Path, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {
         f"{stem}.{suffix}" for stem in ("states", "stops", "efficiency") for suffix in ("png", "svg")
     }
+
+
+def test_of_a_line_that_has_made_nothing_yet_it_says_so(tmp_path: Path) -> None:
+    """Its packer, which waits for its first bottles, is idle for no reason; ten minutes are longer than the run."""
+    scene = load_scene(FAILING_LINE, {"machines": {"packer": {"start_fill": 1}}})
+    shown = CliRunner().invoke(main, ["report", str(record(tmp_path / "bag", ticks=200, scene=scene)), "--no-pictures"])
+    rows = [line.split() for line in shown.output.splitlines()]
+    assert ["machines/packer", "idle", "1", "2.00"] in [row[:4] for row in rows]
+    assert "efficiency  not known: no bottle has left the line" in shown.output
+    assert "alarms  0 came, 0 at most in ten minutes" in shown.output
 
 
 def test_no_name_and_no_number_is_cut_on_a_terminal_of_80_columns(bag: Path) -> None:
