@@ -84,6 +84,23 @@ def declared_alarms(controller: object) -> tuple[Alarm, ...]:
     return tuple(found)
 
 
+def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
+    """The commands of a scan's answer. Raises ControlError for what is no answer, and a value that is no number."""
+    if not isinstance(answer, Mapping):
+        raise ControlError(f"scan: {answer!r:.200} returned, expected a mapping of commands")
+    for name in answer:
+        if not isinstance(name, str):
+            raise ControlError(f"scan: {name!r:.200} returned as a name, expected that of a command or an alarm")
+    return {name: _number(name, value) for name, value in answer.items() if not name.startswith(ALARMS)}
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (OverflowError, TypeError, ValueError):
+        raise ControlError(f"{name}: {value!r:.200} answered by the controller, expected a number") from None
+
+
 class AlarmChanges:
     """What of a controller's alarms is to be given to the line with its commands: all at first, then what changes."""
 
@@ -91,8 +108,11 @@ class AlarmChanges:
         self._given: dict[str, float] = {}
 
     def of(self, answer: Mapping[str, float]) -> dict[str, float]:
-        """The alarms of a scan's answer that come or go, 1 or 0; one that it does not have any more goes."""
-        alarms = {name: float(value >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
+        """The alarms of a scan's answer that come or go, 1 or 0; one that it does not have any more goes.
+
+        Raises ControlError for one that is said by what is no number.
+        """
+        alarms = {name: float(_number(name, value) >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
         now = {**dict.fromkeys(self._given, 0.0), **alarms}
         changes = {name: value for name, value in now.items() if self._given.get(name) != value}
         self._given = now

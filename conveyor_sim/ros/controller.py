@@ -18,7 +18,15 @@ from rclpy.node import Node
 
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.control.recorded import Recorded
-from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs, declared_alarms
+from conveyor_sim.control.scan import (
+    ALARMS,
+    AlarmChanges,
+    ControlError,
+    Controller,
+    Inputs,
+    commands_of,
+    declared_alarms,
+)
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.ros.alarms import Alarms
 from conveyor_sim.ros.lockstep_client import LockstepClient
@@ -75,13 +83,13 @@ class Scanner:
             answer = self._controller.scan(
                 Inputs(signals, tick * self._tick_ns * 1e-9, tick, ticks * self._tick_ns * 1e-9)
             )
+            given = commands_of(answer) | self._changes.of(answer)
         except ControlError as error:
             raise ConveyorError(f"scan at tick {tick}: {error}") from error
         stamp_ns = max(1, tick * self._tick_ns)
         self._alarms.tell(_alarms(answer), stamp_ns)
         self._variables.tell(self._recorded.names, self._recorded.values(), tick, stamp_ns)
-        commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
-        return {**commands, **self._changes.of(answer)}
+        return given
 
 
 class ControllerRun:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.recorded import Recorded
-from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, Inputs, declared_alarms
+from conveyor_sim.control.scan import AlarmChanges, ControlError, Controller, Inputs, commands_of, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.simulation import Simulation
@@ -60,9 +60,10 @@ class Controlled:
         self.scan()
         if outputs is not None:
             outputs.show_variables(self._recorded.names, self._recorded.values())
-        answer = self._answer
-        commands = {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
-        commands |= self._changes.of(answer)
+        try:
+            commands = commands_of(self._answer) | self._changes.of(self._answer)
+        except ControlError as error:
+            raise ConveyorError(f"at {self._simulation.time:.2f} s: {error}") from error
         if commands:
             names, values = tuple(commands), tuple(commands.values())
             self._simulation.command(names, values, SOURCE, writer=type(self._controller).__name__)

@@ -55,8 +55,8 @@ def _row(tag: Tag, where: str) -> Row:
         tag.role,
         tag.unit,
         tag.unece.code,
-        f"{tag.low:.15g}",
-        f"{tag.high:.16g}",
+        _limit(tag, tag.low),
+        _limit(tag, tag.high),
         f"{tag.initial:.15g}",
         NONE if tag.nominal is None else f"{tag.nominal:.15g}",
         tag.listed_texts or ("0 off, 1 on" if tag.kind == "bool" else NONE),
@@ -65,6 +65,10 @@ def _row(tag: Tag, where: str) -> Row:
         tag.description,
         ", ".join(names_of(tag)) or NONE,
     )
+
+
+def _limit(tag: Tag, value: float) -> str:
+    return f"{value:.0f}" if tag.kind == "count" else f"{value:.15g}"
 
 
 def tag_table(scene: Scene) -> RenderableType:

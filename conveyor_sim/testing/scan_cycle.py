@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.recorded import Recorded
-from conveyor_sim.control.scan import ALARMS, AlarmChanges, ControlError, Controller, declared_alarms
+from conveyor_sim.control.scan import (
+    ALARMS,
+    AlarmChanges,
+    ControlError,
+    Controller,
+    commands_of,
+    declared_alarms,
+)
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.state.checkpoint import read_checkpoint
@@ -143,8 +150,7 @@ class ScanCycle:
         controller = self._controller
         assert controller is not None
         answer = controller.scan(inputs)
-        if not isinstance(answer, Mapping):
-            raise ControlError(f"{type(controller).__name__}.scan: {answer!r} returned, expected a mapping of commands")
+        commands = commands_of(answer)
         self.read |= inputs.read
         alarms = {name: value for name, value in answer.items() if name.startswith(ALARMS)}
         # A node answers what changes only, and nothing between its scans; alarms of a controller before it go.
@@ -153,7 +159,7 @@ class ScanCycle:
             self._answer = {**changes, **answer}
         else:
             changes = self._changes.of(alarms)
-            self._answer = {name: value for name, value in answer.items() if name not in alarms} | changes
+            self._answer = commands | changes
         return (*alarms, *changes)
 
     def give(self) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from control.scans import Scans
 
 from conveyor_sim.control import Constant, ControlError, Inputs, priority, together
-from conveyor_sim.control.scan import AlarmChanges
+from conveyor_sim.control.scan import AlarmChanges, commands_of
 
 
 def test_together_merges_what_all_answer() -> None:
@@ -41,6 +43,27 @@ def test_inputs_tell_bools_and_what_is_missing() -> None:
         inputs["photo_eyes/c/blocked"]
     with pytest.raises(KeyError, match="which has no zones/"):
         inputs["zones/z/bottles"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (None, "scan: None returned, expected a mapping of commands"),
+        ([1.0], "scan: [1.0] returned, expected a mapping of commands"),
+        ({5: 1.0}, "scan: 5 returned as a name, expected that of a command or an alarm"),
+        ({"gates/g/open": "x"}, "gates/g/open: 'x' answered by the controller, expected a number"),
+        ({"gates/g/open": None}, "gates/g/open: None answered by the controller, expected a number"),
+        ({"alarms/jam": None}, "alarms/jam: None answered by the controller, expected a number"),
+    ],
+)
+def test_what_is_no_answer_is_said(answer: Any, message: str) -> None:
+    with pytest.raises(ControlError) as raised:
+        commands_of(answer) | AlarmChanges().of(answer)
+    assert str(raised.value) == message
+
+
+def test_commands_are_numbers_without_the_alarms() -> None:
+    assert commands_of({"gates/g/open": True, "alarms/jam": 1.0}) == {"gates/g/open": 1.0}
 
 
 def test_of_its_alarms_the_line_is_given_what_changes() -> None:

@@ -76,6 +76,7 @@ def test_an_operator_takes_a_belt_forces_a_signal_and_all_of_it_replays(
         ({"writer_kind": "test"}, "writer_kind: 'test' given, expected one of operator, engineer, controller"),
         ({"writer": ""}, "writer: no name given"),
         ({"writer": "x" * 201}, "writer: a name of 201 characters given"),
+        ({"texts": [""] * 20_000}, "larger than 262144 bytes, expected at most that for one command"),
         ({}, "explode: no such operation, expected one of set, "),
     ):
         response = operate(client, "explode", (FEEDER, 0.1), **more)

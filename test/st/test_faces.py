@@ -53,6 +53,9 @@ def test_a_controller_in_python_runs_too(tmp_path: Path) -> None:
     )
     code, output = command("run", TABLE, "--duration", 0.1, "--no-record", "--controller", f"{controller}:Mine")
     assert code == 0, output
+    controller.write_text("class Mine:\n    def scan(self, inputs):\n        return None\n")
+    code, output = command("run", TABLE, "--duration", 0.1, "--no-record", "--controller", f"{controller}:Mine")
+    assert code == 1 and "at 0.00 s: scan: None returned, expected a mapping of commands" in output
 
 
 def test_parameters_of_a_program_are_tags_and_a_map(tmp_path: Path) -> None:
