@@ -50,7 +50,10 @@ class Line:
         self.now = ScanContext(state, scene.tick, speeds, speeds.copy())
         devices = build_devices(scene, state.model)
         self._log = EventLog(devices, self.now)
-        self._alarms = AlarmSystem(scene, devices, self._log.note_alarm)
+        self._pending: list[Input] = []
+        self.modes = Modes(devices, scene.where, lambda: self._pending, self._log.note)
+        """In whose hands devices are, and who owns the line."""
+        self._alarms = AlarmSystem(scene, devices, self.modes, self._log.note_alarm)
         devices = (*devices, self._alarms.device) if devices else devices
         self._devices = devices
         belts = [device for device in devices if isinstance(device, BeltDevice)]
@@ -75,12 +78,9 @@ class Line:
         """Whether any device takes bottles off the line."""
         self.feeds = bool(self._feeding) and state.model.has("infeed")
         """Whether any device puts bottles onto the line."""
-        self._pending: list[Input] = []
         self._outcomes: list[CommandOutcome] = []
-        self.modes = Modes(devices, scene.where, lambda: self._pending, self._log.note)
-        """In whose hands devices are, and who owns the line."""
         tags = (tag for device in devices for tag in device.tags)
-        self.image = ProcessImage((*tags, *self.modes.tags, *RUN_TAGS))
+        self.image = ProcessImage((*tags, *self.modes.signals, *RUN_TAGS))
         self.forcing = Forcing(self.image.signals, self._log.note)
         """What controllers read otherwise than it is."""
         self.read_back = ReadBack(self.image.commands)

@@ -61,13 +61,18 @@ class Modes:
         self._free = self._found_free()
 
     @property
-    def tags(self) -> tuple[Tag, ...]:
+    def signals(self) -> tuple[Tag, ...]:
         """`<device>/mode`, one for each."""
         return self._tags
 
     @property
+    def read(self) -> Callable[[ScanContext], list[float]]:
+        """What gives their values."""
+        return lambda now: self._values
+
+    @property
     def values(self) -> list[float]:
-        """Of the tags."""
+        """Their values."""
         return self._values
 
     def operations(self) -> dict[str, Operation]:

@@ -9,7 +9,7 @@ from scenes import base, belt, simulation
 from testing.conftest import ON_TABLE, TABLE
 
 from conveyor_sim.errors import CheckpointError, SceneError
-from conveyor_sim.line.inputs import DECLARE, FORCE, UNFORCE, Input
+from conveyor_sim.line.inputs import DECLARE, FORCE, MODE, UNFORCE, Input
 from conveyor_sim.observe.events import Event
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -89,6 +89,25 @@ def test_the_scene_s_alarms_are_on_signals() -> None:
     came = sim.tick
     assert alarm_events(sim, 30) == [(came + 25, "raised", "full")]
     assert sim.alarms == {"full"} and value(sim, "alarms/full") == 1
+
+
+def test_an_alarm_on_a_mode_says_that_a_device_is_in_other_hands(tmp_path: Path) -> None:
+    """Of the scene, and of a controller; from a checkpoint too."""
+    belt = "belts/feeder"
+    sim = line(alarms={"by_hand": {"tag": f"{belt}/mode", "high": 1.5, "alarm_class": "message"}})
+    declare(sim, automatic={"tag": f"{belt}/mode", "low": 1.5})
+    assert alarm_events(sim, 2) == [(1, "raised", "automatic")]
+    for number, expected in (
+        (3.0, ["raised by_hand", "cleared automatic"]),
+        (1.0, ["cleared by_hand", "raised automatic"]),
+    ):
+        sim.give(Input("operate", "Jo", "operator", MODE, (belt,), (number,)))
+        sim.save(tmp_path / "there")
+        for one in (sim, Simulation.load(tmp_path / "there")):
+            assert sorted(f"{kind} {id}" for _, kind, id in alarm_events(one, 1)) == sorted(expected)
+    declare(sim, circle={"tag": "alarm_counts/errors", "high": 0.5})
+    sim.advance()
+    assert "alarm_counts/errors given, expected a signal of a device" in sim.take_outcomes()[-1].reason
 
 
 def test_an_alarm_with_a_limit_goes_by_what_is_read_the_line_s_own_by_what_is() -> None:

@@ -227,7 +227,7 @@ def test_hands_are_in_a_checkpoint(tmp_path: Path) -> None:
     other = two_belts()
     other.restore_from(sim)
     for one in (again, other):
-        assert one.line.modes.tags and vars_of(one.line.modes) == vars_of(sim.line.modes)
+        assert one.line.modes.signals and vars_of(one.line.modes) == vars_of(sim.line.modes)
         assert one.signals().tolist() == sim.signals().tolist()
     given = plc((ONE, 0.5), (TWO, 0.5), writer="forgotten")
     expected = after(sim, given)

@@ -76,7 +76,7 @@ class Alarms:
             if present is not None and present.own:
                 return DeclarationProblem(id, "id", f"is declared by the {present.declared_by}, expected another one")
             if fields.tag is not None and fields.tag not in self._signals:
-                expected = f"expected a signal of the line{_hint(fields.tag, self._signals)}"
+                expected = f"expected a signal of a device{_hint(fields.tag, self._signals)}"
                 return DeclarationProblem(id, "tag", f"{printable(fields.tag)} given, {expected}")
             for cause in fields.suppressed_by:
                 if cause not in new and cause not in self._all:

@@ -8,7 +8,7 @@ from conveyor_sim.errors import SceneError
 from conveyor_sim.line.alarms import memory, operations
 from conveyor_sim.line.alarms.alarms import Alarms, Note
 from conveyor_sim.line.alarms.declaration import parse
-from conveyor_sim.line.alarms.measured import Measured
+from conveyor_sim.line.alarms.measured import Measured, Signals
 from conveyor_sim.line.alarms.own import LimitConditions, limit_alarms, scene_alarms
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.alarms import AlarmsDevice
@@ -23,9 +23,10 @@ from conveyor_sim.scene.schema import Scene
 class AlarmSystem:
     """Asks at ticks for the conditions that the line finds out by itself, and takes what others say."""
 
-    def __init__(self, scene: Scene, devices: Sequence[Device], note: Note) -> None:
-        """devices: all others. Raises SceneError for alarms of a scene that can't be."""
-        signals = [tag.name for device in devices for tag in device.signals]
+    def __init__(self, scene: Scene, devices: Sequence[Device], modes: Signals, note: Note) -> None:
+        """devices: all others; modes: of these. Raises SceneError for alarms of a scene that can't be."""
+        sources = (*devices, modes)
+        signals = [tag.name for source in sources for tag in source.signals]
         self.alarms = Alarms(scene.tick, note, signals)
         line = [declared for device in devices for declared in device.alarms] + limit_alarms(scene)
         self.alarms.declare(0, line, "line", own=True)
@@ -36,7 +37,7 @@ class AlarmSystem:
         self.alarms.declare(0, given, "scene", own=True)
         self.device = AlarmsDevice(self.alarms)
         """What controllers read of them."""
-        self._measured = Measured(self.alarms, devices)
+        self._measured = Measured(self.alarms, sources)
         self._limits = LimitConditions(self.alarms)
 
     def operations(self) -> dict[str, Operation]:

@@ -200,7 +200,7 @@ def test_one_that_is_declared_after_it_was_said_keeps_its_state() -> None:
         ({"trip": {}}, "alarm trip: id: is declared by the line, expected another one"),
         (
             {"a": {"tag": "zone/table/bottles", "high": 3}},
-            "alarm a: tag: zone/table/bottles given, expected a signal of the line, such as zones/table/bottles",
+            "alarm a: tag: zone/table/bottles given, expected a signal of a device, such as zones/table/bottles",
         ),
     ],
 )
