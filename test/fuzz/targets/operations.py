@@ -26,6 +26,7 @@ from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.authority import MAY, PEOPLE
 from conveyor_sim.line.inputs import WRITER_KINDS, CommandOutcome, Input
 from conveyor_sim.line.packml import COMMAND_TEXTS, MODE_STATES, Command, State
+from conveyor_sim.line.stop_reason import BY_HAND, COMMANDED, WORKING
 from conveyor_sim.line.time_account import CATEGORIES
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.simulation import Simulation
@@ -127,7 +128,15 @@ def inputs_of(rng: random.Random, scene: Scene, ticks: int) -> dict[int, list[In
     for _ in range(rng.choice([10, 40, 120])):
         burst = [names.drawn(rng) for _ in range(rng.choice([1, 1, 1, 2, 6]))]
         script.setdefault(rng.randrange(ticks), []).extend(burst)
+    if rng.random() < 0.2:
+        script.setdefault(rng.randrange(ticks), []).append(flood(rng))
     return script
+
+
+def flood(rng: random.Random) -> Input:
+    """Alarms that nobody has declared, often more than there can be; most of them do not hold."""
+    names = tuple(f"alarms/{rng.choice('ab')}{number}" for number in range(rng.choice([900, 1500])))
+    return Input("commands", "plc", "controller", "set", names, tuple(float(rng.random() < 0.1) for _ in names))
 
 
 class Names:
@@ -300,6 +309,8 @@ class Watch:
             stopped = one.operation == "set" and machine != name and value in STOPS and one.writer_kind in PEOPLE
             if stopped and now[machine] not in STOPPED[Command(int(value))]:
                 raise Violation("stop", f"{machine}: state {now[machine]} after {value:g} of {one.writer_kind}")
+            if stopped and self._states[machine] in WORKING and COMMANDED[value] + BY_HAND != self._reason(machine):
+                raise Violation("stop reason", f"{machine}: {self._reason(machine)} after {value:g} by hand")
 
     def _times(self) -> None:
         """Where the time of each machine went adds up to the time since its reset."""
@@ -319,6 +330,10 @@ class Watch:
         shown = {name.removeprefix("alarms/") for name, value in truth.items() if name.startswith("alarms/") and value}
         if counted != len(standing) or not shown <= standing:
             raise Violation("alarms", f"{standing} stand, {counted} counted, {shown} shown")
+
+    def _reason(self, machine: str) -> int:
+        names, truth = self._sim.process_image.signal_names, self._sim.signals()
+        return int(truth[names.index(f"{machine}/stop_reason")])
 
     def _state_of_machines(self) -> dict[str, int]:
         truth = dict(zip(self._sim.process_image.signal_names, self._sim.signals().tolist(), strict=True))
