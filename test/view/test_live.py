@@ -187,10 +187,12 @@ def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
     page.click("[aria-label='Watch photo_eyes/exit/blocked']")
     page.click("#tab_watch")
     page.click("[aria-label='Force photo_eyes/exit/blocked on']")
-    row = page.locator("#panel_watch li")
+    row, chip = page.locator("#panel_watch li"), page.locator("[aria-label^='Remove photo_eyes/exit/blocked ']")
     soon(page, lambda: "forced" in row.inner_text() and "\non\n" in row.inner_text(), "the force")
+    soon(page, lambda: "photo_eyes/exit/blocked, forced" in chip.inner_text(), "the force, of what the trends show")
     page.click("[aria-label='End the force on photo_eyes/exit/blocked']")
     soon(page, lambda: "forced" not in row.inner_text(), "its end")
+    soon(page, lambda: "forced" not in chip.inner_text(), "its end, of what the trends show")
     show_device(page, "photo_eyes/exit")
     page.click("[aria-label='Inject photo_eyes/exit/stuck_on on']")
     fault = page.locator("#panel_device tr", has_text="stuck_on").first

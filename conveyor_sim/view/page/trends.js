@@ -55,10 +55,11 @@ export class Trends {
   }
 
   _chipped() {
+    this.said = new Map(this.names.map((name) => [name, element("span", { class: "said" })]));
     this.chips.replaceChildren(...this.names.map((name, i) => {
       const swatch = element("span", { class: "swatch" });
       swatch.style.background = COLOURED(i);
-      return element("button", { class: "chip", title: `Remove ${name}`, "aria-label": `Remove ${name} from the trends`, onclick: () => this.remove(name) }, swatch, name, " ✕");
+      return element("button", { class: "chip", title: `Remove ${name}`, "aria-label": `Remove ${name} from the trends`, onclick: () => this.remove(name) }, swatch, name, this.said.get(name), " ✕");
     }));
     this.plot?.destroy();
     this.plot = null;
@@ -151,6 +152,8 @@ export class Trends {
       this.plot?.destroy();
       this._make();
     }
+    const forced = this.view.story.forcedAt(this.view.clock.time);
+    for (const [name, said] of this.said) said.textContent = forced.has(name) ? ", forced" : "";
     const { clientWidth: width, clientHeight: height } = this.box;
     if (this.plot.width !== width || this.plot.height !== height) this.plot.setSize({ width, height });
     this.plot.setData(this._data(), false);
