@@ -88,10 +88,15 @@ def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
     """The commands of a scan's answer. Raises ControlError for what is no answer, and a value that is no number."""
     if not isinstance(answer, Mapping):
         raise ControlError(f"scan: {answer!r:.200} returned, expected a mapping of commands")
-    for name in answer:
-        if not isinstance(name, str):
-            raise ControlError(f"scan: {name!r:.200} returned as a name, expected that of a command or an alarm")
-    return {name: _number(name, value) for name, value in answer.items() if not name.startswith(ALARMS)}
+    try:
+        return {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+    except (AttributeError, OverflowError, TypeError, ValueError):
+        for name, value in answer.items():
+            if not isinstance(name, str):
+                text = f"scan: {name!r:.200} returned as a name, expected that of a command or an alarm"
+                raise ControlError(text) from None
+            _number(name, value)
+        raise
 
 
 def _number(name: str, value: object) -> float:
