@@ -21,6 +21,9 @@ from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
 PATIENCE = 60.0
 """s of wall time that a call may take, beyond which the watchdog ends it."""
 
+_MOMENT = 1.0
+"""s of wall time that the end of a program may take."""
+
 _NS = 1e9
 
 
@@ -109,6 +112,7 @@ class CompiledProgram:
         except OSError:
             raise ControlError(f"{self._path}: {self._ended()} before {do}, expected a program that goes on") from None
         if not select.select([process.stdout], [], [], self._patience)[0]:
+            process.kill()
             self.close()
             raise ControlError(f"{self._path}: watchdog: {do} took more than {self._patience:g} s, expected less")
         line = process.stdout.readline()
@@ -125,9 +129,12 @@ class CompiledProgram:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
+    """Have it destroy its instance, for which it has a moment."""
     for stream in (process.stdin, process.stdout):
         if stream is not None:
             with suppress(BrokenPipeError):
                 stream.close()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(_MOMENT)
+    process.kill()
     process.wait()

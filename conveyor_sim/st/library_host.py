@@ -86,6 +86,10 @@ class _Host:
         if self._library.restore(self._plc, content, len(content)):
             raise ValueError("found a state that the program does not take, expected one of its own")
 
+    def destroy(self) -> None:
+        """The end of the instance."""
+        self._library.destroy(self._plc)
+
 
 def main() -> None:
     """Answers requests until there are no more."""
@@ -104,6 +108,8 @@ def main() -> None:
             answer = {"error": str(error)}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
+    if host is not None:
+        host.destroy()
 
 
 if __name__ == "__main__":

@@ -94,6 +94,18 @@ def test_its_state_is_part_of_a_checkpoint(tmp_path: Path) -> None:
     assert second.simulation.state_hash() == whole.simulation.state_hash()
 
 
+def test_its_instance_is_destroyed_at_the_end(tmp_path: Path) -> None:
+    text, last = SHIM.read_text(), tmp_path / "destroyed"
+    assert text.count("{ free(p); }") == 1
+    text = text.replace("{ free(p); }", f'{{ fclose(fopen("{last}", "w")); free(p); }}').replace(
+        "#include <stdlib.h>", "#include <stdio.h>\n#include <stdlib.h>"
+    )
+    program = CompiledProgram(built(tmp_path, "ends", text), TAGS)
+    assert not last.exists()
+    program.close()
+    assert last.exists()
+
+
 @pytest.mark.parametrize(
     ("body", "text"),
     [
