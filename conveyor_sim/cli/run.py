@@ -75,7 +75,7 @@ def run(
             drawing.get_ready()
     Compilation(loaded, say).run()
     with ProgressBar(loaded.name, loaded.duration) as bar:
-        done = run_scene(loaded, folder, bar.update, threads, controls, variables)
+        done = run_scene(loaded, folder, bar.update, threads, controls, variables, say)
     if done.interrupted:
         click.echo(f"interrupted at {done.simulated:.2f} s")
     if done.bag is None:

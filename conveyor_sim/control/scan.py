@@ -64,7 +64,8 @@ class Controller(Protocol):
     """Anything with a scan. One with an attribute `declared_alarms` (a sequence of Alarm) says by it what its alarms
     are; the others are as by default. One with a method `bind` is given the line's tags (`line_tags.py`) before its
     first scan; one with an attribute `variables` (a mapping of numbers by name) shows these to a test's conditions, and
-    by an attribute `record` (patterns) says which of them are recorded (`recorded.py`).
+    by an attribute `record` (patterns) says which of them are recorded (`recorded.py`); one with an attribute
+    `left_over` (sentences) says, once it has the tags, what of them it leaves out.
     """
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:

@@ -24,7 +24,7 @@ with while_importing():
     from conveyor_sim.ros.declared import Entry, declare_table
     from conveyor_sim.runs.controller_parameters import controller_parameters
     from conveyor_sim.st.load import load
-    from conveyor_sim.support.printable import printable_lines
+    from conveyor_sim.support.printable import SENTENCE, printable, printable_lines
     from conveyor_sim.support.stop_request import StopRequest
 
 NAME = "controller"
@@ -55,6 +55,8 @@ def run(stop: StopRequest) -> None:
                 kinds = dict(zip(line.tag_names, line.tag_kinds, strict=True))
                 named = ({name: kinds[name] for name in names} for names in (line.signal_names, line.command_names))
                 bind(controller, LineTags(*named))
+                for sentence in getattr(controller, "left_over", ()):
+                    node.get_logger().info(printable(sentence, SENTENCE))
             return controller
         except ControlError as error:
             raise ConveyorError(str(error)) from error

@@ -41,6 +41,11 @@ class Controlled:
             ids, texts = tuple(one.id for one in declared), tuple(one.as_text() for one in declared)
             simulation.give(Input(SOURCE, type(controller).__name__, "controller", DECLARE, ids, (), texts))
 
+    @property
+    def left_over(self) -> tuple[str, ...]:
+        """Sentences of a controller that says what it has no tag for, and which commands it does not give."""
+        return tuple(getattr(self._controller, "left_over", ()))
+
     def scan(self) -> None:
         """One scan at the present tick, if there was none. Raises ConveyorError for one that can't go on."""
         simulation = self._simulation

@@ -54,18 +54,23 @@ def run_scene(
     threads: int | None = None,
     controller: Controller | None = None,
     record: Sequence[str] = (),
+    told: Callable[[str], None] | None = None,
 ) -> Run:
     """Runs a scene for its duration and records it to the folder `bag`, if given.
 
     progress(simulated time, s) is called after every tick. threads: to step with, None has them chosen.
-    controller: scans at every tick. record: patterns of its variables that are recorded (`control/recorded.py`). Ctrl-C
-    ends the run at the next tick, with a whole bag; a second one ends the process.
+    controller: scans at every tick. record: patterns of its variables that are recorded (`control/recorded.py`).
+    told: what a controller has no tag for, and the commands that it does not give.
+    Ctrl-C ends the run at the next tick, with a whole bag; a second one ends the process.
     Raises SceneError, SimulationError, BagError if the recording can't be written, and ConveyorError for a controller
     that can't go on; one that can't begin leaves no recording.
     """
     simulation = Simulation(scene, threads)
     controlled = None if controller is None else Controlled(simulation, controller, record)
     if controlled is not None:
+        if told is not None:
+            for sentence in controlled.left_over:
+                told(sentence)
         controlled.scan()
     recorder = Recorder(bag) if bag is not None else None
     with recorder or nullcontext(), _stop_request() as stop:

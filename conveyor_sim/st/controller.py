@@ -64,6 +64,12 @@ class StructuredText:
         self._ins = [(variable, tag) for is_input, variable, tag in pairs if is_input]
         self._outs = [(variable, tag) for is_input, variable, tag in pairs if not is_input]
 
+    @property
+    def left_over(self) -> tuple[str, ...]:
+        """Sentences: variables without a tag, and commands that are not given, once it is bound to a line."""
+        file = self.program.compiled.file
+        return () if self.mapping is None else tuple(f"{file}: {words}" for words in self.mapping.left_over())
+
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Commands and alarms, as the program has them after this scan. Raises StructuredTextError as it stops."""
         if self.mapping is None:

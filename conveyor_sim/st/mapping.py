@@ -22,6 +22,9 @@ _TABLES = {
     ("Q", False): "holding register",
 }
 
+_LISTED = 20
+"""Names in a sentence."""
+
 Addresses = Mapping[tuple[str, int], tuple[str, object]]
 """Tag and type in Modbus by table and address."""
 
@@ -49,11 +52,21 @@ class Mapped:
     commands: tuple[str, ...]
     """Commands of the line that the program does not give."""
 
+    def left_over(self) -> tuple[str, ...]:
+        """What is left on either side, in words."""
+        said = (("no tag for", self.variables), ("these commands are not given:", self.commands))
+        return tuple(f"{words} {_listed(names)}" for words, names in said if names)
+
     def __str__(self) -> str:
         lines = [f"{one.variable} {'<-' if one.is_input else '->'} {one.tag} (by {one.how})" for one in self.bound]
         lines += [f"{name}: no tag" for name in self.variables]
         lines += [f"{name}: a command that the program does not give" for name in self.commands]
         return "\n".join(lines)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def read_addresses(path: Path) -> Addresses:
@@ -162,7 +175,7 @@ def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: Li
     else:
         first = tag.split("/")[0] + "/"
         alike = [one for one in (*tags.signals, *tags.commands) if one.startswith(first)]
-        listed = f"one of {', '.join(alike[:20])}" if alike else f"a tag of this line, which has no {first}"
+        listed = f"one of {', '.join(alike[:_LISTED])}" if alike else f"a tag of this line, which has no {first}"
         raise StructuredTextError(f"{where}: found {tag}, expected {listed}")
     if (is_input and outward) or (inward and not is_input):
         direction = "a command" if outward else "a signal"

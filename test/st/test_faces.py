@@ -29,6 +29,7 @@ def test_run_has_a_program_control_the_line_and_the_recording_replays(tmp_path: 
         "run", TABLE, "--duration", 2, "--controller", program, "--out", tmp_path / "bag", "--no-pictures"
     )
     assert code == 0, output
+    assert "table.st: these commands are not given: machines/packer/" in output
     code, output = command("replay", tmp_path / "bag")
     assert code == 0, output
     code, output = command("events", tmp_path / "bag")
@@ -69,10 +70,11 @@ def test_parameters_of_a_program_are_tags_and_a_map(tmp_path: Path) -> None:
             load(nowhere)
 
 
-def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached() -> None:
+def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached(tmp_path: Path) -> None:
     pytest.importorskip("rclpy")
     program = PROGRAMS / "table.st"
     node = [sys.executable, "-m", "conveyor_sim.ros.controller_node", "--ros-args", "-p", f"controller:={program}"]
+    node = ["sh", "-c", f'exec "$@" 2> "{tmp_path / "log"}"', "sh", *node]
     hashes = []
     for attach in (lambda plant: plant.attach(StructuredText(program)), lambda plant: plant.attach_node(node)):
         with Scenario(TABLE) as plant:
@@ -80,3 +82,4 @@ def test_a_program_as_a_node_gives_the_bits_that_it_gives_attached() -> None:
             plant.run_for(2.0)
             hashes.append(plant.simulation.state_hash())
     assert hashes[0] == hashes[1]
+    assert "table.st: these commands are not given: machines/packer/" in (tmp_path / "log").read_text()
