@@ -13,6 +13,7 @@ import struct
 from typing import Any
 
 from conveyor_sim.st.errors import Fault, Position, SourceError
+from conveyor_sim.st.literals import duration, time_text
 from conveyor_sim.st.types import (
     DINT,
     DWORD,
@@ -29,9 +30,9 @@ from conveyor_sim.st.types import (
 from conveyor_sim.st.values import NAMESPACE, Value, converted, described, folded
 
 _MS = 1_000_000
+_BASES = {"2": 2, "8": 8, "16": 16}
+_DURATION = re.compile("L?T(IME)?#", re.IGNORECASE)
 _NAME = re.compile(r"(?:(\w+?)_)?(TO|TRUNC)_(\w+)")
-_UNITS = (("d", 86_400_000_000_000), ("h", 3_600_000_000_000), ("m", 60_000_000_000), ("s", 1_000_000_000))
-_SMALL = (("ms", 1_000_000), ("us", 1_000), ("ns", 1))
 
 
 def conversion(name: str, hint: Type | None) -> tuple[Type | None, Type, bool] | None:
@@ -114,15 +115,6 @@ def _to_text(source: Type, code: str) -> str | None:
     return f"{name}({code})" if name else None
 
 
-def time_text(value: int) -> str:
-    """A duration as it is written: T#1m30s."""
-    rest, parts = abs(value), ""
-    for unit, size in (*_UNITS, *_SMALL):
-        count, rest = divmod(rest, size)
-        parts += f"{count}{unit}" if count else ""
-    return f"T#{'-' if value < 0 else ''}{parts or '0s'}"
-
-
 def _bool_text(value: bool) -> str:
     return "TRUE" if value else "FALSE"
 
@@ -145,10 +137,12 @@ def _parsed(text: str, name: str) -> Any:
                 return number
         if target.kind in ("int", "bits"):
             base, hash_, digits = given.partition("#")
-            whole = int(digits, int(base)) if hash_ else int(given)
+            whole = int(digits, _BASES[base]) if hash_ else int(given)
             if target.low <= whole <= target.high:
                 return whole
-    except (ValueError, KeyError):
+        if target == TIME and _DURATION.match(given):
+            return duration(Position(1, 1), given)
+    except (ValueError, KeyError, SourceError):
         pass
     raise Fault(f"STRING_TO_{name}: found {text[:40]!r}, expected {name}")
 

@@ -56,6 +56,15 @@ def duration(at: Position, text: str) -> int:
     return sign * total
 
 
+def time_text(value: int) -> str:
+    """A duration as it is written: T#1m30s."""
+    rest, parts = abs(value), ""
+    for unit, size in _UNITS.items():
+        count, rest = divmod(rest, size)
+        parts += f"{count}{unit}" if count else ""
+    return f"T#{'-' if value < 0 else ''}{parts or '0s'}"
+
+
 def _require_short(at: Position, text: str) -> None:
     if len(text) > _LONGEST:
         raise SourceError(at, f"found a number of {len(text)} characters, expected at most {_LONGEST}")

@@ -7,6 +7,8 @@ one of:
   10 ms from scan to scan;
 - `values`: rows "TYPE | expression | value"; each is computed twice: as it stands, so by the compiler, and with its
   typed literals (INT#5) in variables, so by the program;
+- `matrix`: a table of conversions, a row for what is converted, a column for a type; each is computed twice likewise.
+  `=` is the type itself, `!` has no value and stops the program, `x` is no conversion, which the compiler says;
 - `error`: what the compiler says of it; `stops`: what the program says as it stops.
 """
 
@@ -59,8 +61,33 @@ def _read(group: str, given: dict[str, Any]) -> Iterator[Case]:
                 text = program(given.get("types", ""), f"result : {kind};\n{declare}", f"result := {body};")
                 yield Case(f"{name}, {kind} {expression}, {how}", source, text, f"| result\n| {value}")
         return
+    if "matrix" in given:
+        yield from _conversions(name, source, given["matrix"])
+        return
     text = given.get("program") or program(given.get("types", ""), given.get("declare", ""), given["body"])
     yield Case(name, source, text, given.get("scans", ""), given.get("error", ""), given.get("stops", ""))
+
+
+def _conversions(name: str, source: str, matrix: str) -> Iterator[Case]:
+    """One case for the values of a row, one for each of its conversions that stops or is none."""
+    header, *rows = matrix.strip().splitlines()
+    targets = header.partition("|")[2].split()
+    for row in rows:
+        literal, cells = row.partition("|")[0].strip(), row.partition("|")[2].split()
+        kind = "TIME" if literal.startswith("T#") else literal.partition("#")[0]
+        declare, body, names, values = f"v : {kind} := {literal};", "", "", ""
+        for target, cell in zip(targets, cells, strict=True):
+            call = f"{kind}_TO_{target}"
+            if cell == "!" or cell == "x":
+                text = program("", f"v : {kind} := {literal}; r : {target};", f"r := {call}(v);")
+                stops, error = ("found", "") if cell == "!" else ("", f"found {call} of {kind}, which is no conversion")
+                yield Case(f"{name}, {call}({literal})", source, text, error=error, stops=stops)
+            elif cell != "=":
+                declare += f"\nr{target}, c{target} : {target};"
+                body += f"r{target} := {call}(v); c{target} := {call}({literal});\n"
+                names, values = f"{names} r{target} c{target}".lower(), f"{values} {cell} {cell}"
+        if body:
+            yield Case(f"{name}, {literal}", source, program("", declare, body), f"|{names}\n|{values}")
 
 
 def program(types: str, declare: str, body: str) -> str:
