@@ -10,12 +10,17 @@ from lark import Token
 
 from conveyor_sim.st.errors import Position, SourceError
 
+_DATES = "dates and times of day"
+
 REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
     **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
     **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
-    **dict.fromkeys(("DATE", "TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT"), "dates and times of day"),
+    **dict.fromkeys(("DATE", "TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT"), _DATES),
+    **dict.fromkeys(("D#", "DATE#", "TIME_OF_DAY#", "TOD#", "DATE_AND_TIME#", "DT#"), _DATES),
+    **dict.fromkeys(("LDATE", "LTIME_OF_DAY", "LTOD", "LDATE_AND_TIME", "LDT"), _DATES),
+    **dict.fromkeys(("LD#", "LDATE#", "LTIME_OF_DAY#", "LTOD#", "LDATE_AND_TIME#", "LDT#"), _DATES),
 }
 """Words of the standard, and of dialects, that are not for this interpreter, and what they belong to."""
 
@@ -25,6 +30,7 @@ SUSPECT: Mapping[str, str] = {
     **dict.fromkeys(("STEP", "TRANSITION", "ACTION"), "SFC"),
     **dict.fromkeys(("JMP", "GOTO"), "jumps"),
     **dict.fromkeys(("UNION",), "unions"),
+    **dict.fromkeys(("R_EDGE", "F_EDGE"), "R_EDGE and F_EDGE, which R_TRIG and F_TRIG do"),
 }
 """The same of words that may be names: so they are where the text makes sense with them as names."""
 
@@ -48,6 +54,7 @@ _WORDS = {
     "__ANON_2": "'=>'",
 }
 _WORD = re.compile(r"\w+")
+_COMMENT = re.compile(r"\(\*|\*\)")
 _STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
 _OPERATORS = {
     *("OR", "OR_ELSE", "XOR", "AND", "AMPERSAND", "AND_THEN", "MOD", "EQUALS", "DIFFERS", "LESS", "GREATER"),
@@ -70,10 +77,20 @@ def place_of(text: str, index: int) -> Position:
 
 
 def not_refused(token: Token) -> Token:
-    """A name. Raises SourceError for a word of what is not supported."""
+    """A name, or what stands before #. Raises SourceError for a word of what is not supported."""
     if what := REFUSED.get(token.value.upper()):
         raise SourceError(at_of(token), f"found {token.value}, expected a program without {what}")
     return token
+
+
+def _ends(text: str, place: int) -> bool:
+    """Whether a comment ends, and those within it."""
+    depth = 0
+    for match in _COMMENT.finditer(text, place):
+        depth += 1 if match.group() == "(*" else -1
+        if depth == 0:
+            return True
+    return False
 
 
 def unexpected(error: Any, text: str) -> SourceError:
@@ -86,7 +103,11 @@ def unexpected(error: Any, text: str) -> SourceError:
                 place_of(text, match.start()), f"found {match.group()}, expected a program without {what}"
             )
     if text.startswith("(*", place):
+        if _ends(text, place):
+            return SourceError(at_of(token), "found comments three deep, expected at most one within another")
         return SourceError(at_of(token), "found a comment that does not end, expected *)")
+    if token.type == "ADDRESS":
+        return SourceError(at_of(token), f"found {token}, expected a variable that is declared AT {token}")
     found = "the end of the file" if token.type == "$END" else f"'{token.value}'"
     expected = set(error.accepts or error.expected)
     words = []

@@ -74,24 +74,23 @@ def _parser() -> tuple[Lark, _Tree]:
         parser="lalr",
         lexer="basic",  # type: ignore[arg-type]  # lark takes the word, its types do not
         maybe_placeholders=True,
-        lexer_callbacks={"NAME": not_refused},
         transformer=made,
-        postlex=_Bounded(),
+        postlex=_Checked(),
     )
     return parser, made
 
 
-class _Bounded(PostLex):
-    """Counts tokens as they come."""
+class _Checked(PostLex):
+    """Counts tokens as they come, and looks at names."""
 
     always_accept = ()
 
     def process(self, stream: Iterator[Token]) -> Iterator[Token]:
-        """The tokens. Raises SourceError for more than MOST_TOKENS."""
+        """The tokens. Raises SourceError for more than MOST_TOKENS, and for words of what is not supported."""
         for number, token in enumerate(stream):
             if number == MOST_TOKENS:
                 raise SourceError(at_of(token), f"found more than {MOST_TOKENS} words and signs, expected fewer")
-            yield token
+            yield not_refused(token) if token.type in ("NAME", "PREFIX") else token
 
 
 def _of(first: Token | tree.Node) -> Position:
@@ -294,14 +293,18 @@ class _Tree(Transformer[Any]):
 
     # Expressions
     def arguments(self, items: list[Any]) -> tuple[tree.Argument, ...]:
-        return tuple(i if isinstance(i, tree.Argument) else tree.Argument(i.at, None, i) for i in items)
+        return tuple(
+            i if isinstance(i, tree.Argument) else tree.Argument(i.at, None, i) for i in items if i is not None
+        )
 
-    def input_argument(self, items: list[Any]) -> tree.Argument:
-        return self._deep(tree.Argument(at_of(items[0]), str(items[0]), items[1]), items[1])
+    def input_argument(self, items: list[Any]) -> tree.Argument | None:
+        return items[1] and self._deep(tree.Argument(at_of(items[0]), str(items[0]), items[1]), items[1])
 
-    def output_argument(self, items: list[Any]) -> tree.Argument:
-        negated, name, value = items
-        return tree.Argument(at_of(negated or name), str(name), value, output=True, negated=negated is not None)
+    def output_argument(self, items: list[Any]) -> tree.Argument | None:
+        negated, name, *value = items
+        if not value:
+            return None
+        return tree.Argument(at_of(negated or name), str(name), value[0], output=True, negated=negated is not None)
 
     def expression(self, items: list[Any]) -> tree.Expression:
         """Operands with operators between them: the one that binds less waits for what binds more."""
