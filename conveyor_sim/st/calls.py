@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from conveyor_sim.st import tree
 from conveyor_sim.st.declarations import Declarations
-from conveyor_sim.st.errors import SourceError
+from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.functions import apply, is_standard
 from conveyor_sim.st.types import BOOL, VOID, BlockType, Member, Type
@@ -17,7 +17,9 @@ PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 class Calls:
     """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2003, 2.5)."""
 
-    def __init__(self) -> None:
+    def __init__(self, trace: bool) -> None:
+        """trace: whether what a call writes is noted."""
+        self.trace = trace
         self.declarations: Declarations
         """Set before the first call."""
         self.edges: dict[str, dict[str, tree.Call]] = {}
@@ -51,7 +53,7 @@ class Calls:
                 value = expressions.value(argument.value, member.type)
                 codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
             else:
-                codes.append(self.reference(expressions, argument, member))
+                codes.append(self.reference(expressions, argument, member, node.at))
         code = f"_f_{function.name.lower()}({', '.join(codes)})"
         return Value(node.at, function.result or VOID, code)
 
@@ -63,6 +65,7 @@ class Calls:
             raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
         self._note(expressions, kind, node)
         lines, after = [f"_o = {place.code}"], []
+        written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
         given = self._bound(expressions, node, kind)
         for member in kind.of(*PASSED):
             argument = given.get(member.slot)
@@ -72,11 +75,22 @@ class Calls:
             elif member.section == "VAR_INPUT":
                 value = expressions.value(argument.value, member.type)
                 lines.append(f"_o.{member.slot} = {converted(value, member.type, f'{member.name} of {kind.name}')}")
+                written.append(member.slot)
             elif member.section == "VAR_IN_OUT":
-                lines.append(f"_o.{member.slot} = {self.reference(expressions, argument, member)}")
+                lines.append(f"_o.{member.slot} = {self.reference(expressions, argument, member, node.at)}")
             else:
-                after.append(self._output(expressions, argument, member))
-        return place, [*lines, "_o.run(_rt.now)", *after]
+                after += self._output(expressions, argument, member, node.at)
+        noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
+        return place, [*lines, "_o.run(_rt.now)", *noted, *after]
+
+    def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
+        """The line that notes who was the last to write a variable, if that is traced.
+
+        What is of a function's own lives as long as the call: nobody asks for it.
+        """
+        unit = expressions.scope.unit
+        passing = unit is not None and unit.function and root.startswith("(self,")
+        return [f"_noted({root}, {at.line}, {at.column})"] if self.trace and not passing else []
 
     def recursion(self) -> tuple[tree.Call, str] | None:
         """A call that leads back to where it stands, and to whom; None if there is none."""
@@ -143,19 +157,22 @@ class Calls:
             raise SourceError(node.at, f"found no {member.name} of {function.name}, expected all of its arguments")
         return member.initial if member.section == "VAR_INPUT" else "None"
 
-    def reference(self, expressions: Expressions, argument: tree.Argument, member: Member) -> str:
-        """Code that passes a variable itself."""
+    def reference(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> str:
+        """Code that passes a variable itself. at: of the call."""
         place = expressions.target(argument.value)
         if place.type != member.type or not place.reference or argument.negated:
             expected = f"a variable of type {member.type.name}"
             raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
+        if member.section == "VAR_OUTPUT" and self.noted(expressions, place.root, at):
+            return f"_Traced({place.reference}, _noted, {at.line}, {at.column})"
         return place.reference
 
-    def _output(self, expressions: Expressions, argument: tree.Argument, member: Member) -> str:
+    def _output(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> list[str]:
         place = expressions.target(argument.value)
         code = f"_o.{member.slot}"
         if argument.negated:
             if member.type != BOOL:
                 raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
             code = f"(not {code})"
-        return place.write(converted(Value(argument.at, member.type, code), place.type))
+        written = place.write(converted(Value(argument.at, member.type, code), place.type))
+        return [written, *self.noted(expressions, place.root, at)]

@@ -9,12 +9,13 @@ from types import CodeType
 
 from conveyor_sim.st import tree
 from conveyor_sim.st.calls import PASSED, Calls
-from conveyor_sim.st.declarations import Declarations
+from conveyor_sim.st.declarations import MOST_ELEMENTS, Declarations
 from conveyor_sim.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
-from conveyor_sim.st.types import TIME, BlockType, Member
+from conveyor_sim.st.types import TIME, BlockType, Member, Structure
+from conveyor_sim.st.values import LARGE
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -88,14 +89,15 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     if len(source.units) > MOST_UNITS:
         at, count = source.units[MOST_UNITS].at, len(source.units)
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
-    calls = Calls()
+    calls = Calls(trace)
     declared = calls.declarations = Declarations(source, calls)
     lines = Lines()
     for one in source.types:
         declared.named(one.at, one.name)
     units = [(unit, _type_of(unit, declared)) for unit in source.units]
+    _require_few(declared, units)
     for unit, kind in units:
-        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, trace)
+        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls)
     if found := calls.recursion():
         node, name = found
         raise SourceError(node.at, f"found a call that leads back to {name}, expected no recursion")
@@ -105,16 +107,32 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     lines.add("_g = _Globals()")
     python = "\n".join(lines.lines) + "\n"
     programs = {unit.name.lower(): kind for unit, kind in units if unit.kind == "PROGRAM"}
+    scheduled = _schedule(source, programs, declared, calls)
+    for key in (program.name.lower() for program in scheduled):
+        shared = declared.names.globals.members.get(key)
+        if shared is not None and isinstance(shared.type, Structure):
+            found = f"found {shared.name}, which has the name of a program"
+            raise SourceError(Position(*shared.at), f"{found}, expected another: {key}/x would be two variables")
     return Compiled(
         file,
         compile(python, f"<{file}>", "exec"),
         python,
         tuple(lines.positions),
-        tuple(sorted(_schedule(source, programs, declared, calls), key=lambda one: one.priority)),
+        tuple(sorted(scheduled, key=lambda one: one.priority)),
         declared.names.globals,
         hashlib.sha256(text.encode()).hexdigest(),
         trace,
     )
+
+
+def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
+    """Raises SourceError for more than MOST_ELEMENTS in all that a file declares."""
+    elements = declared.names.globals.size + sum(one.size for one in declared.structures)
+    for unit, kind in units:
+        elements += kind.size
+        if elements > MOST_ELEMENTS:
+            found = f"found {elements} elements with those of {unit.name}"
+            raise SourceError(unit.at, f"{found}, expected at most {MOST_ELEMENTS} in all that is declared")
 
 
 def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
@@ -123,18 +141,19 @@ def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
     return kind
 
 
-def _unit(unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls, trace: bool) -> None:
+def _unit(unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls) -> None:
     """The class of a unit, whose `run` is its body."""
     members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
     _class(lines, kind.python, "", members)
     with lines.inner():
         lines.add("def run(self, now=0):", unit.at)
+        made = kind.size if kind.function else sum(one.type.size for one in kind.of("VAR_TEMP"))
         with lines.inner():
-            lines.add("_rt.left -= 1", unit.at)
+            lines.add(f"_rt.left -= {1 + made // LARGE}", unit.at)
             lines.add("if _rt.left < 0: _late()", unit.at)
             for member in kind.of("VAR_TEMP"):
                 lines.add(f"self.{member.slot} = {member.initial}")
-        Statements(lines, expressions, calls, trace).block(unit.body)
+        Statements(lines, expressions, calls).block(unit.body)
     if kind.function:
         _function(kind, lines)
 
@@ -180,6 +199,7 @@ def _schedule(
     known = Expressions(declared.scope(None), calls)
     tasks = {task.name.lower(): _task(task, known) for task in configuration.tasks}
     found: dict[str, Scheduled] = {}
+    elements = 0
     for one in configuration.instances:
         if one.type.lower() not in programs:
             raise SourceError(one.at, f"found {one.type}, expected a PROGRAM: {', '.join(programs) or 'there is none'}")
@@ -188,7 +208,11 @@ def _schedule(
         if one.name.lower() in found:
             raise SourceError(one.at, f"found {one.name} again, expected each program once")
         interval, priority = tasks[one.task.lower()] if one.task else (0, LOWEST)
-        found[one.name.lower()] = Scheduled(one.name, programs[one.type.lower()], one.task, interval, priority)
+        kind = programs[one.type.lower()]
+        elements += kind.size
+        if elements > MOST_ELEMENTS:
+            raise SourceError(one.at, f"found {elements} elements in programs, expected at most {MOST_ELEMENTS}")
+        found[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
     if not found:
         raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")
     return list(found.values())

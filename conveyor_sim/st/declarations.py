@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -33,9 +32,6 @@ MOST_ELEMENTS = 1_000_000
 MOST_LEVELS = 100
 """Structures and blocks one within the other."""
 
-_OF_A_BLOCK = 5
-"""Elements of one of the library."""
-
 _SECTIONS = {
     "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
     "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
@@ -55,7 +51,6 @@ class Declarations:
         self._pending: dict[str, tree.TypeDeclaration | tree.Unit] = {}
         self._functions: dict[str, tree.Unit] = {}
         self._open: list[str] = []
-        self._elements: dict[str, int] = {}
         self._levels: dict[str, int] = {}
         everything: list[tree.TypeDeclaration | tree.Unit] = [*source.types, *source.units]
         for declared in everything:
@@ -67,11 +62,36 @@ class Declarations:
             if taken or declared.name.upper() in ELEMENTARY:
                 raise SourceError(declared.at, f"found {declared.name} again, expected a name that is not taken")
             where[key] = declared
+        self._globals = self._by_name(
+            (*source.globals, *(one for config in source.configurations for one in config.globals))
+        )
+        self.names.read = self._read
         for one in source.types:
             if isinstance(one.type, tree.EnumType):
                 self.named(one.at, one.name)
-        sections = (*source.globals, *(one for config in source.configurations for one in config.globals))
-        self._members(self.names.globals, sections, ("VAR_GLOBAL",))
+        order = list(self._globals)
+        for key in order:
+            self._read(key)
+        members = self.names.globals.members
+        for key in order:
+            members[key] = members.pop(key)
+
+    def _by_name(self, sections: Iterable[tree.Variables]) -> dict[str, tree.Variables]:
+        """Global variables by name, each as a section of its own."""
+        found: dict[str, tree.Variables] = {}
+        for section in sections:
+            for declared in section.declarations:
+                if declared.name.lower() in found:
+                    raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+                found[declared.name.lower()] = replace(section, declarations=(declared,))
+        return found
+
+    def _read(self, key: str) -> None:
+        """Take up a global variable, if there is one of that name and it is not known yet."""
+        if (section := self._globals.pop(key, None)) is not None:
+            self.names.reading.add(key)
+            self._members(self.names.globals, (section,), ("VAR_GLOBAL",))
+            self.names.reading.remove(key)
 
     def scope(self, unit: BlockType | None) -> Scope:
         """The names of a unit."""
@@ -151,17 +171,17 @@ class Declarations:
             if low > high:
                 raise SourceError(spec.at, f"found the range {low}..{high}, expected a rising one")
             elements *= high - low + 1
+            _require_few(elements, spec.at)
             ranges.append((low, high))
         element = self._type(spec.element, known)
-        _require_few(elements * self._elements_of(element), spec.at)
+        _require_few(elements * element.size, spec.at)
         shown = ", ".join(f"{low}..{high}" for low, high in ranges)
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
 
     def _bound(self, kind: Structure, at: Position) -> None:
-        """Keep how many elements it has, and levels, once its members are known."""
+        """Keep how many levels it has, once its members are known."""
         own = [one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
-        self._elements[kind.python] = max(1, sum(map(self._elements_of, own)))
-        _require_few(self._elements[kind.python], at)
+        _require_few(kind.size, at)
         self._levels[kind.python] = levels = 1 + max(map(self._levels_of, own), default=0)
         if levels > MOST_LEVELS:
             raise SourceError(at, f"found {levels} types one within the other, expected at most {MOST_LEVELS}")
@@ -171,12 +191,6 @@ class Declarations:
         while isinstance(kind, Array):
             kind = kind.element
         return self._levels.get(kind.python, 1) if isinstance(kind, Structure) else 0
-
-    def _elements_of(self, kind: Type) -> int:
-        """Elementary variables in one of a type; a block of the library counts as some."""
-        if isinstance(kind, Array):
-            return math.prod(high - low + 1 for low, high in kind.ranges) * self._elements_of(kind.element)
-        return self._elements.get(kind.python, _OF_A_BLOCK) if isinstance(kind, Structure) else 1
 
     def _enumeration(self, spec: tree.EnumType, known: Expressions, name: str) -> Type:
         base = self.named(spec.at, spec.base) if spec.base else ELEMENTARY["INT"]
@@ -303,18 +317,20 @@ class Declarations:
         for one, other in rest:
             size *= other - one + 1
         codes: list[str] = []
+        values = 0
         for count, element in node.elements:
-            if len(codes) + count > size:
+            values += count
+            if values > size:
                 raise SourceError(node.at, f"found more than {size} values, expected at most {size}")
             deeper = nested or not isinstance(element, tree.InitialArray)
             if element is not None and not deeper:
                 raise SourceError(element.at, f"found a list, expected {inner.name}")
-            codes += [inner.initial if element is None else self._initial(element, inner, known)] * count
-        codes += [inner.initial] * (size - len(codes))
+            codes.append(_times(count, inner.initial if element is None else self._initial(element, inner, known)))
+        codes.append(_times(size - values, inner.initial))
+        code = f"[{', '.join(filter(None, codes))}]"
         for one, other in reversed(rest):
-            step = other - one + 1
-            codes = [f"[{', '.join(codes[at : at + step])}]" for at in range(0, len(codes), step)]
-        return f"[{', '.join(codes)}]"
+            code = f"_rows({code}, {other - one + 1})"
+        return code
 
     def _initial_structure(self, node: tree.InitialStructure, kind: Type, known: Expressions) -> str:
         if not isinstance(kind, Structure):
@@ -328,6 +344,11 @@ class Declarations:
                 )
             given.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(given)})"
+
+
+def _times(count: int, code: str) -> str:
+    """Code of so many elements of a list, each its own."""
+    return code if count == 1 else f"*({code} for _ in range({count}))" if count else ""
 
 
 def _require_few(elements: int, at: Position) -> None:

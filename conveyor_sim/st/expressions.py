@@ -50,6 +50,8 @@ class Expressions:
 
     def __init__(self, scope: Scope, calls: Calls) -> None:
         self.scope = scope
+        self.controls: list[str] = []
+        """Code of the control variables of each FOR around what is checked."""
         self._calls = calls
 
     def value(self, node: tree.Expression, hint: Type | None = None) -> Value:
@@ -103,6 +105,10 @@ class Expressions:
     def target(self, node: tree.Expression) -> Place:
         """A place that may be written."""
         place = self.place(node)
+        if place.code in self.controls:
+            raise SourceError(
+                node.at, "found an assignment to the control variable of a FOR inside of it, expected none"
+            )
         if place.fixed:
             raise SourceError(node.at, f"found {place.fixed}, expected a variable that can be written")
         return place
@@ -160,14 +166,15 @@ class Expressions:
             reasons = {"VAR_INPUT": "", "VAR": f"{node.name}, which is {kind.name}'s own"}
             fixed = reasons.get(member.section, f"{node.name}, an output of {kind.name}")
         code = f"{base.code}.{member.slot}"
+        root = base.root if kind.kind == "structure" else f"({base.code}, {member.slot!r})"
         return Place(
             node.at,
             member.type,
             code,
             write=lambda new: f"{code} = {new}",
-            reference=f"_Attribute({base.code}, {member.slot!r})",
+            reference=f"_Attribute({base.code}, {member.slot!r}, {root})",
             fixed=fixed,
-            root=base.root if kind.kind == "structure" else (base.code, member.slot),
+            root=root,
         )
 
     def _item(self, node: tree.Item) -> Place:
@@ -187,7 +194,7 @@ class Expressions:
             kind.element,
             element,
             write=lambda new: f"{element} = {new}",
-            reference=f"_Element({code}, {index})",
+            reference=f"_Element({code}, {index}, {base.root})",
             fixed=base.fixed,
             root=base.root,
         )
@@ -220,7 +227,11 @@ class Expressions:
             node.at,
             BOOL,
             f"({base.code} & {bit} != 0)",
-            write=lambda new: base.write(f"{base.code} | {bit} if {new} else {base.code} & {rest}"),
+            write=lambda new: (
+                f"_set_bit({base.reference}, {bit}, {new})"  # what is called in it is called once
+                if "(" in base.code
+                else base.write(f"{base.code} | {bit} if {new} else {base.code} & {rest}")
+            ),
             fixed=base.fixed,
             root=base.root,
         )

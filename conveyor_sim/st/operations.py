@@ -15,13 +15,17 @@ MOST_CHARACTERS = 32767
 """Of any text."""
 
 
+Root = tuple[Any, str]
+"""A variable of a unit: the instance, and its slot."""
+
+
 class Attribute:
-    """A variable passed as VAR_IN_OUT."""
+    """A variable passed as VAR_IN_OUT; root: the one that it is part of, if it is one of a structure's."""
 
-    __slots__ = ("_name", "_owner")
+    __slots__ = ("_name", "_owner", "root")
 
-    def __init__(self, owner: Any, name: str) -> None:
-        self._owner, self._name = owner, name
+    def __init__(self, owner: Any, name: str, root: Root | None = None) -> None:
+        self._owner, self._name, self.root = owner, name, root or (owner, name)
 
     def get(self) -> Any:
         """Its value."""
@@ -35,10 +39,10 @@ class Attribute:
 class Element:
     """An element of an array, passed likewise."""
 
-    __slots__ = ("_index", "_list")
+    __slots__ = ("_index", "_list", "root")
 
-    def __init__(self, values: list[Any], index: int) -> None:
-        self._list, self._index = values, index
+    def __init__(self, values: list[Any], index: int, root: Root) -> None:
+        self._list, self._index, self.root = values, index, root
 
     def get(self) -> Any:
         """Its value."""
@@ -47,6 +51,21 @@ class Element:
     def set(self, value: Any) -> None:
         """Write it."""
         self._list[self._index] = value
+
+
+class Traced:
+    """A variable that a function's output goes to: that this call wrote it is noted."""
+
+    __slots__ = ("_note", "_place", "_reference")
+
+    def __init__(self, reference: Attribute | Element, note: Callable[[Root, int, int], None], *place: int) -> None:
+        """place: line and column of the call."""
+        self._reference, self._note, self._place = reference, note, place
+
+    def set(self, value: Any) -> None:
+        """Write it."""
+        self._reference.set(value)
+        self._note(self._reference.root, *self._place)
 
 
 def divide(a: int, b: int) -> int:
@@ -80,6 +99,11 @@ def power(a: float, b: float) -> float:
     if isinstance(result, complex):
         raise Fault(f"found {a:g} ** {b:g}, expected a whole exponent of a negative number")
     return result
+
+
+def set_bit(word: Attribute | Element, bit: int, on: bool) -> None:
+    """One bit of a bit string."""
+    word.set(word.get() | bit if on else word.get() & ~bit)
 
 
 def outside(index: int, low: int, high: int) -> int:
@@ -143,6 +167,11 @@ def copied(value: Any) -> Any:
     if isinstance(value, Record):
         return value.copy()
     return value
+
+
+def rows(values: list[Any], length: int) -> list[list[Any]]:
+    """Values that follow each other, as rows of so many."""
+    return [values[at : at + length] for at in range(0, len(values), length)]
 
 
 class Record:
@@ -262,6 +291,7 @@ NAMES: dict[str, Any] = {
     "_modulo": modulo,
     "_quotient": quotient,
     "_power": power,
+    "_set_bit": set_bit,
     "_outside": outside,
     "_in_range": in_range,
     "_rounds": rounds,
@@ -271,9 +301,11 @@ NAMES: dict[str, Any] = {
     "_single": single,
     "_copied": copied,
     "_with": with_values,
+    "_rows": rows,
     "_Record": Record,
     "_Attribute": Attribute,
     "_Element": Element,
+    "_Traced": Traced,
     "_left": left,
     "_right": right,
     "_mid": mid,

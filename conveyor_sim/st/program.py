@@ -9,12 +9,14 @@ from typing import Any
 
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
+from conveyor_sim.st.operations import Root, copied
 from conveyor_sim.st.types import TIME, Type
 from conveyor_sim.st.values import NAMESPACE
 from conveyor_sim.st.variables import Variable, dump, leaves, load, retain
 
 BUDGET = 100_000
-"""Rounds of loops and calls of units that a task may take in one scan: far more than a PLC has time for."""
+"""Rounds of loops and calls of units that a task may take in one scan: far more than a PLC has time for. Whatever
+copies or makes arrays and structures takes one more for each LARGE elements."""
 
 MOST_VARIABLES = 100_000
 """That can be read by name."""
@@ -43,7 +45,8 @@ class Program:
 
     def _begin(self) -> None:
         self._written: dict[tuple[int, str], tuple[int, int]] = {}
-        names = {**NAMESPACE, "_rt": self._clock, "_late": self._late, "_written": self._written}
+        own = {"_late": self._late, "_noted": self._noted, "_copied_large": self._copied_large}
+        names = {**NAMESPACE, **own, "_rt": self._clock}
         exec(self.compiled.code, names)
         self.globals: Any = names["_g"]
         self.instances: dict[str, Any] = {one.name.lower(): names[one.type.python]() for one in self.compiled.programs}
@@ -61,7 +64,8 @@ class Program:
             due = self._due.get(name, now)
             if now < due:
                 continue
-            self._due[name] = due + one.interval if one.interval else now + 1
+            # What should have run in between is not made up for.
+            self._due[name] = now + one.interval - (now - due) % one.interval if one.interval else now + 1
             self._clock.left = self.budget
             ran = True
             try:
@@ -75,6 +79,17 @@ class Program:
 
     def _late(self) -> None:
         raise Fault(f"watchdog: found more than {self.budget} rounds of loops and calls in one scan, expected fewer")
+
+    def _copied_large(self, value: Any, rounds: int) -> Any:
+        """An array or a structure as a value of its own; rounds: of a loop, that take as long."""
+        self._clock.left -= rounds
+        if self._clock.left < 0:
+            self._late()
+        return copied(value)
+
+    def _noted(self, variable: Root, line: int, column: int) -> None:
+        owner, slot = variable
+        self._written[id(owner), slot] = line, column
 
     def _place(self, traceback: TracebackType | None) -> str:
         """File, line and column of the innermost statement that was being carried out."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
@@ -28,6 +28,16 @@ class Names:
     globals: BlockType = field(default_factory=lambda: BlockType("VAR_GLOBAL", "block", python="_Globals"))
     values: dict[str, list[Enumeration]] = field(default_factory=dict)
     """Which enumerations have a value of a name."""
+    reading: set[str] = field(default_factory=set)
+    """Global variables that are being taken up."""
+    read: Callable[[str], None] = lambda key: None
+    """Takes up the global variable of a name, if it stands further down in the file."""
+
+    def global_(self, key: str) -> Member | None:
+        """A global variable; None if there is none of that name."""
+        if key not in self.globals.members:
+            self.read(key)
+        return self.globals.members.get(key)
 
 
 class Scope:
@@ -44,11 +54,13 @@ class Scope:
             if member.section == "VAR_EXTERNAL":
                 return self._global(at, key, name)
             return place_of(at, "self", member, inside=True)
-        if key in self.names.globals.members:
+        if self.names.global_(key) is not None:
             return self._global(at, key, name)
         for known, what in self._others():
             if key in known:
                 return Thing(what)
+        if key in self.names.reading:
+            raise SourceError(at, f"found {name} in its own declaration, expected another value")
         close = get_close_matches(key, [one for known, _ in self._others(True) for one in known], 1)
         hint = f"; there is {self._written(close[0])}" if close else ""
         raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
@@ -57,7 +69,7 @@ class Scope:
         """What a name comes to where a value is expected. Raises SourceError."""
         key = name.lower()
         own = self.unit is not None and key in self.unit.members
-        if not own and key not in self.names.globals.members and (kinds := self.names.values.get(key)):
+        if not own and (kinds := self.names.values.get(key)) and self.names.global_(key) is None:
             if len(kinds) > 1:
                 listed = " or ".join(f"{kind.name}#{name}" for kind in kinds)
                 raise SourceError(at, f"found {name}, which several types have, expected {listed}")
@@ -74,7 +86,7 @@ class Scope:
         return kind if isinstance(kind, Enumeration) and not hidden else None
 
     def _global(self, at: Position, key: str, name: str) -> Place:
-        member = self.names.globals.members.get(key)
+        member = self.names.global_(key)
         if member is None:
             raise SourceError(at, f"found {name}, expected a variable of VAR_GLOBAL of that name")
         return place_of(at, "_g", member, inside=True)
@@ -106,7 +118,7 @@ def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
             f"{reference}.get()",
             write=lambda new: f"{reference}.set({new})",
             reference=reference,
-            root=(owner, slot),
+            root=f"{reference}.root",
         )
     code = f"{owner}.{slot}"
     fixed = f"{member.name}, a CONSTANT" if member.constant else ""
@@ -123,5 +135,5 @@ def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
         write=lambda new: f"{code} = {new}",
         reference=f"_Attribute({owner}, {slot!r})",
         fixed=fixed,
-        root=(owner, slot),
+        root=f"({owner}, {slot!r})",
     )

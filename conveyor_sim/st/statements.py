@@ -48,13 +48,10 @@ class Lines:
 class Statements:
     """Of one unit."""
 
-    def __init__(self, lines: Lines, expressions: Expressions, calls: Calls, trace: bool) -> None:
-        """trace: whether each assignment notes that it was the last to write its variable."""
+    def __init__(self, lines: Lines, expressions: Expressions, calls: Calls) -> None:
         self._lines = lines
         self._expressions = expressions
         self._calls = calls
-        self._trace = trace
-        self._controls: list[str] = []
         self._loops = 0
         self._names = 0
 
@@ -81,10 +78,6 @@ class Statements:
 
     def _assignment(self, node: tree.Assignment) -> None:
         place = self._expressions.target(node.target)
-        if place.code in self._controls:
-            raise SourceError(
-                node.at, "found an assignment to the control variable of a FOR inside of it, expected none"
-            )
         if isinstance(place.type, BlockType):
             raise SourceError(
                 node.at, f"found an assignment to a block, {place.type.name}, expected a call or a variable"
@@ -102,9 +95,6 @@ class Statements:
         _, lines = self._calls.block(self._expressions, node.call)
         for line in lines:
             self._lines.add(line, node.at)
-        for argument in node.call.arguments:
-            if argument.output:
-                self._note(self._expressions.place(argument.value), node.at)
 
     def _is_variable(self, node: tree.Name) -> bool:
         scope = self._expressions.scope
@@ -115,9 +105,8 @@ class Statements:
         return member is not None or node.name.lower() in scope.names.globals.members
 
     def _note(self, place: Place, at: Position) -> None:
-        if self._trace:
-            owner, slot = place.root
-            self._lines.add(f"_written[id({owner}), {slot!r}] = ({at.line}, {at.column})", at)
+        for line in self._calls.noted(self._expressions, place.root, at):
+            self._lines.add(line, at)
 
     def _if(self, node: tree.If) -> None:
         word = "if"
@@ -181,9 +170,10 @@ class Statements:
         self._lines.add(f"for _k in {rounds}:", node.at)
         with self._lines.inner():
             self._lines.add(control.write("_k"), node.at)
-        self._controls.append(control.code)
+            self._note(control, node.at)
+        self._expressions.controls.append(control.code)
         self._body(node.body, node.at)
-        self._controls.pop()
+        self._expressions.controls.pop()
         self._lines.add("else:")
         with self._lines.inner():
             self._lines.add(control.write(f"_after({rounds}, {kind.low}, {kind.high})"), node.at)

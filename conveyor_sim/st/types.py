@@ -6,8 +6,10 @@ to 32 bits; TIME an int, ns; STRING a str; an array a list, nested by dimension;
 
 from __future__ import annotations
 
+import math
 from array import array
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
@@ -41,6 +43,11 @@ class Type:
     def initial(self) -> str:
         """Code of the value that a variable has where none is given."""
         return self.start or {"bool": "False", "real": "0.0", "string": "''"}.get(self.kind, "0")
+
+    @property
+    def size(self) -> int:
+        """Elementary variables within one of it."""
+        return 1
 
     @property
     def width(self) -> int:
@@ -112,6 +119,11 @@ class Array(Type):
             code = f"[{code} for _ in range({high - low + 1})]"
         return self.start or code
 
+    @property
+    def size(self) -> int:
+        """Of all its elements."""
+        return math.prod(high - low + 1 for low, high in self.ranges) * self.element.size
+
 
 @dataclass(frozen=True)
 class Member:
@@ -149,6 +161,12 @@ class Structure(Type):
     def initial(self) -> str:
         """A new object."""
         return self.start or f"{self.python}()"
+
+    @cached_property
+    def size(self) -> int:  # once all members are known
+        """Of all its members but those that are elsewhere."""
+        own = [one.type.size for one in self.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
+        return max(1, sum(own))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Structure) and self.python == other.python

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from conveyor_sim.st.blocks import CLASSES
 from conveyor_sim.st.errors import Fault, Position, SourceError
+from conveyor_sim.st.literals import time_text
 from conveyor_sim.st.operations import NAMES
 from conveyor_sim.st.types import (
     BOOL,
@@ -16,6 +18,7 @@ from conveyor_sim.st.types import (
     LINT,
     LREAL,
     REAL,
+    TIME,
     ULINT,
     Array,
     BlockType,
@@ -30,6 +33,11 @@ from conveyor_sim.st.types import (
 
 NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES}
 """What code may call."""
+
+_MOST = {REAL: "3.4028235E38", LREAL: "1.7976931348623157E308"}
+
+LARGE = 100
+"""Elements whose copy takes as long as a round of a loop."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +67,8 @@ class Place(Value):
     """Code that passes it as VAR_IN_OUT; "" where it can't be."""
     fixed: str = ""
     """Why it can't be written; "" where it can."""
-    root: tuple[str, str] = ("", "")
-    """Code of the object, and slot, of the variable that it is part of."""
+    root: str = ""
+    """Code of the variable that it is part of: the object that it belongs to, and its slot."""
 
 
 def text_of(value: Any) -> str:
@@ -104,7 +112,9 @@ def described(value: Value) -> str:
     """What it is, in words."""
     if value.literal:
         return f"the number {value.constant}"
-    return value.type.name if value.constant is None else f"{value.type.name} {value.constant}"
+    if value.constant is None:
+        return value.type.name
+    return time_text(value.constant) if value.type.base == TIME else f"{value.type.name} {value.constant}"
 
 
 def converts(value: Value, target: Type) -> bool:
@@ -126,7 +136,12 @@ def converted(value: Value, target: Type, what: str = "") -> str:
         return text_of(bool(known)) if value.literal else value.code
     if into.kind == "real":
         if known is not None:
-            return text_of(single(known) if into == REAL else float(known))
+            number = single(known) if into == REAL else float(known)
+            if value.literal and not math.isfinite(number):
+                raise SourceError(
+                    value.at, f"found a number beyond {into.name}, expected {expected}, up to {_MOST[into]}"
+                )
+            return text_of(number)
         return f"float({value.code})" if value.type.base.kind == "int" else value.code
     if isinstance(target, Subrange) and known is None:
         inside = target.low <= value.type.low and value.type.high <= target.high
@@ -140,7 +155,8 @@ def converted(value: Value, target: Type, what: str = "") -> str:
             raise SourceError(
                 value.at, f"found {target.name} with blocks in it, expected a value: blocks are not copied"
             )
-        return f"_copied({value.code})"
+        rounds = target.size // LARGE
+        return f"_copied_large({value.code}, {rounds})" if rounds else f"_copied({value.code})"
     return value.code
 
 

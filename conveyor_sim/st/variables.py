@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.st.errors import StructuredTextError
@@ -113,17 +114,27 @@ def load(value: Any, data: Any) -> Any:
     return value
 
 
-def retain(kind: Structure, old: Any, new: Any, all_: bool = False) -> None:
-    """Carry RETAIN variables from one object of a type to another; with `all_` every one."""
-    if isinstance(kind, BlockType) and kind.standard:
-        if all_:
-            load(new, dump(old))
+def retain(kind: Type, old: Any, new: Any) -> None:
+    """Carry RETAIN variables from one value of a type to another, those of blocks within it too."""
+    if isinstance(kind, Array):
+        if isinstance(_innermost(kind), Structure):
+            inner = replace(kind, ranges=kind.ranges[1:]) if len(kind.ranges) > 1 else kind.element
+            for one, other in zip(old, new, strict=True):
+                retain(inner, one, other)
+        return
+    if not isinstance(kind, Structure) or (isinstance(kind, BlockType) and kind.standard):
         return
     for member in kind.members.values():
         if member.section in ("VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"):
             continue
-        value = getattr(old, member.slot)
-        if all_ or member.retain:
-            setattr(new, member.slot, load(getattr(new, member.slot), dump(value)))
-        elif isinstance(member.type, BlockType):
-            retain(member.type, value, getattr(new, member.slot))
+        before, now = getattr(old, member.slot), getattr(new, member.slot)
+        if member.retain:
+            setattr(new, member.slot, load(now, dump(before)))
+        else:
+            retain(member.type, before, now)
+
+
+def _innermost(kind: Type) -> Type:
+    while isinstance(kind, Array):
+        kind = kind.element
+    return kind

@@ -14,7 +14,7 @@ from conveyor_sim.scada.modbus_map import modbus_map, to_csv
 from conveyor_sim.st.controller import StructuredText
 from conveyor_sim.st.errors import StructuredTextError
 from conveyor_sim.testing import Scenario
-from conveyor_sim.testing.evidence import draw_moment
+from conveyor_sim.testing.evidence import draw_moment, traced
 
 TAGS = LineTags(
     signals={
@@ -65,6 +65,10 @@ def test_variables_are_tags_by_pragma_by_name_and_by_word(tmp_path: Path) -> Non
         "main/lost: no tag",
         "machines/m/run: a command that the program does not give",
     ]
+    assert plc.left_over == (
+        f"{tmp_path / 'program.st'}: no tag for main/lost",
+        f"{tmp_path / 'program.st'}: these commands are not given: machines/m/run",
+    )
 
 
 def test_located_variables_are_tags_by_their_address_in_the_modbus_map(tmp_path: Path) -> None:
@@ -134,6 +138,13 @@ def test_a_task_runs_at_its_interval_and_its_outputs_hold(tmp_path: Path) -> Non
     assert [scan(plc, tick)["belts/a/cmd_speed"] for tick in range(7)] == [1, 1, 1, 2, 2, 2, 3]
 
 
+def test_a_task_does_not_make_up_for_scans_that_there_were_not(tmp_path: Path) -> None:
+    """As where a node that runs free was held up: it goes on at its interval, counted from its first scan."""
+    plc = bound(tmp_path, TASKS)
+    ticks = (0, 1, 2, 3, 100, 101, 102, 103, 104, 105)
+    assert [scan(plc, tick)["belts/a/cmd_speed"] for tick in ticks] == [1, 1, 1, 2, 3, 3, 4, 4, 4, 5]
+
+
 def test_an_interval_is_a_multiple_of_the_scan(tmp_path: Path) -> None:
     plc = bound(tmp_path, TASKS.replace("30ms", "25ms"))
     with pytest.raises(StructuredTextError, match="INTERVAL 25 ms, expected a multiple of a scan, 10 ms"):
@@ -170,6 +181,35 @@ def test_a_warm_restart_keeps_what_is_retained_and_a_cold_one_nothing(tmp_path: 
     assert scan(plc, 8) == {"belts/a/cmd_speed": 1.0}
 
 
+def test_a_warm_restart_keeps_what_blocks_retain_wherever_they_are(tmp_path: Path) -> None:
+    (tmp_path / "p.st").write_text(
+        """FUNCTION_BLOCK Counts VAR RETAIN n : INT; t : TON; END_VAR VAR m : INT; END_VAR
+        n := n + 1; m := m + 1; t(IN := TRUE, PT := T#10s);
+        END_FUNCTION_BLOCK
+        TYPE Lane : STRUCT c : Counts; k : INT; END_STRUCT; END_TYPE
+        VAR_GLOBAL RETAIN g : INT; END_VAR
+        VAR_GLOBAL one : Counts; END_VAR
+        PROGRAM main VAR a : ARRAY [1..2, 0..1] OF Counts; l : Lane; END_VAR
+        g := g + 1; one(); a[2, 1](); l.c(); l.k := 5;
+        END_PROGRAM"""
+    )
+    plc = StructuredText(tmp_path / "p.st")
+    plc.bind(TAGS)
+    for tick in range(3):
+        scan(plc, tick)
+    plc.restart(warm=True)
+    kept = {name: value for name, value in plc.variables.items() if value}
+    timer = {"in": 1.0, "pt": 10.0, "et": 0.02}
+    assert kept == {
+        "plc/g": 3.0,
+        **{
+            f"plc/{block}/{name}": value
+            for block in ("one", "main/a[2,1]", "main/l/c")
+            for name, value in (("n", 3.0), *((f"t/{name}", value) for name, value in timer.items()))
+        },
+    }
+
+
 def test_a_variable_is_forced_and_let_go(tmp_path: Path) -> None:
     plc = bound(tmp_path, TASKS.replace("30ms", "10ms"))
     plc.force("plc/main/n", 100)
@@ -194,8 +234,58 @@ def test_a_trace_knows_the_statement_that_wrote_last(tmp_path: Path) -> None:
     assert plc.last_written("plc/main/v[2]").endswith("program.st:7:1")
     assert plc.last_written("plc/main/q").endswith("program.st:8:1")
     assert plc.last_written("plc/main/y") == ""
+    assert plc.last_written("plc/main/t/in") == plc.last_written("plc/main/t/et") == plc.last_written("plc/main/q")
     with pytest.raises(StructuredTextError, match="expected trace=True"):
         bound(tmp_path, declare, body).last_written("plc/main/x")
+
+
+PASSED_ON = """TYPE P : STRUCT a, b : LREAL; END_STRUCT; END_TYPE
+FUNCTION_BLOCK Sets VAR_IN_OUT o : LREAL; END_VAR VAR_INPUT v : LREAL; END_VAR
+o := v;
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Outer VAR_IN_OUT p : P; w : ARRAY [1..2] OF LREAL; END_VAR VAR s : Sets; END_VAR
+s(o := p.b, v := 2.0);
+w[2] := p.b;
+END_FUNCTION_BLOCK
+FUNCTION gives : BOOL VAR_OUTPUT o : LREAL; END_VAR
+o := 3.0;
+END_FUNCTION
+PROGRAM main VAR s : Sets; x : Outer; p : P; w : ARRAY [1..2] OF LREAL; b : BOOL; i : INT; END_VAR
+VAR {tag: belts/a/cmd_speed} speed : LREAL; g, h : LREAL; END_VAR
+speed := 0.0;
+s(o := speed, v := 1.0);
+x(p := p, w := w);
+b := gives(o => g);
+gives(h);
+FOR i := 1 TO 3 DO ; END_FOR;
+END_PROGRAM
+"""
+
+
+def test_a_trace_knows_who_wrote_what_was_passed_on(tmp_path: Path) -> None:
+    (tmp_path / "p.st").write_text(PASSED_ON)
+    plc = StructuredText(tmp_path / "p.st", trace=True)
+    plc.bind(TAGS)
+    assert scan(plc, 0) == {"belts/a/cmd_speed": 1.0}
+    found = {
+        name: plc.last_written(f"plc/main/{name}").rpartition("p.st:")[2]
+        for name in ("speed", "p/b", "w[2]", "b", "g", "h", "i", "s/v", "x/s/v")
+    }
+    assert found == {
+        "speed": "3:1",
+        "p/b": "3:1",
+        "w[2]": "7:1",
+        "b": "17:1",
+        "g": "17:6",
+        "h": "18:1",
+        "i": "19:1",
+        "s/v": "15:1",
+        "x/s/v": "6:1",
+    }
+    plain = StructuredText(tmp_path / "p.st")
+    plain.bind(TAGS)
+    scan(plain, 0)
+    assert dict(plain.variables) == dict(plc.variables)
 
 
 def test_two_of_one_program_share_nothing(tmp_path: Path) -> None:
@@ -214,6 +304,7 @@ def test_conditions_read_variables_and_the_picture_shows_them(tmp_path: Path) ->
         plant.eventually(lambda s: s["plc/table/free/et"] > 1.0, within=0.5)
     assert "plc/table/free/et" in str(caught.value)
     assert plant.history["plc/table/held"][-1] == 1.0
+    assert traced(plant)[0] == "plc/table/free/et"
     assert draw_moment(plant, tmp_path / "line.png").stat().st_size > 0
 
 

@@ -72,6 +72,8 @@ def attack(seed: int, folder: Path) -> str:
     text = _random(draw) if draw.integers(2) else _changed(draw)
     begun = time.process_time()
     said = _play(text)
+    if said == "ran" and draw.integers(4) == 0:
+        _trace(text)
     if time.process_time() - begun > LONGEST:
         raise Violation("slow program", text[:2000])
     return said
@@ -91,6 +93,19 @@ def _play(text: str) -> str:
         _check(str(error), text)
         return "stopped"
     return "ran"
+
+
+def _trace(text: str) -> None:
+    """A trace changes nothing; a warm restart takes what it kept."""
+    plain, traced = (Program(compile_text(text, trace=trace), BUDGET) for trace in (False, True))
+    for scan in range(SCANS):
+        for program in (plain, traced):
+            program.run(scan * 10_000_000)
+    if repr(plain.snapshot()) != repr(traced.snapshot()):
+        raise Violation("another run with a trace", text[:2000])
+    for variable in traced.variables.values():
+        traced.last_written(variable)
+    traced.restart(warm=True)
 
 
 def _check(said: str, text: str) -> None:
