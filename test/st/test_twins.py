@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from control.test_gap_on_a_line import DIAMETER, GAP, metered
 
@@ -60,6 +61,20 @@ def nothing(plant: Scenario) -> None:
     pass
 
 
+def level_holds(plant: Scenario) -> None:
+    """The feeder is held from 45 bottles on, and goes on once there are 35."""
+    held = plant.history["belts/feeder/cmd_speed"] == 0.0
+    bottles = plant.history["belts/table/bottles"]
+    begins, ends = np.flatnonzero(np.diff(held.astype(int)) == 1), np.flatnonzero(np.diff(held.astype(int)) == -1)
+    assert len(begins) > 0 and (bottles[begins + 1] == 45).all()
+    assert len(ends) > 0 and (bottles[ends + 1] == 35).all()
+
+
+def gap_holds(plant: Scenario) -> None:
+    """As `test_the_gaps_are_as_asked_for`, which plays the twin in Python."""
+    assert abs(plant.signals["plc/gap/measured"] - GAP) < 0.05 * GAP
+
+
 def stop_packer(plant: Scenario) -> None:
     plant.run_for(26.0)
     plant.inject("machines/packer/stop")
@@ -88,20 +103,24 @@ class Twins:
     right: str
     wrong: str
     """What a mutant has in its place."""
+    holds: Callable[[Scenario], None] = nothing
+    """What the program brings about at the end, and its mutant does not; of others `test_scenarios.py` has it."""
 
 
 TWINS = {
-    "level": Twins(lambda: Scenario("paper_plant"), table_level, nothing, 16, "bottles > LOW", "bottles > HIGH"),
+    "level": Twins(
+        lambda: Scenario("paper_plant"), table_level, nothing, 26, "bottles > LOW", "bottles > HIGH", level_holds
+    ),
     "cascade": Twins(lambda: Scenario("scenarios/zoned_line"), cascade, stop_packer, 20, "(NOT room OR", "(room OR"),
     "v_curve": Twins(lambda: Scenario("scenarios/buffer_lane"), v_curve, stop_filler, 15, "1.0 + MARGIN", "1.0"),
-    "gap": Twins(metered, gap, nothing, 20, "measured - GAP", "GAP - measured"),
+    "gap": Twins(metered, gap, nothing, 20, "measured - GAP", "GAP - measured", gap_holds),
     "jam": Twins(wedged, jam, nothing, 25, "BACK_TIME : TIME := T#1.3s", "BACK_TIME : TIME := T#0.5s"),
     "reject": Twins(lambda: Scenario("scenarios/reject_line"), reject, nothing, 40, "LREAL := 1.2", "LREAL := 1.1"),
 }
 
 
-def hashes(name: str, controller: Controller) -> list[int]:
-    """The state, twice a second."""
+def hashes(name: str, controller: Controller) -> tuple[list[int], Scenario]:
+    """The state, twice a second, and the line at the end."""
     twins = TWINS[name]
     plant = twins.line()
     plant.attach(controller)
@@ -110,19 +129,25 @@ def hashes(name: str, controller: Controller) -> list[int]:
     for _ in range(int(2 * twins.seconds)):
         plant.run_for(0.5)
         found.append(plant.simulation.state_hash())
-    return found
+    return found, plant
 
 
 @pytest.mark.parametrize("name", TWINS)
 def test_a_program_is_its_twin_to_the_bit(name: str, tmp_path: Path) -> None:
     twins = TWINS[name]
-    expected = hashes(name, twins.python())
-    assert hashes(name, StructuredText(PROGRAMS / f"{name}.st")) == expected
+    expected, _ = hashes(name, twins.python())
+    found, plant = hashes(name, StructuredText(PROGRAMS / f"{name}.st"))
+    assert found == expected
+    twins.holds(plant)
     text = (PROGRAMS / f"{name}.st").read_text()
     assert text.count(twins.right) == 1
     mutant = tmp_path / "mutant.st"
     mutant.write_text(text.replace(twins.right, twins.wrong))
-    assert hashes(name, StructuredText(mutant)) != expected
+    found, plant = hashes(name, StructuredText(mutant))
+    assert found != expected
+    if twins.holds is not nothing:
+        with pytest.raises(AssertionError):
+            twins.holds(plant)
 
 
 def test_every_program_is_here() -> None:
