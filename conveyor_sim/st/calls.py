@@ -8,7 +8,7 @@ from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.functions import apply, is_standard
 from conveyor_sim.st.types import BOOL, VOID, BlockType, Member, Type
-from conveyor_sim.st.values import Place, Value, converted, described
+from conveyor_sim.st.values import Place, Value, assignment, converted, described
 
 PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 """Sections of what a call passes."""
@@ -174,5 +174,5 @@ class Calls:
             if member.type != BOOL:
                 raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
             code = f"(not {code})"
-        written = place.write(converted(Value(argument.at, member.type, code), place.type))
+        written = assignment(place, Value(argument.at, member.type, code))
         return [written, *self.noted(expressions, place.root, at)]

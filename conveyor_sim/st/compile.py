@@ -111,8 +111,8 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
     for key in (program.name.lower() for program in scheduled):
         shared = declared.names.globals.members.get(key)
         if shared is not None and isinstance(shared.type, Structure):
-            found = f"found {shared.name}, which has the name of a program"
-            raise SourceError(Position(*shared.at), f"{found}, expected another: {key}/x would be two variables")
+            said = f"found {shared.name}, which has the name of a program"
+            raise SourceError(Position(*shared.at), f"{said}, expected another: {key}/x would be two variables")
     return Compiled(
         file,
         compile(python, f"<{file}>", "exec"),

@@ -32,7 +32,7 @@ class Application:
         first, *others = values
         for other in others:
             kind = unified(first, other, self.hint)
-            if kind is None or isinstance(kind, Structure):
+            if kind is None:
                 found = f"{described(first)} and {described(other)}"
                 raise SourceError(other.at, f"found {found} in {self.name}, expected values of one type")
             literal = first.literal if first.literal and other.literal else ""
@@ -96,7 +96,7 @@ def _operator(word: str) -> Build:
 
 def _compare(call: Application) -> Value:
     kind = call.joined(call.values)
-    if isinstance(kind, Array):
+    if isinstance(kind, (Array, Structure)):
         raise call.refuse(call.values[0], "an elementary type")
     codes = [one.code if kind.kind == "string" else converted(one, kind) for one in call.values]
     return call.given(f"_chain(_{call.name.lower()}, {', '.join(codes)})", BOOL)
@@ -108,7 +108,7 @@ def _pick(python: str, ordered: bool, before: int = 0) -> Build:
     def build(call: Application) -> Value:
         choice, values = call.values[:before], call.values[before:]
         kind = call.joined(values)
-        if ordered and (isinstance(kind, Array) or kind == BOOL):
+        if ordered and (isinstance(kind, (Array, Structure)) or kind == BOOL):
             raise call.refuse(values[0], "numbers, times or texts")
         codes = [one.code if kind.kind == "string" else converted(one, kind) for one in values]
         if kind.kind == "string":

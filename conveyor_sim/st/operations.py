@@ -174,6 +174,23 @@ def rows(values: list[Any], length: int) -> list[list[Any]]:
     return [values[at : at + length] for at in range(0, len(values), length)]
 
 
+def overwrite(target: Any, value: Any) -> None:
+    """Give an array or a structure what another holds."""
+    if isinstance(target, list):
+        if target and isinstance(target[0], (list, Record)):
+            for one, other in zip(target, value, strict=True):
+                overwrite(one, other)
+        else:
+            target[:] = value
+        return
+    for slot in type(target).__slots__:
+        now, new = getattr(target, slot), getattr(value, slot)
+        if isinstance(now, (list, Record)):
+            overwrite(now, new)
+        else:
+            setattr(target, slot, new)
+
+
 class Record:
     """A structure's value; those of a program derive from it."""
 
@@ -300,6 +317,7 @@ NAMES: dict[str, Any] = {
     "_truncated": truncated,
     "_single": single,
     "_copied": copied,
+    "_overwrite": overwrite,
     "_with": with_values,
     "_rows": rows,
     "_Record": Record,

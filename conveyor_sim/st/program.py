@@ -9,7 +9,7 @@ from typing import Any
 
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
-from conveyor_sim.st.operations import Root, copied
+from conveyor_sim.st.operations import Root, copied, overwrite
 from conveyor_sim.st.types import TIME, Type
 from conveyor_sim.st.values import NAMESPACE
 from conveyor_sim.st.variables import Variable, dump, leaves, load, retain
@@ -45,8 +45,8 @@ class Program:
 
     def _begin(self) -> None:
         self._written: dict[tuple[int, str], tuple[int, int]] = {}
-        own = {"_late": self._late, "_noted": self._noted, "_copied_large": self._copied_large}
-        names = {**NAMESPACE, **own, "_rt": self._clock}
+        large = {"_copied_large": self._copied_large, "_overwrite_large": self._overwrite_large}
+        names = {**NAMESPACE, **large, "_rt": self._clock, "_late": self._late, "_noted": self._noted}
         exec(self.compiled.code, names)
         self.globals: Any = names["_g"]
         self.instances: dict[str, Any] = {one.name.lower(): names[one.type.python]() for one in self.compiled.programs}
@@ -82,10 +82,17 @@ class Program:
 
     def _copied_large(self, value: Any, rounds: int) -> Any:
         """An array or a structure as a value of its own; rounds: of a loop, that take as long."""
+        self._spend(rounds)
+        return copied(value)
+
+    def _overwrite_large(self, target: Any, value: Any, rounds: int) -> None:
+        self._spend(rounds)
+        overwrite(target, value)
+
+    def _spend(self, rounds: int) -> None:
         self._clock.left -= rounds
         if self._clock.left < 0:
             self._late()
-        return copied(value)
 
     def _noted(self, variable: Root, line: int, column: int) -> None:
         owner, slot = variable

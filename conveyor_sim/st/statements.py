@@ -12,7 +12,7 @@ from conveyor_sim.st.calls import Calls
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.types import BlockType, Type
-from conveyor_sim.st.values import Place, converted, converts, described
+from conveyor_sim.st.values import Place, assignment, converted, converts, described
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -83,7 +83,7 @@ class Statements:
                 node.at, f"found an assignment to a block, {place.type.name}, expected a call or a variable"
             )
         value = self._expressions.value(node.value, place.type)
-        self._lines.add(place.write(converted(value, place.type)), node.at)
+        self._lines.add(assignment(place, value), node.at)
         self._note(place, node.at)
 
     def _call(self, node: tree.CallStatement) -> None:

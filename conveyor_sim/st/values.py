@@ -160,6 +160,16 @@ def converted(value: Value, target: Type, what: str = "") -> str:
     return value.code
 
 
+def assignment(place: Place, value: Value) -> str:
+    """Code that gives a variable a value. An array or a structure stays where it is: its parts may be passed on."""
+    code = converted(value, place.type)
+    if not isinstance(place.type, (Array, Structure)):
+        return place.write(code)
+    rounds = place.type.size // LARGE
+    arguments = f"{place.code}, {value.code}"
+    return f"_overwrite_large({arguments}, {rounds})" if rounds else f"_overwrite({arguments})"
+
+
 def _has_blocks(kind: Type) -> bool:
     if isinstance(kind, Array):
         return _has_blocks(kind.element)
