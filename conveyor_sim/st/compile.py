@@ -197,17 +197,23 @@ def _schedule(
         return [Scheduled(kind.name, kind) for kind in programs.values()]
     configuration = source.configurations[0]
     known = Expressions(declared.scope(None), calls)
-    tasks = {task.name.lower(): _task(task, known) for task in configuration.tasks}
+    tasks: dict[tuple[str, str], tuple[int, int]] = {}
+    for task in configuration.tasks:
+        if (key := (task.resource, task.name.lower())) in tasks:
+            raise SourceError(task.at, f"found {task.name} again, expected another name")
+        tasks[key] = _task(task, known)
     found: dict[str, Scheduled] = {}
     elements = 0
     for one in configuration.instances:
         if one.type.lower() not in programs:
             raise SourceError(one.at, f"found {one.type}, expected a PROGRAM: {', '.join(programs) or 'there is none'}")
-        if one.task and one.task.lower() not in tasks:
-            raise SourceError(one.at, f"found {one.task}, expected a TASK: {', '.join(tasks) or 'there is none'}")
+        own = tasks.get((one.resource, one.task.lower())) or tasks.get(("", one.task.lower()))
+        if one.task and own is None:
+            names = ", ".join(name for resource, name in tasks if resource in (one.resource, ""))
+            raise SourceError(one.at, f"found {one.task}, expected a TASK: {names or 'there is none'}")
         if one.name.lower() in found:
             raise SourceError(one.at, f"found {one.name} again, expected each program once")
-        interval, priority = tasks[one.task.lower()] if one.task else (0, LOWEST)
+        interval, priority = own or (0, LOWEST)
         kind = programs[one.type.lower()]
         elements += kind.size
         if elements > MOST_ELEMENTS:

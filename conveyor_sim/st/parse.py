@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from typing import Any, TypeVar
@@ -212,7 +213,9 @@ class _Tree(Transformer[Any]):
         return tree.Instance(at_of(items[0]), str(items[0]), str(items[1] or ""), str(items[2]))
 
     def resource(self, items: list[Any]) -> tree.Configuration:
-        return self._gathered(items[0], items[2:])
+        name, own = items[0].lower(), (tree.Task, tree.Instance)
+        inside = [replace(item, resource=name) if isinstance(item, own) else item for item in items[2:]]
+        return self._gathered(items[0], inside)
 
     def configuration(self, items: list[Any]) -> tree.Configuration:
         return self._gathered(items[0], items[1:])

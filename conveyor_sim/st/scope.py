@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 from conveyor_sim.st.errors import Position, SourceError
@@ -52,7 +52,8 @@ class Scope:
         key = name.lower()
         if self.unit is not None and (member := self.unit.members.get(key)):
             if member.section == "VAR_EXTERNAL":
-                return self._global(at, key, name)
+                place = self._global(at, key, name)
+                return replace(place, fixed=place.fixed or f"{name}, a CONSTANT") if member.constant else place
             return place_of(at, "self", member, inside=True)
         if self.names.global_(key) is not None:
             return self._global(at, key, name)

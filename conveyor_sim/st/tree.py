@@ -284,15 +284,18 @@ class Task(Node):
 
     name: str
     fields: tuple[tuple[Position, str, Expression], ...]
+    resource: str = ""
+    """In which it stands, in small letters; "" outside of all."""
 
 
 @dataclass(frozen=True)
 class Instance(Node):
-    """PROGRAM name WITH task : type; task "" where none is given."""
+    """PROGRAM name WITH task : type; task "" where none is given. resource: as of a task."""
 
     name: str
     task: str
     type: str
+    resource: str = ""
 
 
 @dataclass(frozen=True)

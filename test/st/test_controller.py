@@ -78,15 +78,19 @@ def test_located_variables_are_tags_by_their_address_in_the_modbus_map(tmp_path:
     kept.write_text(to_csv(rows))
     where = {row.name: row for row in rows}
     eye, speed = where["photo_eyes/high/blocked"], where["belts/table/cmd_speed"]
+    run, actual = where["machines/packer/run"], where["belts/table/speed"]
     plc = controller(
         tmp_path,
-        f"VAR eye AT %IX{eye.address // 8}.{eye.address % 8} : BOOL; speed AT %QD{speed.address} : REAL; END_VAR",
-        "speed := SEL(eye, 0.25, 0.0);",
+        f"VAR eye AT %IX{eye.address // 8}.{eye.address % 8} : BOOL; speed AT %QD{speed.address} : REAL; "
+        f"run AT %QX{run.address} : BOOL; actual AT %ID{actual.address} : REAL; END_VAR",
+        "speed := SEL(eye, 0.25, 0.0); run := actual >= 0.0;",
         modbus_map=kept,
     )
     plant.attach(plc)
     plant.run_for(0.05)
     assert plant.history["belts/table/cmd_speed"][-1] == 0.25
+    assert plant.history["machines/packer/run"][-1] == 1.0
+    assert plant.signals["plc/main/actual"] == plant.signals["belts/table/speed"] == 0.25
     assert "main/eye <- photo_eyes/high/blocked (by address)" in str(plc.mapping)
     wrong = controller(tmp_path, f"VAR speed AT %QW{speed.address} : INT; END_VAR", modbus_map=kept)
     with pytest.raises(StructuredTextError, match=r"found %QW\d+ for belts/table/cmd_speed, expected 32 bits"):
