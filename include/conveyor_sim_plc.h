@@ -34,6 +34,7 @@ int64_t plc_snapshot(const plc *instance, void *state, int64_t size);
 /* Goes on from such bytes of the same library. 0; else they are none. */
 int32_t plc_restore(plc *instance, const void *state, int64_t size);
 
+/* The end of the instance, and soon of its process: it has a second. Not called after the watchdog has ended it. */
 void plc_destroy(plc *instance);
 
 #endif
