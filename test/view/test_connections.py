@@ -9,7 +9,7 @@ import signal
 import socket
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from contextlib import AsyncExitStack, ExitStack, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,7 +23,7 @@ from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeErro
 
 from conveyor_sim.scada.face import FaceError, Settings
 from conveyor_sim.scada.serving import Serving
-from conveyor_sim.scada.web import server
+from conveyor_sim.scada.web import feed, server
 from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, MOST_VIEWERS
 from conveyor_sim.scada.web.viewer import MOST_WAITING, UNSEEN
 
@@ -289,6 +289,26 @@ def test_who_shows_no_frames_gets_no_more_and_all_that_happened(live: Live) -> N
 
     drawn, happened = run(work())
     assert drawn == UNSEEN and happened >= 1
+
+
+def test_a_picture_is_packed_once_however_many_look(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    packed: list[Any] = []
+    really_pack = feed._packed
+
+    def counted(picture: Any) -> bytes:
+        packed.append((picture.tick, *picture.drawn.values()))
+        return really_pack(picture)
+
+    monkeypatch.setattr(feed, "_packed", counted)
+
+    async def work() -> None:
+        async with ClientSession() as session, AsyncExitStack() as stack:
+            looking = [session.ws_connect(f"{live.url}/live", origin=live.url) for _ in range(8)]
+            sockets = [await stack.enter_async_context(one) for one in looking]
+            await asyncio.gather(*(frames(socket, 20) for socket in sockets))
+
+    run(work())
+    assert len(packed) >= 20 and len(packed) == len(set(packed)), "none was packed anew for another page"
 
 
 def test_no_more_pages_look_than_may(live: Live) -> None:
