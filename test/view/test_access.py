@@ -121,9 +121,9 @@ def test_so_it_does_on_a_line_that_runs_for_one_who_may_command_it(open_page: Ca
     page = open_page(live.url)
     signed_in(page, "tess")
     page.wait_for_selector("#panel_alarms .alarm", state="attached")
-    page.focus("text=Pause the line")
+    page.focus("text=Pause run")
     page.keyboard.press("Enter")
-    page.wait_for_selector("text=Let it go on")
+    page.wait_for_selector("text=Resume run")
     show_device(page, "photo_eyes/exit")
     page.focus("[aria-label='Watch photo_eyes/exit/blocked']")
     page.keyboard.press("Enter")
@@ -131,9 +131,9 @@ def test_so_it_does_on_a_line_that_runs_for_one_who_may_command_it(open_page: Ca
     page.keyboard.press("b")
     for panel in (*PANELS, "watch"):
         go_through(page, panel)
-    page.focus("text=Let it go on")
+    page.focus("text=Resume run")
     page.keyboard.press(" ")
-    page.wait_for_selector("text=Pause the line")
+    page.wait_for_selector("text=Pause run")
 
 
 def test_a_line_that_runs_is_commanded_by_keys_alone(open_page: Callable[[str], Any], live: Live) -> None:

@@ -51,7 +51,7 @@ def test_the_picture_follows_the_line_and_says_how_late_it_is(page: Any, live: L
     soon(page, lambda: clock(page) > first + 0.5, "time goes on")
     assert page.inner_text("#link") == "● Live" and page.inner_text("#run") == "running"
     soon(page, lambda: page.inner_text("#latency").endswith(" ms behind"), "how late it is")
-    assert page.inner_text("#scene") == "small_packaging"
+    assert page.inner_text("#scene") == "small_packaging" and page.inner_text("#who") == "read only"
     drawn = clock(page)
     assert live.source.shown.tick * 0.01 >= drawn - 0.005
 
@@ -59,8 +59,8 @@ def test_the_picture_follows_the_line_and_says_how_late_it_is(page: Any, live: L
 def test_bottles_are_drawn_where_the_source_has_them_to_a_pixel(page: Any, live: Live) -> None:
     signed_in(page, "tess")
     until(lambda: live.source.shown.tick > 1000, "bottles behind the capper")
-    page.click("text=Pause the line")
-    page.wait_for_selector("text=Let it go on")
+    page.click("text=Pause run")
+    page.wait_for_selector("text=Resume run")
     until(lambda: live.source.picture.drawn["bottles"]().tick == live.source.shown.tick, "a picture of where it stands")
     drawn = live.source.picture.drawn["bottles"]()
     soon(
@@ -73,9 +73,9 @@ def test_bottles_are_drawn_where_the_source_has_them_to_a_pixel(page: Any, live:
     assert int(page.get_attribute("body", "data-bottles")) == len(bottles.id)
     assert count_where_they_are(page, bottles, lambda x: 2.1 < x < 2.4 or 2.6 < x < 3.5) >= 2
     before = clock(page)
-    page.click("text=One tick")
+    page.click("text=Step one tick")
     soon(page, lambda: clock(page) == pytest.approx(before + 0.01), "one tick")
-    page.click("text=Let it go on")
+    page.click("text=Resume run")
     soon(page, lambda: clock(page) > before + 0.2, "time goes on")
 
 
@@ -138,7 +138,7 @@ def test_a_viewer_is_refused_with_the_reason(page: Any, live: Live) -> None:
     signed_in(page, "vic")
     set_speed(page, "0.3")
     told(page, "Refused: vic is a viewer, who only reads")
-    page.click("text=Pause the line")
+    page.click("text=Pause run")
     told(page, "vic is a viewer")
     assert live.source.shown.values[SETPOINT] == 0.5 and live.source.shown.run.text == "running"
     page.click("#sign")
@@ -211,15 +211,15 @@ def test_alarms_are_shelved_acknowledged_and_reset(page: Any) -> None:
     page.click("#tab_alarms")
     row = page.locator("#panel_alarms li", has_text="queue_stands")
     page.wait_for_selector(".alarm.error:has-text('queue_stands')")
-    page.click("[aria-label='Shelve 1 min queue_stands']")
+    page.click("#panel_alarms [aria-label='Shelve 1 min queue_stands']")
     soon(page, lambda: "shelved by web tess" in row.inner_text(), "it is shelved")
-    page.click("[aria-label='Unshelve queue_stands']")
-    page.click("[aria-label='Acknowledge queue_stands']")
+    page.click("#panel_alarms [aria-label='Unshelve queue_stands']")
+    page.click("#panel_alarms [aria-label='Acknowledge queue_stands']")
     soon(page, lambda: "\nacknowledged by web tess" in row.inner_text(), "it is acknowledged")
     page.click("#tab_watch")
     page.click("[aria-label='Force photo_eyes/queue/blocked off']")
     page.click("#tab_alarms")
-    page.click("[aria-label='Reset queue_stands']")
+    page.click("#panel_alarms [aria-label='Reset queue_stands']")
     soon(page, lambda: row.count() == 0, "it is normal")
     page.click("#tab_watch")
     page.click("[aria-label='End the force on photo_eyes/queue/blocked']")
@@ -232,12 +232,12 @@ def test_a_line_that_has_ended_says_so_and_begins_anew(open_page: Callable[[str]
         with Serving(source, [(WEB, 0)], Settings(users=users / "users")) as serving:
             page = open_page(serving.faces[0].address)
             page.wait_for_selector("#run.stands:has-text('ended')")
-            assert clock(page) == 1.0 and not page.locator("text=Pause the line").is_visible()
+            assert clock(page) == 1.0 and not page.locator("text=Pause run").is_visible()
             signed_in(page, "jo")
-            page.click("text=Begin anew")
-            page.click("text=Begin anew: sure?")
+            page.click("text=Reset run")
+            page.click("text=Reset run: sure?")
             page.wait_for_selector("#run:has-text('paused')")
-            page.click("text=Let it go on")
+            page.click("text=Resume run")
             soon(page, lambda: 0.0 < clock(page) < 1.0, "time goes on")
 
 
@@ -276,9 +276,13 @@ def test_a_recording_is_played_on_the_page(open_page: Callable[[str], Any], user
     ):
         page = open_page(serving.faces[0].address)
         soon(page, lambda: int(page.get_attribute("body", "data-bottles")) > 3, "its bottles")
+        page.select_option("#colour", "force")
+        weak = page.inner_text("#legend")
+        assert source.control("seek", 15.0, "test") == ""
+        soon(page, lambda: page.inner_text("#legend") != weak, "the scale of what came since")
         signed_in(page, "tess")
-        page.click("text=Pause the line")
-        page.wait_for_selector("text=Let it go on")
+        page.click("text=Pause run")
+        page.wait_for_selector("text=Resume run")
         stands = clock(page)
         assert source.control("seek", max(0.0, stands - 0.5), "test") == ""
         soon(page, lambda: clock(page) < stands, "it went back")

@@ -80,6 +80,9 @@ def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
 def test_the_page_opens_before_what_failed_and_says_it_as_text(page: Any) -> None:
     assert clock(page) == pytest.approx(17.0, abs=0.05)
     assert page.inner_text("#notice") == "always: no more than 20 bottles <script>alert(3)</script>"
+    assert page.get_attribute("#news", "class") == "wrong"
+    press(page, "Home", "n")
+    assert page.inner_text("#notice").startswith("fault") and page.get_attribute("#news", "class") == ""
 
 
 def test_what_is_to_be_noticed_is_whole_and_dismissed(page: Any) -> None:
@@ -93,8 +96,22 @@ def test_what_is_to_be_noticed_is_whole_and_dismissed(page: Any) -> None:
 def test_colours_of_states_and_of_where_the_time_went_are_explained(page: Any) -> None:
     seek(page, 12.0)
     page.click("#tab_line")
-    states, times = (" ".join(key.split()) for key in page.locator("#panel_line .key").all_inner_texts())
-    assert states == "Suspended Execute Held" and times == "running starved"
+    states, times = page.locator("#panel_line .key").all()
+    said = [entry.inner_text() for entry in states.locator(".entry").all()]
+    assert said == ["Suspended, starved", "Suspended, blocked", "Execute", "Held"]
+    assert " ".join(times.inner_text().split()) == "running starved"
+
+
+def test_bars_say_what_machines_do_now_and_for_what_they_wait(page: Any) -> None:
+    page.click("#tab_line")
+    seek(page, 22.0)
+    label = page.get_attribute("#panel_line .bars", "aria-label")
+    assert "capper Held" in label and "filler Suspended, blocked" in label
+    x, y = (round(part) for part in to_pixels(page, 0.06, 0.0))
+    orange = np.array([0xE6, 0x9F, 0x00])  # blocked: of the bar's end, and of the filler on the plan
+    assert (np.abs(canvas(page)[y - 8 : y + 9, x - 12 : x + 1] - orange) < 30).all(axis=2).any()
+    bar = canvas(page, "#panel_line .bars")[38 + 19 + 7]  # of the second machine, at half its height
+    assert (np.abs(bar[round(len(bar) * 21.0 / 24.0)] - orange) < 30).all()
 
 
 def test_the_plan_stays_where_it_is_unless_the_place_is_out_of_sight(page: Any) -> None:
@@ -157,6 +174,21 @@ def test_events_are_filtered_and_a_click_jumps_there(page: Any) -> None:
     assert clock(page) == pytest.approx(8.0, abs=0.05)
 
 
+def test_a_state_of_a_machine_is_one_event_with_what_is_known_of_why(page: Any) -> None:
+    page.click("#tab_events")
+    seek(page, 16.0)
+    for kind in ("alarms", "faults", "commands"):
+        page.uncheck(f"#panel_events input[value={kind}]")
+    settled(page)
+    said = [" ".join(row.split()) for row in page.locator("#panel_events .event").all_inner_texts()]
+    assert "15.68 s machine state machines/capper Held, failure jam" in said
+    assert any(row.endswith("machine state machines/filler Suspended, blocked") for row in said)
+    assert not any("category" in row for row in said)
+    page.fill("#panel_events input[type=search]", "filler/category")
+    settled(page)
+    assert page.locator("#panel_events .event").count() > 0, "who looks for them finds them"
+
+
 def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> None:
     seek(page, 12.0)
     x, y = to_pixels(page, 1.5, 0.06)
@@ -169,6 +201,11 @@ def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> 
     row = page.locator("#panel_device tr", has_text="cmd_speed")
     assert row.locator("td").inner_text() == "0.3 m/s"
     assert "by test since 10.01 s" in row.inner_text()
+    assert not page.locator("#panel_device .kind .badge").is_visible()
+    page.select_option("#panel_device select", "zones/before_capper")
+    settled(page)
+    assert page.inner_text("#panel_device .kind .badge") == "▲ 1 alarm"
+    assert "capper_full" in page.inner_text("#panel_device .rows")
 
 
 def test_an_eye_is_lit_while_it_is_blocked(page: Any) -> None:
@@ -219,6 +256,19 @@ def test_bottles_are_coloured_as_chosen_by_a_key(page: Any) -> None:
     press(page, "c")
     assert page.input_value("#colour") == "speed"
     assert "m/s" in page.inner_text("#legend")
+    assert "contacts 0" in page.inner_text("#legend") and " N" in page.inner_text("#legend")
+    page.uncheck("#forces")
+    settled(page)
+    assert "contacts" not in page.inner_text("#legend")
+
+
+def test_it_is_zoomed_by_buttons_too(page: Any) -> None:
+    scales = []
+    for button in ("#fit", "#closer", "#farther"):
+        page.click(button)
+        settled(page)
+        scales.append(float(page.get_attribute("#plan", "data-camera").split()[2]))
+    assert scales == pytest.approx([scales[0], 1.5 * scales[0], scales[0]])
 
 
 def test_rails_are_coloured_by_what_they_have_borne(page: Any) -> None:
@@ -241,9 +291,23 @@ def test_signals_are_put_on_the_trends_and_taken_off(page: Any) -> None:
     press(page, "Enter")
     chip = page.locator(".chip", has_text="zones/before_capper/bottles")
     assert chip.count() == 1
+    seek(page, 12.0)
+    shown = page.locator(".chip", has_text="belts/line/speed").inner_text()
+    assert " ".join(shown.split()) == "belts/line/speed 0.3 m/s ✕", "what it is then"
     assert page.locator("#trends canvas").count() == 1
     chip.click()
     assert chip.count() == 0
+
+
+def test_switches_have_a_lane_each_on_the_trends(page: Any) -> None:
+    page.uncheck("#names")
+    seek(page, 12.0)
+    pixels = canvas(page, "#trends canvas")
+    lanes = []
+    for colour in ((0x00, 0x9E, 0x73), (0xCC, 0x79, 0xA7)):  # of the two eyes, the third and the fourth signal
+        rows = np.nonzero((np.abs(pixels - np.array(colour)) < 12).all(axis=2).sum(axis=1) > 20)[0]
+        lanes.append((rows.min(), rows.max()))
+    assert lanes[0][0] < lanes[0][1] < lanes[1][0] < lanes[1][1]
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (820, 1180)], ids=["laptop", "tablet"])
@@ -260,6 +324,7 @@ def test_everything_fits_and_has_a_name_for_those_who_hear_it(page: Any, size: t
     )
     assert nameless == []
     assert page.locator("#plan").bounding_box()["height"] > 200
+    assert page.locator("#scrubber").bounding_box()["width"] > 0.5 * size[0]
 
 
 def test_long_names_stay_where_they_belong(browser: Any, tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.observe.events import Event, event_columns
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.view.one_file import write_page
@@ -161,13 +162,20 @@ def test_a_server_that_ends_is_waited_for(browser: Any, bag: Path) -> None:
         page.close()
 
 
-def written(folder: Path, seconds: float, bottles: int = 300) -> Path:
-    """A recording of many bottles in rows of 60, 0.1 m apart, at 50 Hz on the small line, not simulated."""
+def written(folder: Path, seconds: float, bottles: int = 300, rejected: int = 0) -> Path:
+    """A recording of many bottles in rows of 60, 0.1 m apart, at 50 Hz on the small line, not simulated. rejected: how
+    many of the first are, at 0.1 s.
+    """
     simulation = Simulation(load_scene(LINE))
     ids, zeros = np.arange(bottles, dtype=np.uint64), np.zeros(bottles)
     kinds, belts = np.zeros(bottles, np.uint16), np.zeros(bottles, np.int32)
     with Recorder(folder) as recorder:
         Outputs(simulation, [recorder], run_id="run").start()
+        if rejected:
+            events = event_columns(
+                [Event(10, "bottle_rejected", "machines/x", one, 1.0, "") for one in range(rejected)], rejected
+            )
+            recorder.write("events", TOPICS["events"].pack(events, Header(10, 100_000_000, "world")), 100_000_000)
         for tick in range(2, round(100 * seconds) + 1, 2):
             x, y = 0.1 * (ids % 60) + 0.3 * np.sin(0.001 * tick), 0.1 * (ids // 60) + 0.2
             columns = BottleColumns(ids, kinds, x, y, zeros, zeros, zeros, zeros, belts, zeros, zeros)
@@ -240,6 +248,26 @@ def test_thousands_of_bottles_are_drawn_where_they_are_too(browser: Any, tmp_pat
         x, y = to_pixels(page, 0.1 * column + 0.3 * np.sin(0.02), 0.1 * row + 0.2)
         found = disc(pixels, TYPE_COLOURS[0], x, y, 3.0)
         assert np.abs(found - [x, y]).max() <= 1.0
+    page.close()
+
+
+def test_bottles_that_are_rejected_are_crossed_out(browser: Any, tmp_path: Path) -> None:
+    html = write_page(written(tmp_path / "bag", 0.2, 20, rejected=1), tmp_path / "page.html")
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.goto(html.as_uri())
+    page.wait_for_selector("body[data-ready]", timeout=60_000)
+    page.uncheck("#names")
+    page.select_option("#colour", "defect")
+    page.focus("#plan")
+    page.keyboard.press("End")
+    settled(page)
+    pixels, middles = canvas(page), []
+    for bottle in range(2):
+        x, y = (round(part) for part in to_pixels(page, 0.1 * bottle + 0.3 * np.sin(0.02), 0.2))
+        middles.append(pixels[y - 1 : y + 2, x - 1 : x + 2].mean(axis=(0, 1)))
+    assert middles[1] == pytest.approx([0, 114, 178], abs=10), "one that is not"
+    assert middles[0].sum() < 0.75 * middles[1].sum(), "the cross is dark"
+    assert "✕ rejected" in page.inner_text("#legend")
     page.close()
 
 

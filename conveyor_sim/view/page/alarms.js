@@ -4,6 +4,25 @@ import { controlsOfAlarm } from "./controls.js";
 import { element, refill, seconds, titled } from "./dom.js";
 import { ALARM_STATES } from "./story.js";
 
+// Two lists of alarms with the same key look the same.
+const keyOfAlarms = (alarms) => alarms.map((alarm) => `${alarm.number} ${alarm.state} ${alarm.since} ${alarm.firstOut}`).join("|");
+
+function row(alarm, view) {
+  return element("li", {},
+    element("button", { class: `alarm ${alarm.stands ? alarm.alarm_class || "error" : "gone"}`, dataset: { key: alarm.number }, onclick: () => view.jump(alarm.since, alarm.tag) },
+      element("span", { class: "icon", "aria-hidden": "true" }, alarm.stands ? (alarm.alarm_class === "message" ? "●" : "▲") : "○"),
+      element("span", { class: "what" }, element("b", {}, alarm.id), ` ${alarm.text}`,
+        element("small", {}, `${ALARM_STATES[alarm.state]}${alarm.by ? ` by ${alarm.by}` : ""} · since ${seconds(alarm.since)} · priority ${alarm.priority}`)),
+      alarm.firstOut ? element("span", { class: "badge" }, "first out") : null), controlsOfAlarm(alarm, view));
+}
+
+// Writes a list of alarms if it has changed. key: of what it says already; the new one is returned.
+export function fillAlarms(list, alarms, view, nothing, key) {
+  const now = keyOfAlarms(alarms);
+  if (now !== key) refill(list, alarms.length ? alarms.map((alarm) => row(alarm, view)) : [element("li", { class: "muted" }, nothing)]);
+  return now;
+}
+
 export class Alarms {
   constructor(view) {
     this.view = view;
@@ -14,17 +33,7 @@ export class Alarms {
 
   draw() {
     const { story, clock } = this.view, alarms = story.alarmsAt(clock.time);
-    const key = alarms.map((alarm) => `${alarm.number} ${alarm.state} ${alarm.since} ${alarm.firstOut}`).join("|");
-    if (key === this.drawn) return;
-    this.drawn = key;
-    const rows = alarms.map((alarm) => element("li", {},
-      element("button", { class: `alarm ${alarm.stands ? alarm.alarm_class || "error" : "gone"}`, dataset: { key: alarm.number }, onclick: () => this.view.jump(alarm.since, alarm.tag) },
-        element("span", { class: "icon", "aria-hidden": "true" }, alarm.stands ? (alarm.alarm_class === "message" ? "●" : "▲") : "○"),
-        element("span", { class: "what" }, element("b", {}, alarm.id), ` ${alarm.text}`,
-          element("small", {}, `${ALARM_STATES[alarm.state]}${alarm.by ? ` by ${alarm.by}` : ""} · since ${seconds(alarm.since)} · priority ${alarm.priority}`)),
-        alarm.firstOut ? element("span", { class: "badge" }, "first out") : null), controlsOfAlarm(alarm, this.view)));
-    refill(this.list, rows.length ? rows : [element("li", { class: "muted" }, "All alarms are normal.")]);
-    this.count = alarms.filter((alarm) => alarm.stands).length;
-    this.view.badge("alarms", this.count);
+    this.drawn = fillAlarms(this.list, alarms, this.view, "All alarms are normal.", this.drawn);
+    this.view.badge("alarms", alarms.filter((alarm) => alarm.stands).length);
   }
 }

@@ -2,11 +2,11 @@
 
 import { lastUpTo } from "./block.js";
 import { palette } from "./colours.js";
-import { stateColour } from "./devices.js";
-import { element, keyOf, sharp, short, titled } from "./dom.js";
-import { stateName } from "./story.js";
+import { element, keyOf, seconds, sharp, short, titled } from "./dom.js";
+import { stateColour, stateName, stateOf } from "./story.js";
 
-const ROW = 26, NAME = 96, LETTERS = 14; // of a name
+const ROW = 38, BAR = 14, UNDER = 20; // px of a machine, of its bar, of what the ends of time stand under
+const LETTERS = 24; // of a name
 const STATE = /^machines\/.*\/state$/;
 
 export class Bars {
@@ -22,12 +22,11 @@ export class Bars {
   named() {
     const { story, recording: { head, tags } } = this.view;
     const never = head.signals.filter((name) => STATE.test(name) && Number.isFinite(tags.get(name)?.initial)).map((name) => name.replace(/\/state$/, ""));
-    this.names = [...new Set([...story.machines.keys(), ...never])].sort();
-    const states = [...story.machines.values()].flat().map(({ state }) => state);
-    const initial = this.names.map((name) => tags.get(`${name}/state`)?.initial).filter(Number.isFinite);
-    this.key.replaceChildren(...keyOf([...new Set([...states, ...initial])].sort((a, b) => a - b).map((state) => [stateColour(state), stateName(state)])));
-    this.canvas.setAttribute("aria-label", `${titled("States over time", this.view)} of ${this.names.join(", ") || "no machine"}. Enter goes to the next change.`);
-    this.canvas.style.height = `${this.names.length * ROW + 4}px`;
+    this.names = [...new Set([...story.machines.keys(), ...never])].filter((name) => STATE.test(`${name}/state`)).sort();
+    const all = this.names.flatMap((name) => [story.initially(name), ...(story.machines.get(name) ?? [])]).filter(({ state }) => Number.isFinite(state));
+    const looks = new Map(all.sort((a, b) => a.state - b.state).map(({ state, category }) => [stateName(state, category), stateColour(state, category)]));
+    this.key.replaceChildren(...keyOf([...looks].map(([name, colour]) => [colour, name])));
+    this.canvas.style.height = `${this.names.length * ROW + UNDER}px`;
     this.canvas.hidden = this.key.hidden = !this.names.length;
     this.note.hidden = this.view.letter === "B"; // said once
     this.note.textContent = this.names.length ? "A click on a bar jumps to that time, Enter to the next change." : "There is no machine.";
@@ -40,8 +39,7 @@ export class Bars {
 
   _jump(event) {
     const [from, to] = this._span(), box = this.canvas.getBoundingClientRect();
-    const share = (event.clientX - box.left - NAME) / (box.width - NAME);
-    if (share >= 0) this.view.jump(from + share * (to - from));
+    this.view.jump(from + ((event.clientX - box.left) / box.width) * (to - from));
   }
 
   _next() {
@@ -54,32 +52,40 @@ export class Bars {
     const context = sharp(this.canvas);
     if (!context) return;
     const { story, clock } = this.view, colours = palette(), [from, to] = this._span(), width = this.canvas.clientWidth;
-    const x = (time) => NAME + ((time - from) / Math.max(to - from, 1e-9)) * (width - NAME);
-    context.font = "12px system-ui, sans-serif";
+    const x = (time) => ((time - from) / Math.max(to - from, 1e-9)) * width, said = [];
     context.textBaseline = "middle";
     this.names.forEach((name, row) => {
-      const changes = story.machines.get(name) ?? [], top = row * ROW + 4;
-      context.fillStyle = colours.ink;
-      context.fillText(short(name.split("/").pop(), LETTERS), 0, top + 9, NAME - 6);
-      const initial = changes.length ? this.view.recording.tags.get(`${name}/state`)?.initial : this.view.signal(`${name}/state`);
-      const all = initial === undefined || initial === null ? changes : [{ time: from, state: initial }, ...changes];
+      const top = row * ROW, changes = story.machines.get(name) ?? [];
+      const first = changes.length ? story.initially(name) : stateOf(this.view, name);
+      const all = [...(Number.isFinite(first.state) ? [{ time: from, ...first }] : []), ...changes];
       all.forEach((change, i) => {
         const end = all[i + 1]?.time ?? to;
-        context.fillStyle = stateColour(change.state);
-        context.fillRect(x(change.time), top, Math.max(1, x(end) - x(change.time)), 18);
+        context.fillStyle = stateColour(change.state, change.category);
+        context.fillRect(x(change.time), top + 19, Math.max(1, x(end) - x(change.time)), BAR);
       });
-      const now = all[lastUpTo(all.map(({ time }) => time), clock.time)];
-      if (now) {
-        const text = stateName(now.state);
-        context.fillStyle = colours.halo;
-        context.globalAlpha = 0.85;
-        context.fillRect(NAME + 4, top + 2, context.measureText(text).width + 8, 14);
-        context.globalAlpha = 1;
-        context.fillStyle = colours.ink;
-        context.fillText(text, NAME + 8, top + 9.5);
-      }
+      const now = all[lastUpTo(all.map(({ time }) => time), clock.time + 1e-6)], text = now ? stateName(now.state, now.category) : "", plain = name.split("/").pop();
+      said.push(`${plain} ${text}`);
+      context.fillStyle = colours.ink;
+      context.font = "12px system-ui, sans-serif";
+      context.textAlign = "right";
+      context.fillText(text, width, top + 9);
+      context.font = "600 12px system-ui, sans-serif";
+      context.textAlign = "left";
+      context.fillText(short(plain, LETTERS), 0, top + 9, width - 120);
     });
-    context.fillStyle = colours.ink;
-    context.fillRect(x(clock.time) - 1, 0, 2, this.names.length * ROW);
+    const bottom = this.names.length * ROW;
+    this.names.forEach((_, row) => {
+      context.fillStyle = colours.halo;
+      context.fillRect(x(clock.time) - 2, row * ROW + 16, 4, BAR + 6);
+      context.fillStyle = colours.ink;
+      context.fillRect(x(clock.time) - 1, row * ROW + 16, 2, BAR + 6);
+    });
+    context.fillStyle = colours.muted;
+    context.font = "11px system-ui, sans-serif";
+    context.fillText(seconds(from), 0, bottom + 6);
+    context.textAlign = "right";
+    context.fillText(seconds(to), width, bottom + 6);
+    const label = `${titled("States over time", this.view)}. Now: ${said.join(", ") || "no machine"}. Enter goes to the next change.`;
+    if (this.canvas.getAttribute("aria-label") !== label) this.canvas.setAttribute("aria-label", label);
   }
 }

@@ -13,13 +13,14 @@ export class Bottle {
     this.speed = element("canvas", { class: "spark", role: "img", "aria-label": "Speed over the last 10 s" });
     this.force = element("canvas", { class: "spark", role: "img", "aria-label": "Peak force over the last 10 s" });
     this.root = element("section", {}, element("h2", {}, titled("Bottle", view)), this.facts,
-      element("label", { class: "check" }, this.follow, " Follow it (F)"), this.speed, this.force);
+      this.chosen = element("div", {}, element("label", { class: "check" }, this.follow, " Follow it (F)"), this.speed, this.force));
   }
 
   draw() {
     const { view } = this, { clock, recording, story } = view;
-    if (view.bottle === null) {
-      this.facts.replaceChildren(element("dd", { class: "muted" }, "Click a bottle on the plan."));
+    this.chosen.hidden = view.bottle === null;
+    if (this.chosen.hidden) {
+      this.facts.replaceChildren(element("dd", { class: "muted whole" }, "Click a bottle on the plan, or choose one with B."));
       return;
     }
     const points = recording.trace(view.bottle, clock.time - SHOWN, clock.time), now = points[points.length - 1];
@@ -29,7 +30,7 @@ export class Bottle {
       ["on the line since", fed === undefined ? "before the start" : seconds(fed)],
       ["place", frame ? `${frame.x.toFixed(3)}, ${frame.y.toFixed(3)} m` : "not on the line now"],
       ["speed", frame ? `${frame.speed.toFixed(2)} m/s` : "–"], ["force", frame ? `${frame.force.toPrecision(3)} N` : "–"],
-      [`peak of ${SHOWN} s`, `${most.toPrecision(3)} N`], ["thrown out", story.rejected.has(view.bottle) ? "yes" : "no"]];
+      [`peak of ${SHOWN} s`, `${most.toPrecision(3)} N`], ["rejected", story.rejected.has(view.bottle) ? "yes" : "no"]];
     this.facts.replaceChildren(...rows.flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)]));
     this.follow.checked = view.following;
     if (now) {
@@ -43,13 +44,13 @@ export class Bottle {
     if (!context) return;
     const colours = palette(), { clientWidth: width, clientHeight: height } = canvas, to = this.view.clock.time;
     const highest = Math.max(0, ...points.map(([, value]) => value)), most = Math.max(1e-3, highest);
-    context.strokeStyle = "#0072b2";
+    context.strokeStyle = colours.line;
     context.lineWidth = 1.5;
     context.beginPath();
     points.forEach(([time, value], k) => context[k ? "lineTo" : "moveTo"](width * (1 - (to - time) / SHOWN), height - 4 - (value / most) * (height - 22)));
     context.stroke();
     context.fillStyle = colours.muted;
     context.font = "12px system-ui, sans-serif";
-    context.fillText(`${name}, up to ${+highest.toPrecision(3)} ${unit}`, 4, 12);
+    context.fillText(`${name} over ${SHOWN} s, up to ${+highest.toPrecision(3)} ${unit}`, 4, 12);
   }
 }

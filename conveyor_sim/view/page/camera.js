@@ -1,6 +1,7 @@
 // From metres to pixels of the canvas, and back: zoomed by the wheel, two fingers or keys, moved by dragging.
 
 const MOST = 20000; // px a metre
+const UNDER = 36; // px at the lower edge that a legend may hide
 
 export class Camera extends EventTarget {
   constructor(bounds) {
@@ -22,9 +23,9 @@ export class Camera extends EventTarget {
   fit(box = this.bounds, margin = 40) {
     const [x0, y0, x1, y1] = box;
     this.x = (x0 + x1) / 2;
-    this.y = (y0 + y1) / 2;
-    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - 2 * margin) / Math.max(y1 - y0, 0.01));
+    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - UNDER - 2 * margin) / Math.max(y1 - y0, 0.01));
     this.scale = Math.min(MOST, Math.max(1, fitting));
+    this.y = (y0 + y1 - UNDER / this.scale) / 2;
     this._changed(true);
   }
 

@@ -7,12 +7,12 @@ export const CATEGORIES = {
 const LIGHT = {
   paper: "#f6f8fa", belt: "#dde3e9", beltEdge: "#98a4b0", slat: "#c6ced6", chevron: "#5b6875", rail: "#111827", ink: "#1f2933",
   halo: "#ffffff", muted: "#616e7c", mover: "#a3447f", eye: "#0e5a8a", lit: "#d1330d", zone: "#4d5f0a", passage: "#5b21b6",
-  entry: "#00735c", exit: "#a3447f", edge: "#243b53", select: "#d1330d", force: "#b3200a",
+  entry: "#00735c", exit: "#a3447f", edge: "#243b53", select: "#d1330d", force: "#b3200a", line: "#0072b2",
 };
 const DARK = {
   paper: "#10161d", belt: "#26313c", beltEdge: "#4b5b6b", slat: "#33414f", chevron: "#8b9bab", rail: "#e4e9ee", ink: "#e4e9ee",
   halo: "#10161d", muted: "#93a1af", mover: "#e79fc6", eye: "#56b4e9", lit: "#ff6b3d", zone: "#b8c94a", passage: "#b79bff",
-  entry: "#35c9a5", exit: "#e79fc6", edge: "#c9d3dc", select: "#ffb000", force: "#ff6b3d",
+  entry: "#35c9a5", exit: "#e79fc6", edge: "#c9d3dc", select: "#ffb000", force: "#ff6b3d", line: "#56b4e9",
 };
 
 export function isDark() {
@@ -45,7 +45,7 @@ const FAR = 50; // mm between two recordings, and all above it
 
 export const colourings = (view) => Object.keys(COLOURINGS).filter((name) => name !== "apart" || view.rival);
 
-// How bottles are coloured: a colour for each bottle, and what the legend says of it.
+// How bottles are coloured: a colour for each bottle, which are crossed out, and what the legend says of it.
 export const COLOURINGS = {
   type: {
     label: "by type",
@@ -59,7 +59,8 @@ export const COLOURINGS = {
   defect: {
     label: "by defect",
     of: (bottle, view) => (view.story.rejected.has(bottle.id) ? SERIES[1] : SERIES[0]),
-    legend: () => [[SERIES[0], "not thrown out"], [SERIES[1], "thrown out, now or later"]],
+    crossed: (bottle, view) => view.story.rejected.has(bottle.id),
+    legend: () => [[SERIES[0], "not rejected"], [SERIES[1], "✕ rejected, now or later"]],
   },
 };
 

@@ -1,6 +1,6 @@
 // The bar of a line that runs: whether it is there, how late the picture is, its run, and who sits here.
 
-import { byId, element, seconds } from "./dom.js";
+import { byId, element, seconds, warn } from "./dom.js";
 import { wallTime } from "./live.js";
 
 const SURE = 5000; // ms in which a second click counts
@@ -14,11 +14,11 @@ export class Desk {
     Object.assign(this, { view, about, status: about.status, latency: 0, told: 0, given: new Map() });
     const { line } = view;
     this.link = element("span", { id: "link", role: "status" });
-    this.late = element("span", { id: "latency", title: "From the tick of the line to its picture here" });
+    this.late = element("span", { id: "latency", title: "Latency: from the tick of the line to its picture on this screen" });
     this.run = element("span", { id: "run" });
     this.buttons = new Map();
     const can = about.users ? about.controls : [];
-    const controls = [["pause", "Pause the line", []], ["resume", "Let it go on", []], ["step", "One tick", [1]], ["reset", "Begin anew", []]]
+    const controls = [["pause", "Pause run", []], ["resume", "Resume run", []], ["step", "Step one tick", [1]], ["reset", "Reset run", []]]
       .filter(([what]) => can.includes(what)).map(([what, label, values]) => {
         const button = element("button", { onclick: () => (what === "reset" ? this._sure(button, label) : this.ask("control", [what], values)) }, label);
         this.buttons.set(what, button);
@@ -57,7 +57,7 @@ export class Desk {
     for (const [what, button] of this.buttons) button.hidden = state !== "live" || !useful[what];
     this.late.hidden = state !== "live";
     const { name, role } = line.person;
-    this.who.textContent = name ? `${name} (${role})` : "";
+    this.who.textContent = name ? `${name} (${role})` : state === "live" ? "read only" : "";
     this.sign.textContent = name ? "Sign out" : "Sign in";
     document.body.dataset.person = name;
     this.view.touch();
@@ -76,7 +76,7 @@ export class Desk {
     this.told = now;
     const age = !this.at || this.stands ? 0 : wallTime() + this.view.line.offset - this.at;
     this.late.classList.toggle("stale", clock.live && age > STALE);
-    const late = age > STALE ? `nothing new for ${age.toFixed(0)} s` : this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
+    const late = this.stands ? "" : age > STALE ? `nothing new for ${age.toFixed(0)} s` : this.shown ? `${Math.max(0, Math.round(1000 * this.latency))} ms behind` : "";
     const text = clock.live ? late : `${seconds(this.view.recording.end - clock.time, 1)} ago`;
     if (this.late.textContent !== text) this.late.textContent = text;
   }
@@ -86,7 +86,7 @@ export class Desk {
     for (const [text, time] of this.given) if (wallTime() > time + REMEMBERED) this.given.delete(text);
     this.given.set(names.join(", "), wallTime());
     const { refused } = await this.view.line.ask({ do: what, names, values });
-    this.view.say(refused ? `Refused: ${refused}` : "");
+    warn(refused ? `Refused: ${refused}` : "");
     if (!refused) byId("said").textContent = `${what} ${names.join(", ")} given`;
     return !refused;
   }
@@ -102,7 +102,7 @@ export class Desk {
   // What the line itself has refused, a tick later.
   happened({ kind = [], name = [], text = [] }) {
     kind.forEach((one, i) => {
-      if (one === "command_refused" && this.given.has(name[i])) this.view.say(`Refused: ${text[i]}`);
+      if (one === "command_refused" && this.given.has(name[i])) warn(`Refused: ${text[i]}`);
     });
   }
 

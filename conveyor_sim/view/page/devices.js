@@ -1,9 +1,8 @@
 // Eyes, zones, machines, counters, and gates, pushers and diverters where they are.
 
-import { CATEGORIES } from "./colours.js";
 import { short } from "./dom.js";
 import { outside, placeAt } from "./labels.js";
-import { stateName } from "./story.js";
+import { stateColour, stateName, stateOf } from "./story.js";
 
 const FOLDERS = {
   photo_eye: "photo_eyes", zone: "zones", counter: "counters", infeed: "infeeds", outfeed: "outfeeds", spill: "spills",
@@ -15,9 +14,11 @@ const SHOWN_BAD = 0.5; // s that an inspection is lit after a bad bottle
 
 export const deviceOf = (mark) => `${FOLDERS[mark.kind] ?? `${mark.kind}s`}/${mark.name}`;
 
-// PackML states by what they are to somebody who looks: it works, it could, it waits, it is down.
-const LOOKS = { 6: "running", 5: "starved", 11: "down", 9: "down", 8: "down", 10: "down", 2: "idle", 4: "idle", 17: "planned" };
-export const stateColour = (state) => CATEGORIES[LOOKS[state] ?? "blocked"];
+// Colour and name of what a machine does now; null: it has no states.
+function doing(view, device) {
+  const { state, category } = stateOf(view, device);
+  return state === undefined ? null : { colour: stateColour(state, category), name: ` · ${stateName(state, category)}` };
+}
 
 export function middle(points) {
   return points.reduce((sum, [x, y]) => [sum[0] + x / points.length, sum[1] + y / points.length], [0, 0]);
@@ -32,16 +33,15 @@ function outline(context, camera, points, close) {
 export function drawAreas(context, camera, colours, view) {
   for (const mark of view.recording.head.marks) {
     if (mark.look !== "region" && mark.look !== "exit") continue;
-    const device = deviceOf(mark), state = view.signal(`${device}/state`);
+    const device = deviceOf(mark), now = mark.look === "region" ? null : doing(view, device);
     let colour = mark.look === "region" ? colours.zone : colours.exit, share = 0.06, note = "";
     if (mark.look === "region") {
       const bottles = view.signal(`${device}/bottles`), full = view.signal(`${device}/full`);
       share = full ? 0.4 : Math.min(0.25, 0.06 + 0.01 * (bottles ?? 0));
       note = bottles === undefined ? "" : ` ${bottles}${full ? " full" : ""}`;
-    } else if (state !== undefined) {
-      colour = stateColour(state);
+    } else if (now) {
+      [colour, note] = [now.colour, now.name];
       share = 0.25;
-      note = ` · ${stateName(state)}`;
     }
     outline(context, camera, mark.points, true);
     context.globalAlpha = share;
@@ -49,7 +49,7 @@ export function drawAreas(context, camera, colours, view) {
     context.fill();
     context.globalAlpha = 1;
     context.setLineDash(mark.look === "region" ? [2, 3] : []);
-    context.lineWidth = state === undefined ? 1.5 : 2;
+    context.lineWidth = now ? 2 : 1.5;
     context.strokeStyle = colour;
     context.stroke();
     context.setLineDash([]);
@@ -57,14 +57,15 @@ export function drawAreas(context, camera, colours, view) {
   }
 }
 
-function label(view, camera, mark, note, importance, colour) {
+// beyond: px that are drawn farther than its points.
+function label(view, camera, mark, note, importance, colour, beyond = 0) {
   const [x, y] = middle(mark.points), isLine = mark.points.length === 2, [from, to] = mark.points;
   const far = (point) => (isLine ? Math.hypot(point[0] - x, point[1] - y) : Math.abs(point[1] - y));
   const reach = Math.max(...mark.points.map(far)) * camera.scale;
   const width = Math.max(...mark.points.map((point) => Math.abs(point[0] - x))) * camera.scale;
   const towards = isLine ? placeAt(Math.atan2(to[1] - from[1], to[0] - from[0])) // behind the end of a beam
     : width > LONG * reach ? [0, -1] : null;
-  view.labels.add(short(mark.name) + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80), colour, bold: importance > 5, towards });
+  view.labels.add(short(mark.name) + note, camera.toX(x), camera.toY(y), { importance, reach: Math.min(reach, 80) + beyond, colour, bold: importance > 5, towards });
 }
 
 export function drawLines(context, camera, colours, view) {
@@ -92,14 +93,15 @@ function drawEye(context, camera, colours, view, mark, device) {
   context.strokeStyle = colour;
   context.stroke();
   context.setLineDash([]);
+  const size = blocked ? 9 : 7;
   for (const [x, y] of mark.points) {
-    const size = blocked ? 9 : 7;
+    view.labels.keepOff(camera.toX(x), camera.toY(y), size / 2 + 1);
     context.fillStyle = blocked ? colour : colours.paper;
     context.lineWidth = 2;
     context.fillRect(camera.toX(x) - size / 2, camera.toY(y) - size / 2, size, size);
     context.strokeRect(camera.toX(x) - size / 2, camera.toY(y) - size / 2, size, size);
   }
-  label(view, camera, mark, blocked ? " ■" : "", 4, colour);
+  label(view, camera, mark, blocked ? " ■" : "", 4, colour, size / 2);
 }
 
 function drawPassage(context, camera, colours, view, mark, device) {
@@ -114,7 +116,7 @@ function drawPassage(context, camera, colours, view, mark, device) {
 }
 
 function drawEntry(context, camera, colours, view, mark, device) {
-  const state = view.signal(`${device}/state`), colour = state === undefined ? colours.entry : stateColour(state);
+  const now = doing(view, device), colour = now ? now.colour : colours.entry;
   const [x, y] = mark.points[0], size = Math.max(9, Math.min(18, 0.06 * camera.scale));
   const at = (along, across) => {
     const cos = Math.cos(mark.direction), sin = Math.sin(mark.direction);
@@ -131,7 +133,7 @@ function drawEntry(context, camera, colours, view, mark, device) {
   context.strokeStyle = colours.halo;
   context.stroke();
   const isStation = mark.kind === "station"; // its region has its name and state
-  if (!isStation) label(view, camera, mark, state === undefined ? "" : ` · ${stateName(state)}`, 6, colours.ink);
+  if (!isStation) label(view, camera, mark, now ? now.name : "", 6, colours.ink);
 }
 
 // Where the ends of a rail that moves are.

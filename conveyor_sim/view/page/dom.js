@@ -35,10 +35,13 @@ export const short = (name, most = 28) => (name.length > most ? `${name.slice(0,
 export const titled = (text, view) => (view.letter ? `${text} of ${view.letter}` : text);
 
 // What is to be noticed, over the plan; "": nothing.
-export function say(text) {
+export function say(text, isWrong = false) {
   byId("notice").textContent = text;
-  byId("news").classList.toggle("none", !text);
+  byId("news").className = text ? (isWrong ? "wrong" : "") : "none";
 }
+
+// The same of what is wrong, or was refused.
+export const warn = (text) => say(text, true);
 
 export const byId = (id) => document.getElementById(id);
 

@@ -10,6 +10,7 @@ const KINDS = {
   commands: (kind) => kind.startsWith("command_") || kind.endsWith("_changed") || kind === "limit_passed",
   bottles: (kind) => kind.startsWith("bottle_"),
 };
+const titleOf = (event) => event.kind.replaceAll("_", " ");
 const AROUND = 60; // rows to either side of now
 
 export class Events {
@@ -33,8 +34,8 @@ export class Events {
 
   filter() {
     const words = this.words.value.toLowerCase(), kinds = [...this.on].map((kind) => KINDS[kind]);
-    this.found = this.view.story.events.filter((event) => kinds.some((is) => is(event.kind))
-      && (!words || `${event.kind} ${event.name} ${event.text}`.toLowerCase().includes(words)));
+    const { story } = this.view, said = (event) => `${titleOf(event)} ${event.name} ${event.text}`.toLowerCase();
+    this.found = story.events.filter((event) => kinds.some((is) => is(event.kind)) && (words ? said(event).includes(words) : !story.repeats(event)));
     this.times = this.found.map((event) => event.time);
     this.drawn = null;
     this.view.touch?.();
@@ -50,11 +51,13 @@ export class Events {
   }
 
   _row(event, place, now) {
-    const { tags } = this.view.recording, state = event.kind === "machine_state" ? shown(event.value, tags.get(event.name)) : "";
-    const about = event.bottle >= 0 ? `${event.name} · bottle ${event.bottle}` : event.name;
+    const { story, recording: { tags } } = this.view, isState = event.kind === "machine_state" && event.name.endsWith("/state");
+    const plain = event.kind === "machine_state" ? shown(event.value, tags.get(event.name)) : "", state = isState ? story.whyOf(event) : plain;
+    const name = isState ? event.name.replace(/\/state$/, "") : event.name.replace(/^alarms\//, "");
+    const about = event.bottle >= 0 ? `${name} · bottle ${event.bottle}` : name, text = event.text === plain ? "" : event.text;
     return element("li", {}, element("button", {
       class: `event${place === now ? " now" : ""}${place > now ? " later" : ""}`, "aria-current": place === now ? "true" : null, dataset: { key: place },
       onclick: () => this.view.jump(event.time, event.name, event.bottle),
-    }, element("time", {}, seconds(event.time)), element("span", { class: "what" }, element("b", {}, event.kind.replace("_", " ")), ` ${about} ${state}`, event.text && event.text !== state ? element("small", {}, event.text) : null)));
+    }, element("time", {}, seconds(event.time)), element("span", { class: "what" }, element("b", {}, titleOf(event)), ` ${about} ${state}`, text ? element("small", {}, text) : null)));
   }
 }

@@ -1,21 +1,22 @@
 // Faceplates: all tags of a device as they are now, in two recordings in both; a click on a tag puts it on the trends.
 
+import { fillAlarms } from "./alarms.js";
 import { controlsOf } from "./controls.js";
-import { element, seconds, shown } from "./dom.js";
+import { element, seconds, shown, titled } from "./dom.js";
 
 const ORDER = ["status", "actual", "counter", "alarm", "command", "setpoint", "fault"];
-const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm: "Alarms", command: "Commands", setpoint: "Setpoints", fault: "Faults" };
+const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm: "Alarm counts", command: "Commands", setpoint: "Setpoints", fault: "Faults" };
 
 export class Faceplate {
   constructor(view) {
     this.view = view;
     this.views = view.plans.map((plan) => plan.view);
-    this.devices = [...new Set(view.recording.head.tags.map((tag) => tag.device).filter(Boolean))];
+    this.devices = [...new Set(view.recording.head.tags.filter(({ role }) => ORDER.includes(role)).map((tag) => tag.device).filter(Boolean))];
     this.choice = element("select", { "aria-label": "Device", onchange: () => view.selectDevice(this.choice.value) },
       ...this.devices.map((name) => element("option", { value: name }, name)));
     this.body = element("div", { class: "plate" });
     this.root = element("section", {}, element("h2", {}, "Device"), this.choice, this.body);
-    this.rows = [];
+    this.rows = this.alarms = [];
     if (this.devices.length) this.show(this.devices[0]);
   }
 
@@ -28,7 +29,11 @@ export class Faceplate {
     const groups = ORDER.filter((role) => tags.some((tag) => tag.role === role)).map((role) => element("div", {},
       element("h3", {}, TITLES[role]),
       element("table", {}, ...this._whose(), ...tags.filter((tag) => tag.role === role).flatMap((tag) => this._row(tag, device)))));
-    this.body.replaceChildren(element("p", { class: "muted" }, tags[0]?.class?.replace("_", " ") ?? ""), ...groups);
+    this.alarms = this.views.map((view) => ({ view, key: null, list: element("ul", { class: "rows", "aria-label": titled(`Alarms of ${device}`, view) }) }));
+    const alarms = this.alarms.map(({ view, list }) => element("div", {}, element("h3", {}, titled("Alarms", view)), list));
+    this.count = element("span", { class: "badge" });
+    // The alarms are below: fields must not move as one comes.
+    this.body.replaceChildren(element("p", { class: "kind" }, tags[0]?.class?.replaceAll("_", " ") ?? "", this.count), ...groups, ...alarms);
     this.draw();
   }
 
@@ -54,13 +59,25 @@ export class Faceplate {
 
   draw() {
     const { time } = this.view.clock, forced = new Map(this.views.map((view) => [view, view.story.forcedAt(time)]));
+    const isOurs = ({ tag }) => this.device === "alarms" || tag === this.device || tag.startsWith(`${this.device}/`);
+    let count = 0;
+    for (const one of this.alarms) {
+      const alarms = one.view.story.alarmsAt(time).filter(isOurs);
+      one.key = fillAlarms(one.list, alarms, one.view, "None", one.key);
+      count += alarms.filter(({ stands }) => stands).length;
+    }
+    this.count.hidden = !count;
+    const badge = count === 1 ? "▲ 1 alarm" : `▲ ${count} alarms`;
+    if (this.count.textContent !== badge) this.count.textContent = badge;
     for (const row of this.rows) {
       const { tag, cells, note, choice } = row;
       const notes = cells.map((cell) => {
         const [now, said] = this._now(tag, cell, forced.get(cell.view)), text = shown(now, tag), { value } = cell;
         if (choice && Number.isFinite(now) && now !== row.chosen && choice !== document.activeElement) choice.value = row.chosen = now; // by whomever
         if (value.textContent !== text) value.textContent = text;
-        value.classList.toggle("on", tag.kind === "bool" && now === 1);
+        const isOn = tag.kind === "bool" && now === 1, isBad = tag.role === "fault" || tag.name.endsWith("/fault");
+        value.classList.toggle("on", isOn);
+        value.classList.toggle("bad", isOn && isBad);
         value.classList.toggle("forced", said === "forced");
         return said;
       });

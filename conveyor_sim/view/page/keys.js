@@ -1,6 +1,7 @@
 // Keys, as in a video player.
 
 import { byId, element } from "./dom.js";
+import { MARKS } from "./scrubber.js";
 
 const TABLE = [
   ["Space, K", "play or pause"], ["← →", "one second back, ahead"], ["Shift ← →", "ten seconds back, ahead"], [", .", "one frame back, ahead"],
@@ -8,9 +9,12 @@ const TABLE = [
   ["+ −", "zoom"], ["W A S D", "move the plan"], ["Z", "whole plant"], ["B, shift B", "choose the next, the previous bottle"], ["F", "follow the chosen bottle"], ["C", "next colouring of bottles"], ["T", "trends"], ["Esc", "let go of what is chosen"], ["?", "these keys"],
 ];
 
+const table = (rows) => element("table", {}, ...rows.map(([sign, what]) => element("tr", {}, element("th", {}, sign), element("td", {}, what))));
+
 export function listenToKeys(view) {
   const { clock, camera, clock: { recording } } = view, dialog = byId("keys");
-  dialog.append(element("h2", {}, "Keys"), element("table", {}, ...TABLE.map(([keys, what]) => element("tr", {}, element("th", {}, keys), element("td", {}, what)))),
+  dialog.append(element("div", { class: "columns" },
+    element("div", {}, element("h2", {}, "Keys"), table(TABLE)), element("div", {}, element("h2", {}, "Marks on the time line"), table(MARKS))),
     element("button", { onclick: () => dialog.close() }, "Close"));
   byId("help").addEventListener("click", () => dialog.showModal());
   const seek = (time) => {

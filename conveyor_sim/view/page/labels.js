@@ -2,6 +2,7 @@
 
 const PLACES = [[0, -1], [0, 1], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1, 1]];
 const GAP = 5;
+const SURE = 6; // of this importance, rather over a small thing than elsewhere
 const snapped = (part) => (Math.abs(part) < Math.sin(Math.PI / 8) ? 0 : Math.sign(part));
 
 const placesTowards = ([x, y]) => [[x, y], [-x, -y], ...PLACES.filter(([dx, dy]) => dx * x + dy * y)];
@@ -15,13 +16,21 @@ export function placeAt(angle) {
   return dy > 0 || (dy === 0 && dx < 0) ? [-dx, -dy] : [dx, dy];
 }
 
+const meet = (one, other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3];
+
 export class Labels {
   constructor() {
     this.wanted = [];
+    this.kept = []; // boxes where no name is to stand, px
   }
 
   clear() {
-    this.wanted.length = 0;
+    this.wanted.length = this.kept.length = 0;
+  }
+
+  // Keep names off a square around a point, px.
+  keepOff(x, y, half) {
+    this.kept.push([x - half, y - half, x + half, y + half]);
   }
 
   // x, y: px; reach: px from there to where it may stand; the most important first. towards: the best of PLACES; what lies
@@ -32,7 +41,7 @@ export class Labels {
 
   // covered: boxes where none is to stand, px.
   draw(context, camera, colours, covered) {
-    const taken = [...covered];
+    const taken = [...covered], hides = (box) => this.kept.some((other) => meet(box, other));
     context.textBaseline = "middle";
     context.textAlign = "center";
     context.lineJoin = "round";
@@ -45,7 +54,7 @@ export class Labels {
         const x = dy ? Math.min(camera.width - width / 2, Math.max(width / 2, beside)) : beside, y = label.y + dy * (label.reach + GAP + height / 2);
         const box = [x - width / 2, y - height / 2, x + width / 2, y + height / 2];
         const outside = box[0] < 0 || box[1] < 0 || box[2] > camera.width || box[3] > camera.height;
-        if (outside || taken.some((other) => box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3])) continue;
+        if (outside || taken.some((other) => meet(box, other)) || (label.importance < SURE && hides(box))) continue;
         taken.push(box);
         context.strokeStyle = colours.halo;
         context.lineWidth = 4;

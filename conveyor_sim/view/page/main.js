@@ -2,7 +2,7 @@
 
 import { SPEEDS } from "./clock.js";
 import { COLOURINGS, colourings, isDark } from "./colours.js";
-import { byId, element, say, seconds } from "./dom.js";
+import { byId, element, say, seconds, warn } from "./dom.js";
 import { listenToKeys } from "./keys.js";
 import { Line } from "./live.js";
 import { LiveRecording } from "./live_recording.js";
@@ -25,7 +25,7 @@ function wire(view) {
   byId("speed").addEventListener("change", (event) => clock.setSpeed(+event.target.value));
   const clicks = {
     play: () => clock.toggle(), back: () => clock.step(-1), ahead: () => clock.step(1), fit: () => view.wholePlant(),
-    dismiss: () => say(""),
+    dismiss: () => say(""), closer: () => camera.zoom(1.5), farther: () => camera.zoom(1 / 1.5),
     to_start: () => { clock.seek(clock.recording.start); view.snap(); },
     theme: () => { document.documentElement.dataset.theme = isDark() ? "light" : "dark"; view.touch(); },
     toggle_trends: () => {
@@ -35,7 +35,7 @@ function wire(view) {
   };
   for (const [id, action] of Object.entries(clicks)) byId(id).addEventListener("click", action);
   byId("wear").append(...Object.entries(WEARS).map(([name, { label }]) => element("option", { value: name }, label)));
-  byId("wear").addEventListener("change", (event) => { view.shownWear = event.target.value; view.draw(0); view.legend(); });
+  byId("wear").addEventListener("change", (event) => { view.shownWear = event.target.value; view.touch(); });
   view.worn();
   for (const [id, field] of [["forces", "showForces"], ["names", "showNames"]]) {
     byId(id).addEventListener("change", (event) => { view[field] = event.target.checked; view.touch(); });
@@ -77,7 +77,7 @@ async function compare(view, source, { stretches }) {
       view.compare.add(await read(source, `difference/${part}`));
     } catch (error) {
       view.compare.failed = `They can't be compared further: ${error.message}`;
-      view.say(view.compare.failed);
+      warn(view.compare.failed);
       return;
     }
     if (view.compare.found.length === before) continue;
@@ -102,6 +102,10 @@ async function start() {
   say("Waiting for the line.");
   line.addEventListener("locked", () => {
     say("Sign in to see the line.");
+    if (!document.body.dataset.told) { // who cancels can try again
+      byId("desk").replaceChildren(element("button", { onclick: () => line.signing.open() }, "Sign in"));
+      byId("desk").hidden = false;
+    }
     line.signing.open();
   });
   line.addEventListener("begin", ({ detail }) => {
@@ -139,10 +143,10 @@ async function startRecording() {
   wire(view);
   view.resize();
   let unread = failed || other?.failed || "";
-  view.say(unread);
+  warn(unread);
   const failure = view.story.marks.findLast(({ kind }) => kind === "failed");
   if (failure) {
-    view.say(failure.text);
+    warn(failure.text);
     view.clock.seek(Math.max(recording.start, failure.time - 5));
   }
   await Promise.all(view.clock.all.map((one) => one.load(one.number(view.clock.time))));
@@ -150,10 +154,10 @@ async function startRecording() {
   run(view);
   // A long recording is gone through while one looks at it already.
   for (let part = 0; parts > 1 && part < parts; part++) {
-    view.say(`reading what happened: ${Math.round((100 * part) / parts)} %`);
+    say(`Reading what happened: ${Math.round((100 * part) / parts)} %`);
     unread = await told(source, part, (more) => view.toldMore(more)) || unread;
   }
-  if (parts > 1) view.say(unread);
+  if (parts > 1) warn(unread);
   document.body.dataset.told = "yes";
   for (let part = 0; other && part < other.recording.head.times.stories; part++) {
     if (other.recording.head.times.stories > 1) unread = await told(behind, part, (more) => view.toldMoreOf(other.story, more)) || unread;
@@ -162,5 +166,5 @@ async function startRecording() {
 }
 
 start().catch((error) => {
-  say(`This recording can't be shown: ${error.message}`);
+  warn(`This recording can't be shown: ${error.message}`);
 });

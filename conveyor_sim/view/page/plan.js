@@ -22,12 +22,14 @@ export class Plan {
     this.last = null; // time of the last picture
     this.frame = null;
     this.covered = [];
+    this.said = ""; // over it
   }
 
-  // What the legend hides of it: no name is to stand there.
+  // What stands over it: no name is to be there.
   cover() {
-    const { left, top } = this.canvas.getBoundingClientRect(), box = byId("legend").getBoundingClientRect();
-    this.covered = [[box.left - left, box.top - top, box.right - left, box.bottom - top]];
+    const { left, top } = this.canvas.getBoundingClientRect(), over = byId("stage").querySelectorAll("#legend, #zoom, #news:not(.none), .caption");
+    this.covered = Array.from(over, (one) => one.getBoundingClientRect()).map((box) => [box.left - left, box.top - top, box.right - left, box.bottom - top]);
+    this.said = byId("notice").textContent;
   }
 
   resize() {
@@ -56,6 +58,7 @@ export class Plan {
     context.fillStyle = colours.paper;
     context.fillRect(0, 0, camera.width, camera.height);
     this.labels.clear();
+    if (this.said !== byId("notice").textContent) this.cover();
     this.belts.draw(context, camera, colours, speeds);
     drawAreas(context, camera, colours, view);
     this._rails(colours);
@@ -91,20 +94,20 @@ export class Plan {
     for (const bottle of frame.bottles) {
       const x = camera.toX(bottle.x), y = camera.toY(bottle.y), radius = head.types[bottle.type].radius * camera.scale;
       if (x < -radius || y < -radius || x > camera.width + radius || y > camera.height + radius) continue;
-      const colour = colouring.of(bottle, view);
+      const colour = colouring.of(bottle, view), crossed = colouring.crossed?.(bottle, view) ?? false;
       if (radius < 1.5) {
         context.fillStyle = colour;
         context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);
       } else if (radius < 60) {
-        const { image, half } = this._sprite(this.sprites[bottle.type], colour, radius, colours.edge);
+        const { image, half } = this._sprite(this.sprites[bottle.type], colour, radius, colours.edge, crossed);
         if (!crowd?.add(image, (x - half) * ratio, (y - half) * ratio)) context.drawImage(image, x - half, y - half, 2 * half, 2 * half);
-      } else this._circle(context, x, y, radius, colour, colours.edge);
+      } else this._circle(context, x, y, radius, colour, colours.edge, crossed);
       if (radius > 16) this.labels.add(`${bottle.id}`, x, y - radius - 4, { importance: 1, reach: -11 });
     }
     crowd?.draw(context, camera.width, camera.height);
   }
 
-  _circle(context, x, y, radius, colour, edge) {
+  _circle(context, x, y, radius, colour, edge, crossed) {
     context.beginPath();
     context.arc(x, y, Math.max(0.5, radius - 0.5), 0, 2 * Math.PI);
     context.fillStyle = colour;
@@ -112,7 +115,16 @@ export class Plan {
     context.lineWidth = 1;
     context.strokeStyle = edge;
     context.stroke();
-    if (radius > 6) {
+    if (crossed) {
+      const reach = 0.7 * radius; // as far as the edge
+      context.beginPath();
+      for (const side of [-1, 1]) {
+        context.moveTo(x - reach, y - side * reach);
+        context.lineTo(x + reach, y + side * reach);
+      }
+      context.lineWidth = Math.max(1.5, 0.12 * radius);
+      context.stroke();
+    } else if (radius > 6) {
       context.beginPath();
       context.arc(x, y, radius * 0.45, 0, 2 * Math.PI); // the neck
       context.globalAlpha = 0.35;
@@ -122,15 +134,15 @@ export class Plan {
   }
 
   // A bottle as a picture: to copy it takes a fraction of drawing it. They are kept while the scale stays.
-  _sprite(sprites, colour, radius, edge) {
-    const found = sprites.get(colour);
+  _sprite(sprites, colour, radius, edge, crossed) {
+    const key = crossed ? `${colour} crossed` : colour, found = sprites.get(key);
     if (found) return found;
     const reach = Math.ceil(radius) + 1, size = Math.ceil(2 * reach * this.ratio), canvas = new OffscreenCanvas(size, size);
     const context = canvas.getContext("2d"), half = size / 2 / this.ratio;
     context.scale(this.ratio, this.ratio);
-    this._circle(context, half, half, radius, colour, edge);
+    this._circle(context, half, half, radius, colour, edge, crossed);
     const sprite = { image: canvas.transferToImageBitmap(), half };
-    sprites.set(colour, sprite);
+    sprites.set(key, sprite);
     return sprite;
   }
 

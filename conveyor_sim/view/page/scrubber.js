@@ -3,8 +3,31 @@
 import { palette } from "./colours.js";
 import { byId, element, seconds, sharp } from "./dom.js";
 
-const KINDS = { alarm: ["#d55e00", 0], fault: ["#cc79a7", 1], refused: ["#e69f00", 1], failed: ["#d1330d", 2], difference: ["#8250df", 2] };
+// Colour, weight, and shape: colours alone do not say it to everybody.
+const KINDS = {
+  alarm: ["#d55e00", 0, "triangle"], fault: ["#cc79a7", 1, "diamond"], refused: ["#e69f00", 1, "cross"], failed: ["#d1330d", 2, "disc"],
+  difference: ["#8250df", 2, "square"],
+};
+export const MARKS = [["▼", "alarm"], ["◆", "fault"], ["✕", "refused command"], ["●", "failed condition, below"], ["■", "difference of two recordings, below"]];
 const NEAR = 6; // px
+const SHAPES = {
+  triangle: [[-1, -0.8], [1, -0.8], [0, 1]], diamond: [[0, -1.2], [1.1, 0], [0, 1.2], [-1.1, 0]], square: [[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]],
+};
+
+// Draws the shape of a kind of mark.
+function drawShape(context, shape, x, y, reach) {
+  context.beginPath();
+  if (shape === "disc") context.arc(x, y, reach, 0, 2 * Math.PI);
+  else if (shape === "cross") {
+    for (const side of [-1, 1]) {
+      context.moveTo(x - reach, y - side * reach);
+      context.lineTo(x + reach, y + side * reach);
+    }
+    context.lineWidth = 2.5;
+    context.stroke();
+  } else SHAPES[shape].forEach(([dx, dy], k) => context[k ? "lineTo" : "moveTo"](x + dx * reach, y + dy * reach));
+  context.fill();
+}
 
 export class Scrubber {
   constructor(view) {
@@ -67,19 +90,17 @@ export class Scrubber {
       context.fillRect(from, middle - width / 2, to - from, width);
     };
     line(this.x(recording.start), this.x(recording.end), 4, colours.beltEdge);
-    line(this.x(recording.start), this.x(clock.time), 4, "#0072b2");
+    line(this.x(recording.start), this.x(clock.time), 4, colours.line);
     for (const mark of story.marks) {
       if (mark.time < recording.start) continue;
-      const [colour, weight] = KINDS[mark.kind], x = this.x(mark.time);
-      context.fillStyle = colour;
+      const [colour, weight, shape] = KINDS[mark.kind], x = this.x(mark.time);
+      context.fillStyle = context.strokeStyle = colour;
       context.fillRect(x - 1, 4, weight > 1 ? 3 : 2, height - 8);
-      context.beginPath();
-      context.arc(x, weight > 1 ? height - 5 : 5, weight > 1 ? 5 : 3.5, 0, 2 * Math.PI);
-      context.fill();
+      drawShape(context, shape, x, weight > 1 ? height - 5 : 5, weight > 1 ? 5 : 4);
     }
     context.beginPath();
     context.arc(this.x(clock.time), middle, 8, 0, 2 * Math.PI);
-    context.fillStyle = "#0072b2";
+    context.fillStyle = colours.line;
     context.fill();
     context.lineWidth = 2;
     context.strokeStyle = colours.halo;

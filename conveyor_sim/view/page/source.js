@@ -1,6 +1,6 @@
 // Where a page's data comes from: bytes by name ("head", "story", "block/0"). A recording in the page itself, or a server.
 
-import { byId, say } from "./dom.js";
+import { byId, say, warn } from "./dom.js";
 
 const AGAIN = 2000; // ms
 const NO_ANSWER = "● No answer from the server: trying again";
@@ -43,7 +43,7 @@ class Served {
   }
 
   _link(there) {
-    if (!there) say(NO_ANSWER);
+    if (!there) warn(NO_ANSWER);
     else if (byId("notice").textContent === NO_ANSWER) say("");
     document.body.dataset.link = there ? "served" : "broken";
   }

@@ -1,6 +1,7 @@
 // What happened: events, alarms, states of machines, counters, as they were at a time.
 
 import { lastUpTo } from "./block.js";
+import { CATEGORIES } from "./colours.js";
 
 const STATE_NAMES = [
   "Undefined", "Clearing", "Stopped", "Starting", "Idle", "Suspended", "Execute", "Stopping", "Aborting", "Aborted",
@@ -13,7 +14,23 @@ export const ALARM_STATES = [
 const STANDS = new Set([1, 2, 4, 5]);
 const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8]);
 
-export const stateName = (number) => STATE_NAMES[number] ?? `state ${number}`;
+const EXECUTE = 6;
+const WAITS = new Set(["starved", "blocked"]);
+const OF_MACHINE = /^(.*)\/(\w+)$/;
+
+// Of a machine's signal `category`: where its time goes.
+const categoryOf = (value) => Object.keys(CATEGORIES)[value];
+
+// What a machine does now.
+export const stateOf = (view, device) => ({ state: view.signal(`${device}/state`), category: categoryOf(view.signal(`${device}/category`)) });
+
+// A state of PackML, and for what a machine waits in it. Execute is one state, however often it waits for a bottle.
+export function stateName(number, category) {
+  const name = STATE_NAMES[number] ?? `state ${number}`;
+  return number !== EXECUTE && WAITS.has(category) ? `${name}, ${category}` : name;
+}
+
+export const stateColour = (number, category) => CATEGORIES[number === EXECUTE ? "running" : category] ?? CATEGORIES.idle;
 
 const HOLDS = /^(machine_state|signal_|fault_)/;
 const OF_ONE = new Set(["alarm_changes", "readback"]); // whose second entry says of what they are
@@ -28,6 +45,7 @@ export class Story {
   // Nothing has happened yet.
   begin(head) {
     this.head = head;
+    this.initial = new Map(head.tags.map(({ name, initial }) => [name, initial]));
     this.differences = []; // from another recording: marks
     this.data = { events: {}, alarms: {} };
     for (const list of LISTS) this.data[list] = [];
@@ -64,11 +82,13 @@ export class Story {
     this.events = at.map((time, i) => ({ time, kind: kind[i], name: name[i], bottle: bottle[i], value: value[i], text: text[i] }));
     this.fed = new Map();
     this.rejected = new Set();
-    this.machines = new Map();
+    this.machines = new Map(); // of each, when it began to do something else
+    this.reasons = new Map(); // of machines and times, why they stand
+    const now = new Map();
     for (const event of this.events) {
       if (event.kind === "bottle_fed") this.fed.set(event.bottle, event.time);
       if (event.kind === "bottle_rejected") this.rejected.add(event.bottle);
-      if (event.kind === "machine_state" && event.name.endsWith("/state")) this._state(event);
+      if (event.kind === "machine_state") this._state(event, now);
     }
     this.alarms = new Map();
     for (const [time, number, state, active, firstOut, since, by] of data.alarm_changes) {
@@ -81,16 +101,45 @@ export class Story {
     this.marks = this._marks();
   }
 
-  _state(event) {
-    const device = event.name.replace(/\/state$/, "");
-    if (!this.machines.has(device)) this.machines.set(device, []);
-    this.machines.get(device).push({ time: event.time, state: event.value });
+  // What a machine does at first, if that is known.
+  initially(device) {
+    const [state, category] = ["state", "category"].map((what) => this.initial.get(`${device}/${what}`));
+    return { state, category: categoryOf(category) };
+  }
+
+  // The machine of an event that only says in other words what its state does at that tick; "": it says more.
+  repeats({ kind, name }) {
+    const [, device, what] = OF_MACHINE.exec(name) ?? [];
+    return kind === "machine_state" && what !== "state" && this.machines.has(device) ? device : "";
+  }
+
+  // A state that a machine goes to, with what is known of why.
+  whyOf({ name, time, value }) {
+    const [, device] = OF_MACHINE.exec(name);
+    const change = this.machines.get(device)?.find((other) => other.time === time), reason = this.reasons.get(`${device} ${time}`) ?? "";
+    const text = stateName(value, change?.category);
+    return value !== EXECUTE && reason && !WAITS.has(reason) ? `${text}, ${reason}` : text;
+  }
+
+  // now: of each machine, what it did last.
+  _state({ name, time, value, text }, now) {
+    const [, device, what] = OF_MACHINE.exec(name) ?? [];
+    if (what === "stop_reason") this.reasons.set(`${device} ${time}`, text);
+    if (what !== "state" && what !== "category") return;
+    const before = now.get(device) ?? this.initially(device), changes = this.machines.get(device) ?? [];
+    const after = { ...before, [what]: what === "state" ? value : categoryOf(value) };
+    now.set(device, after);
+    this.machines.set(device, changes);
+    if (changes.length && changes[changes.length - 1].time === time) changes.pop(); // of one tick, the last
+    const last = changes.length ? changes[changes.length - 1] : this.initially(device);
+    const looks = ({ state, category }) => `${stateName(state, category)} ${stateColour(state, category)}`;
+    if (looks(after) !== looks(last)) changes.push({ time, ...after });
   }
 
   _marks() {
     const marks = [...this.differences];
     for (const event of this.events) {
-      if (event.kind === "alarm_raised") marks.push({ time: event.time, kind: "alarm", text: `alarm ${event.name} ${event.text}` });
+      if (event.kind === "alarm_raised") marks.push({ time: event.time, kind: "alarm", text: `alarm ${event.name.replace(/^alarms\//, "")}: ${event.text}` });
       if (event.kind === "fault_injected") marks.push({ time: event.time, kind: "fault", text: `fault ${event.name}` });
       if (event.kind === "command_refused") marks.push({ time: event.time, kind: "refused", text: `refused ${event.name}: ${event.text}` });
     }

@@ -1,12 +1,15 @@
-// Trends of chosen signals around now, with commands and faults as marks; drawn by uPlot.
+// Trends of chosen signals around now, with commands and faults as marks; drawn by uPlot. Switches have a lane each, below.
 
 import { COLOURED, palette } from "./colours.js";
-import { byId, element, seconds } from "./dom.js";
+import { byId, element, seconds, short, shown } from "./dom.js";
 
 const MOST = 8; // signals
 const MARKS = { alarm: "#d55e00", fault: "#cc79a7", refused: "#e69f00", failed: "#d1330d", difference: "#8250df" };
 const LONGEST = 28; // letters of a mark
 const WINDOWS = [10, 30, 60, 120]; // s
+const GUTTER = 76, GUTTER_LETTERS = 11; // px beside the trends, and letters that fit there
+const LANE = 1.5; // of a switch, which goes from 0 to 1 in it
+const LANES_SHARE = 0.17, LANES_MOST = 0.65; // of the height: one lane, and all of them at most
 
 export class Trends {
   constructor(view) {
@@ -52,6 +55,7 @@ export class Trends {
   remove(name) {
     this.names = this.names.filter((other) => other !== name);
     this._chipped();
+    this.input.focus(); // what had it is gone
   }
 
   _chipped() {
@@ -59,30 +63,45 @@ export class Trends {
     this.chips.replaceChildren(...this.names.map((name, i) => {
       const swatch = element("span", { class: "swatch" });
       swatch.style.background = COLOURED(i);
-      return element("button", { class: "chip", title: `Remove ${name}`, "aria-label": `Remove ${name} from the trends`, onclick: () => this.remove(name) }, swatch, name, this.said.get(name), " ✕");
+      return element("button", { class: "chip", title: `Remove ${name}`, "aria-label": `Remove ${name} from the trends`, onclick: () => this.remove(name) }, swatch, `${name} `, element("b", { class: this._scale(name) === "switch" ? "switch" : "" }), this.said.get(name), " ✕");
     }));
     this.plot?.destroy();
     this.plot = null;
     this.view.touch();
   }
 
-  // How a signal is drawn: switches as steps below, all of one unit on one axis.
+  // How a signal is drawn: switches in lanes, all others of one unit on one axis.
   _scale(name) {
     const tag = this.view.recording.tags.get(name);
     return tag?.kind === "bool" ? "switch" : tag?.unit || "1";
   }
 
+  // Which lane a switch has, from above.
+  _lane(name) {
+    return this.switches.length - 1 - this.switches.indexOf(name);
+  }
+
+  // The share of the height that lanes take: all of it if there is nothing else.
+  _lanesShare() {
+    const { length } = this.switches;
+    return length === this.names.length ? 1 : Math.min(LANES_MOST, LANES_SHARE * length);
+  }
+
   _make() {
+    this.switches = this.names.filter((name) => this._scale(name) === "switch");
+    this.lowest = new Map(); // of each scale, what stands just above the lanes
     const colours = palette(), scales = { x: { time: false } }, axes = [{ stroke: colours.muted, size: 28, gap: 2, grid: { stroke: colours.slat, width: 1 }, values: (_, at) => at.map((time) => `${time} s`) }];
     for (const scale of new Set(this.names.map((name) => this._scale(name)))) {
       scales[scale] = { auto: false };
-      if (scale !== "switch" && axes.length < 3) axes.push({ scale, stroke: colours.muted, size: 68, space: 26, side: axes.length === 1 ? 3 : 1, grid: { show: axes.length === 1, stroke: colours.slat, width: 1 }, values: (_, at) => at.map((value) => (scale === "1" ? `${value}` : `${value} ${scale}`)) });
+      const written = (value) => (value < this.lowest.get(scale) ? "" : scale === "1" ? `${value}` : `${value} ${scale}`); // not beside the lanes
+      if (scale !== "switch" && axes.length < 3) axes.push({ scale, stroke: colours.muted, size: GUTTER, space: 16, side: axes.length === 1 ? 3 : 1, grid: { show: axes.length === 1, stroke: colours.slat, width: 1 }, values: (_, at) => at.map((value) => written(+value.toPrecision(9))) });
     }
+    if (axes.length === 1) axes.push({ scale: "switch", stroke: colours.muted, size: GUTTER, grid: { show: false }, ticks: { show: false }, values: (_, at) => at.map(() => "") });
     const stepped = uPlot.paths.stepped({ align: 1 });
     this.plot = new uPlot({
       width: this.box.clientWidth, height: this.box.clientHeight, legend: { show: false }, scales, axes, cursor: { y: false, drag: { x: false, y: false } },
       series: [{}, ...this._drawn().map(({ name, i, dash }) => ({ label: name, scale: this._scale(name), stroke: COLOURED(i), width: 2, dash, points: { show: false }, spanGaps: dash !== null, paths: this.view.recording.tags.get(name)?.kind === "number" ? undefined : stepped }))],
-      hooks: { draw: [(plot) => this._marks(plot)] },
+      hooks: { draw: [(plot) => this._lanes(plot), (plot) => this._marks(plot)] },
     }, this._data(), this.box);
     this.plot.over.addEventListener("click", (event) => this.view.jump(this.plot.posToVal(event.offsetX, "x")));
     this.theme = colours;
@@ -100,9 +119,28 @@ export class Trends {
   }
 
   _data() {
-    const [from, to] = this._span(), all = this._drawn().map(({ name, of }) => of.series(name, from, to));
+    const [from, to] = this._span(), all = this._drawn().map(({ name, of }) => this._laned(name, of.series(name, from, to)));
     if (this.view.rival) return uPlot.join(all.map(({ times, values }) => [times, values]));
     return [all[0]?.times ?? [], ...all.map(({ values }) => values)];
+  }
+
+  _laned(name, { times, values }) {
+    return { times, values: this.switches.includes(name) ? values.map((value) => value + LANE * this._lane(name)) : values };
+  }
+
+  // Whose lane each is: beside it, for colours alone do not say it to everybody.
+  _lanes(plot) {
+    const { ctx: context, bbox } = plot;
+    context.save();
+    context.fillStyle = palette().muted;
+    context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    context.textAlign = "right";
+    context.textBaseline = "middle";
+    for (const name of this.switches) {
+      const text = short(name.split("/").slice(-2)[0], GUTTER_LETTERS);
+      context.fillText(text, bbox.left - 6 * devicePixelRatio, plot.valToPos(LANE * this._lane(name) + 0.5, "switch", true));
+    }
+    context.restore();
   }
 
   _marks(plot) {
@@ -156,21 +194,35 @@ export class Trends {
     for (const [name, said] of this.said) said.textContent = forced.has(name) ? ", forced" : "";
     const { clientWidth: width, clientHeight: height } = this.box;
     if (this.plot.width !== width || this.plot.height !== height) this.plot.setSize({ width, height });
+    this._written();
     this.plot.setData(this._data(), false);
     const [min, max] = this._span();
     this.plot.batch(() => {
       for (const scale of Object.keys(this.plot.scales)) if (scale !== "x") this.plot.setScale(scale, this._range(scale));
       this.plot.setScale("x", { min, max });
     });
-    this.box.setAttribute("aria-label", `Trends of ${this.names.join(", ")} up to ${seconds(this.view.clock.time)}`);
+    const now = this.names.map((name, i) => `${name} ${this.chips.children[i].querySelector("b").textContent}`);
+    this.box.setAttribute("aria-label", `Trends up to ${seconds(this.view.clock.time)}: ${now.join(", ")}`);
+  }
+
+  // What each signal is now, on its chip.
+  _written() {
+    this.names.forEach((name, i) => {
+      const tag = this.view.recording.tags.get(name), value = this.chips.children[i].querySelector("b");
+      const text = [...new Set(this.view.plans.map(({ view }) => shown(view.signal(name), tag)))].join(" | "); // of A and B
+      if (value.textContent !== text) value.textContent = text;
+    });
   }
 
   _range(scale) {
-    if (scale === "switch") return { min: -0.1, max: 4 };
+    const lanes = this._lanesShare();
+    if (scale === "switch") return { min: -0.2, max: (LANE * this.switches.length) / lanes };
     const values = this._drawn().flatMap(({ name }, i) => (this._scale(name) === scale ? Array.from(this.plot.data[i + 1]).filter(Number.isFinite) : []));
     const low = values.reduce((least, value) => Math.min(least, value), Infinity), high = values.reduce((most, value) => Math.max(most, value), -Infinity);
     if (!(low <= high)) return { min: 0, max: 1 };
     const room = low === high ? Math.max(0.5, 0.1 * Math.abs(low)) : 0.08 * (high - low);
-    return { min: low - room, max: high + room };
+    const least = low - room, most = high + room;
+    this.lowest.set(scale, low - 0.6 * room);
+    return { min: least - (lanes / (1 - lanes)) * (most - least), max: most };
   }
 }

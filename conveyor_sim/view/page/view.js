@@ -10,7 +10,7 @@ import { COLOURINGS, SCALES, colourings } from "./colours.js";
 import { Compare } from "./compare.js";
 import { Desk } from "./desk.js";
 import { deviceOf, middle } from "./devices.js";
-import { byId, element, keyOf, say, seconds } from "./dom.js";
+import { byId, element, keyOf, say, seconds, warn } from "./dom.js";
 import { Events } from "./events.js";
 import { Faceplate } from "./faceplate.js";
 import { LiveClock } from "./live_clock.js";
@@ -21,7 +21,7 @@ import { Tabs } from "./tabs.js";
 import { Tiles } from "./tiles.js";
 import { Trends } from "./trends.js";
 import { Watch } from "./watch.js";
-import { WEARS, Wear } from "./wear.js";
+import { NO_WEAR, WEARS, Wear } from "./wear.js";
 
 const MEASURED = 5000; // forces of a block that its scale is made from
 const MOST_EVENTS = 5000; // of a line that runs; then those before what can still be seen are forgotten
@@ -36,6 +36,7 @@ export class View {
     this.letter = ""; // of two that are shown side by side, A
     this.fastest = 0.1;
     this.strongest = 1;
+    this.touching = false; // whether there have been contacts
     this.oldest = line ? 60 : Math.max(1, Math.min(60, recording.end - recording.start));
     this.clock = line ? new LiveClock(recording) : new Clock(recording, other?.recording);
     this.desk = line ? new Desk(this, about) : null;
@@ -59,21 +60,17 @@ export class View {
     const production = { title: "Line", parts: [...this.bars, ...shown.map((one) => new Tiles(one))] };
     const panels = { line: production, alarms: { title: "Alarms", parts: this.alarms }, events: { title: "Events", parts: [this.events] },
       device: { title: "Device", parts: [this.faceplate] }, ...(line ? { watch: { title: "Watch", parts: [this.watch] } } : {}), bottle: { title: "Bottle", parts: [new Bottle(this)] } };
-    this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : "line");
+    this.tabs = new Tabs(other ? { compare: { title: "A, B", parts: [this.compare] }, ...panels } : panels, other ? "compare" : this.bars[0].names.length ? "line" : "device");
     for (const part of [this.clock, this.camera]) part.addEventListener("change", () => this.touch());
     for (const one of this.clock.all) {
       one.addEventListener("loaded", () => this._loaded());
-      one.addEventListener("failed", (event) => this.say(event.detail));
+      one.addEventListener("failed", (event) => warn(event.detail));
     }
     this.snapping = false;
   }
 
   touch() {
     this.dirty = true;
-  }
-
-  say(text) {
-    say(text);
   }
 
   badge(name, count) {
@@ -138,7 +135,6 @@ export class View {
     for (const block of this.clock.all.flatMap(({ blocks }) => [...blocks.values()])) {
       if (!block.measured) this.measure(block);
     }
-    this.legend();
   }
 
   measure(block) {
@@ -146,9 +142,8 @@ export class View {
     for (const column of block.belts.columns) for (const value of column.values) this.fastest = Math.max(this.fastest, Math.abs(value));
     const every = Math.ceil(block.contacts.reduce((sum, { force }) => sum + force.length, 0) / MEASURED);
     const forces = block.contacts.flatMap(({ force }) => Array.from(force).filter((_, i) => i % every === 0)).sort((a, b) => a - b);
-    const strong = forces[Math.floor(0.99 * forces.length)] ?? 0;
-    this.strongest = Math.max(this.strongestSeen ?? 1, strong);
-    this.strongestSeen = this.strongest;
+    this.strongest = Math.max(this.strongest, forces[Math.floor(0.99 * forces.length)] ?? 0);
+    this.touching ||= forces.length > 0;
   }
 
   // Time stands at a frame of the recording, once that is there.
@@ -172,7 +167,7 @@ export class View {
   compared() {
     this.story.differences = this.compare.marks();
     this.story.build();
-    this.say(this.compare.words());
+    say(this.compare.words());
     this.touch();
   }
 
@@ -193,7 +188,7 @@ export class View {
     const found = by > 0 ? marks.find((mark) => mark.time > time + 1e-3) : marks.reverse().find((mark) => mark.time < time - 1e-3);
     if (found) {
       this.jump(found.time);
-      this.say(found.text);
+      say(found.text, found.kind === "failed");
     }
   }
 
@@ -233,7 +228,6 @@ export class View {
 
   setColouring(name) {
     this.colouring = byId("colour").value = name;
-    this.legend();
     this.touch();
   }
 
@@ -242,8 +236,12 @@ export class View {
     this.setColouring(names[(names.indexOf(this.colouring) + 1) % names.length]);
   }
 
-  legend() {
-    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear;
+  // What colours and lines mean, once their scales are known.
+  _legend() {
+    const colouring = COLOURINGS[this.colouring], entries = [], { shown, most } = this.wear, lines = this.showForces && this.touching;
+    const key = [this.colouring, colouring.ends?.(this), shown, most, lines && this.strongest].join(" ");
+    if (key === this.legendKey) return;
+    this.legendKey = key;
     const ramp = (colours, low, high) => {
       const bar = element("span", { class: "ramp" });
       bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
@@ -251,9 +249,12 @@ export class View {
     };
     if (colouring.ramp) entries.push(ramp(colouring.ramp, ...colouring.ends(this)));
     else entries.push(...keyOf(colouring.legend(this)));
-    if (shown) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
+    if (shown && most > NO_WEAR) entries.push(ramp(SCALES.force, "rails 0", `${+most.toPrecision(2)} ${WEARS[shown].unit}`));
+    else if (shown) entries.push(element("span", { class: "entry" }, `no ${shown} on rails`));
+    if (lines) entries.push(element("span", { class: "entry" }, "contacts 0 ", element("span", { class: "wedge" }), ` ${+this.strongest.toPrecision(2)} N`));
     byId("legend").replaceChildren(...entries);
     for (const plan of this.plans) plan.cover();
+    this.touch(); // names make room
   }
 
   clicked(px, py, plan = this.plan) {
@@ -282,6 +283,7 @@ export class View {
     for (const plan of this.plans) plan.update();
     this._follow();
     for (const plan of this.plans) plan.draw();
+    this._legend();
     this.beside?.draw();
     this.scrubber.draw();
     const { clock, camera } = this, play = byId("play");

@@ -9,6 +9,8 @@ export const WEARS = {
   pressure: { label: "by pressure", unit: "N/m", of: ([time, , impulse], i, bins, start) => impulse[i] / bins.length[i] / Math.max(time - start, 1e-9) },
 };
 
+export const NO_WEAR = 1e-9; // what is not above it is none
+
 export class Wear {
   constructor(view) {
     this.view = view;
@@ -22,7 +24,7 @@ export class Wear {
   // The scale is that of the end, so that a colour means the same all the time.
   scale() {
     const { story, recording } = this.view, { bins, wear } = story.data, last = wear[wear.length - 1];
-    return last ? Math.max(1e-9, ...bins.x.map((_, i) => WEARS[this.shown].of(last, i, bins, recording.began))) : 1e-9;
+    return last ? Math.max(NO_WEAR, ...bins.x.map((_, i) => WEARS[this.shown].of(last, i, bins, recording.began))) : NO_WEAR;
   }
 
   draw(context, camera) {
