@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Mapping
+import sysconfig
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
 from hashlib import blake2b
 from pathlib import Path
@@ -37,6 +40,22 @@ def file_of(reference: str) -> Path | None:
     return None if spec is None or spec.origin is None else Path(spec.origin)
 
 
+def files_of(reference: str) -> list[Path]:
+    """The files that decide what a located reference is: its own, and those of the modules that it imports, but for
+    installed packages and this one. Modules are found as far as they are on the path by now.
+    """
+    first = file_of(reference)
+    module = "" if first is None or reference.startswith(str(first)) else reference.partition(":")[0]
+    todo = [] if first is None else [(first, module)]
+    found: dict[Path, None] = {}
+    while todo:
+        file, module = todo.pop()
+        if file not in found:
+            found[file] = None
+            todo += [*_imported(file, module)] if file.suffix == PYTHON else []
+    return list(found)
+
+
 def function(reference: str, arguments: Mapping[str, Any] | None = None) -> Any:
     """The function (or class) that a located reference names. Raises StudyError if there is none, or if it does not
     take the arguments.
@@ -62,6 +81,47 @@ def digest_of(file: Path) -> str:
         return blake2b(file.read_bytes(), digest_size=8).hexdigest()
     except OSError:
         return ""
+
+
+_INSTALLED = {"site-packages", "dist-packages"}
+_ELSEWHERE = (Path(sysconfig.get_path("stdlib")), Path(__file__).parent.parent)
+"""Where modules lie whose versions are looked at otherwise."""
+
+
+def _imported(file: Path, module: str) -> Iterator[tuple[Path, str]]:
+    """Files and names of modules that a file imports, wherever in it. module: its own name; "": it is in no package."""
+    with suppress(OSError, SyntaxError, ValueError):
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+                base = package.rsplit(".", node.level - 1)[0] if node.level > 1 else package
+                parts = [base, node.module or ""] if node.level else [node.module or ""]
+                start = ".".join(filter(None, parts))
+                names = [start, *(f"{start}.{alias.name}" for alias in node.names)]
+            else:
+                continue
+            for name in names:
+                if (origin := _origin(name)) is not None:
+                    yield origin, name
+
+
+def _origin(module: str) -> Path | None:
+    """The file of a module; None of one that is not there, installed, or of this package."""
+    place: Path | None = None
+    parts = module.split(".")
+    for count in range(1, len(parts) + 1):  # from the outside, for what finds an inner one imports the outer ones
+        with suppress(ImportError, ValueError, AttributeError):
+            spec = importlib.util.find_spec(".".join(parts[:count]))
+            if spec is None or spec.origin is None:
+                return None
+            place = Path(spec.origin)
+            if not place.is_file() or _INSTALLED & {*place.parts} or any(map(place.is_relative_to, _ELSEWHERE)):
+                return None
+            continue
+        return None
+    return place
 
 
 def _module(where: str) -> ModuleType:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import shutil
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict, fields
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.studies.row import Job, Pilot, Row
+from conveyor_sim.studies.row import BAGS, Job, Pilot, Row
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.files import FileError, write_file
 
@@ -27,7 +28,9 @@ WARM_UP = "warm_up"
 """What they have found, in ORIGIN."""
 VERSION = "version of conveyor_sim"
 UNITS = "units.json"
-"""Of metrics and parameters, and the path of the study."""
+"""Of metrics and parameters, what each metric is, and the path of the study."""
+ASKED = "asked"
+"""What each metric is, in UNITS."""
 FREE = ("description", "seeds", "bags", "metrics", "optimise", "points")
 """Fields of a study that may change while its finished runs stay: all but these decide a run."""
 
@@ -44,7 +47,7 @@ class Journal(AbstractContextManager["Journal"]):
         written.
         """
         self.folder = folder
-        self._setup = setup
+        self._setup, self._asked = setup, setup.asked
         self.warm_up: float | None = None
         """s, as pilot runs have found it; None: they have not yet, or need not."""
         try:
@@ -57,6 +60,8 @@ class Journal(AbstractContextManager["Journal"]):
             except OSError:
                 pass  # a file system without locks
             self._check_origin()
+            for cut_short in (folder / BAGS).glob(".*"):  # by a process that was killed
+                shutil.rmtree(cut_short, ignore_errors=True)
             self.rows = {row.key: row for row in read_rows(folder) if row.status != "lost"}
             """Those that were there, and those added since."""
         except OSError as error:
@@ -73,8 +78,10 @@ class Journal(AbstractContextManager["Journal"]):
                 f"{self.folder}: point {job.point} was made with {dict(row.parameters)}, not {dict(job.parameters)}; "
                 "expected another folder, or this one emptied to begin anew"
             )
-        lacks = row is not None and row.status == "finished" and not set(self._setup.metrics) <= set(row.metrics)
-        return None if lacks else row
+        if row is not None and row.asked != self._asked:  # one that failed may have done so in a metric
+            has_all = row.status == "finished" and self._asked.items() <= row.asked.items()
+            return row if has_all else None
+        return row
 
     def add(self, row: Row) -> None:
         """Keep a run; when this returns, it is on the disk. Raises StudyError if it can't be written."""
@@ -82,24 +89,25 @@ class Journal(AbstractContextManager["Journal"]):
         self.rows[row.key] = row
 
     def start_of(self, seed: int) -> Path:
-        """Where the warm start of a seed is kept, once it is there."""
-        return self.folder / STARTS / f"seed_{seed}.npz"
+        """Where the warm start of a seed is kept, once it is there: one for each set of effects that metrics force."""
+        forced = "".join(f"_{effect}" for effect in sorted(self._setup.needs({}).get("effects", {})))
+        return self.folder / STARTS / f"seed_{seed}{forced}.npz"
 
     def keep_start(self, seed: int, content: bytes) -> None:
         """Keep a warm start. Raises StudyError if it can't be written."""
-        self._write(Path(STARTS) / f"seed_{seed}.npz", content)
+        self._write(self.start_of(seed).relative_to(self.folder), content)
 
     def pilot_of(self, job: Job) -> Pilot | None:
         """What a pilot run has shown before; None if it is to be made."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             found = json.loads((self.folder / _pilot(job)).read_text(encoding="utf-8"))
-            if (found["parameters"], found["metrics"]) == (dict(job.parameters), dict(self._setup.metrics)):
+            if (found["parameters"], found["asked"]) == (dict(job.parameters), self._asked):
                 return Pilot(found["part"], found["series"])
         return None
 
     def keep_pilot(self, job: Job, made: Pilot) -> None:
         """Keep a pilot run. Raises StudyError if it can't be written."""
-        about = {"parameters": dict(job.parameters), "metrics": dict(self._setup.metrics)}
+        about = {"parameters": dict(job.parameters), "asked": self._asked}
         self._write(_pilot(job), json.dumps({**about, **asdict(made)}))
 
     def keep_warm_up(self, seconds: float) -> None:
@@ -107,9 +115,18 @@ class Journal(AbstractContextManager["Journal"]):
         self._write(Path(ORIGIN), json.dumps({**origin_of(self._setup), WARM_UP: seconds}, indent=1))
         self.warm_up = seconds
 
+    @property
+    def has_units(self) -> bool:
+        """Whether those are kept that belong to the metrics of today."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            found = json.loads((self.folder / UNITS).read_text(encoding="utf-8"))
+            return bool((found["path"], found[ASKED]) == (self._setup.path, self._asked))
+        return False
+
     def keep_units(self, metrics: Mapping[str, str], parameters: Mapping[str, str]) -> None:
         """Keep the units of metrics and parameters. Raises StudyError if they can't be written."""
-        about = {"path": self._setup.path, "units": dict(metrics), "parameters": dict(parameters)}
+        units = {"units": dict(metrics), "parameters": dict(parameters)}
+        about = {"path": self._setup.path, ASKED: self._asked, **units}
         self._write(Path(UNITS), json.dumps(about, indent=1))
 
     def _write(self, name: Path, content: str | bytes) -> None:
@@ -134,7 +151,7 @@ class Journal(AbstractContextManager["Journal"]):
         if found is None:
             self.rows = {}
             self._write(Path(ORIGIN), json.dumps(origin, indent=1))
-            self._write(Path(SOURCE), self._setup.source)
+            self._keep_source()
             return
         self.warm_up = found.get(WARM_UP) if isinstance(found, dict) else None
         other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
@@ -143,6 +160,14 @@ class Journal(AbstractContextManager["Journal"]):
                 f"{self.folder}: its runs were made with another {' and another '.join(other)}, so they can't be "
                 "compared with new ones; expected another folder, or this one emptied to begin anew"
             )
+        self._keep_source()
+
+    def _keep_source(self) -> None:
+        """The study as it is now: some of its fields may have changed since the folder was made."""
+        with suppress(OSError, ValueError):
+            if (self.folder / SOURCE).read_text(encoding="utf-8") == self._setup.source:
+                return
+        self._write(Path(SOURCE), self._setup.source)
 
 
 def _pilot(job: Job) -> Path:
@@ -155,7 +180,7 @@ def origin_of(setup: Setup) -> dict[str, str]:
     return {
         "study": _hash(json.dumps(study, sort_keys=True)),
         "scene": _hash(setup.text, setup.overrides),
-        "code": _hash(*(f"{Path(file).name} {digest}" for file, digest in setup.code.items())),
+        "code": _hash(*(f"{Path(file).name} {setup.code[file]}" for file in setup.made_by)),
         "engine": setup.engine,
         VERSION: setup.sources,
     }

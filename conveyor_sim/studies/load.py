@@ -13,7 +13,7 @@ from conveyor_sim.scene import load_scene
 from conveyor_sim.scene.load import refused, untagged
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
-from conveyor_sim.studies.code import digest_of, file_of, function, located
+from conveyor_sim.studies.code import digest_of, files_of, function, located
 from conveyor_sim.studies.metrics import WORDS, metric_of
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import MSER, Study
@@ -51,7 +51,6 @@ def parse_study(text: str, name: str = "<text>", folder: Path | None = None) -> 
         raise StudyError(str(error)) from None
     code = {what: located(what, folder) if what else "" for what in (study.function or "", study.controller or "")}
     metrics = {name: _metric(what, folder) for name, what in study.metrics.items()}
-    named = [*code.values(), *(what for what in metrics.values() if ":" in what.partition(" ")[0])]
     made = code[study.function or ""]
     if made:
         try:
@@ -60,7 +59,13 @@ def parse_study(text: str, name: str = "<text>", folder: Path | None = None) -> 
             line = document.line_of(("function",))
             raise StudyError(f"{name}:{line}: function: {error}") from None
     scene = None if study.scene is None else load_scene(_scene_path(study.scene, folder))
-    files = [found for what in named if what and (found := file_of(what)) is not None]
+    made_by = {str(file): digest_of(file) for what in code.values() if what for file in files_of(what)}
+    asked, code_of_metrics = dict(study.metrics), dict[str, str]()
+    for metric, what in metrics.items():
+        if ":" in what.partition(" ")[0]:
+            digests = {str(file): digest_of(file) for file in files_of(what)}
+            asked[metric] = " ".join([study.metrics[metric], *digests.values()])
+            code_of_metrics |= digests
     return Setup(
         study=study,
         path=name,
@@ -71,7 +76,9 @@ def parse_study(text: str, name: str = "<text>", folder: Path | None = None) -> 
         function=made,
         controller=code[study.controller or ""],
         metrics=metrics,
-        code={str(found): digest_of(found) for found in files},
+        code=made_by | code_of_metrics,
+        made_by=tuple(made_by),
+        asked=asked,
     )
 
 

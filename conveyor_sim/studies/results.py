@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from conveyor_sim.errors import StudyError
 from conveyor_sim.scene import parse_overrides
-from conveyor_sim.studies.journal import ORIGIN, SOURCE, UNITS, VERSION, WARM_UP, read_rows
+from conveyor_sim.studies.journal import ASKED, ORIGIN, SOURCE, UNITS, VERSION, WARM_UP, read_rows
 from conveyor_sim.studies.row import Row
-from conveyor_sim.studies.study import HALF_WIDTH
+from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
 from conveyor_sim.support.files import FileError, write_file
 from conveyor_sim.version import __version__
 
@@ -47,6 +48,16 @@ class Results:
     def name(self) -> str:
         """Of the study."""
         return str(parse_overrides(self.study).get("name", ""))
+
+    @property
+    def until(self) -> Until | None:
+        """When a point has been run often enough; None: the number of seeds is given."""
+        seeds = parse_overrides(self.study).get("seeds")
+        return Seeds.model_validate(seeds).until if isinstance(seeds, dict) else None
+
+    def unit(self, metric: str) -> str:
+        """As it stands behind a number: "" for what has no dimension."""
+        return "" if self.units[metric] == "1" else self.units[metric]
 
     def command(self, row: Row) -> str:
         """What makes a run again, alone."""
@@ -81,11 +92,22 @@ def read_results(path: Path) -> Results:
         origin = json.loads((path / ORIGIN).read_text(encoding="utf-8"))
         versions = {"conveyor_sim": __version__, "engine": origin["engine"], "sources": origin[VERSION]}
         units, parameters, found = about["units"], about["parameters"], origin.get(WARM_UP)
+        rows = [_as_asked(row, about[ASKED]) for row in rows]
         return Results(study, about["path"], units, parameters, versions, rows, found)
     except (OSError, ValueError, KeyError, TypeError):
         raise StudyError(
             f"{path}: not the folder of a study that has begun, expected one of conveyor-sim sweep"
         ) from None
+
+
+def _as_asked(row: Row, asked: Mapping[str, str]) -> Row:
+    """With the metrics of today; NaN: the run was made before it was asked for this one."""
+    if row.status != "finished":
+        return row
+    known = {name for name, what in asked.items() if row.asked.get(name) == what}
+    metrics = {name: row.metrics[name] if name in known else math.nan for name in asked}
+    halves = {name: half for name, half in row.half_widths.items() if name in known}
+    return replace(row, metrics=metrics, half_widths=halves)
 
 
 def write_parquet(results: Results, path: Path) -> Path:

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+BAGS = "bags"
+"""Folder of recordings, below that of their study."""
+
 Status = Literal["finished", "failed", "lost"]
 """lost: by no fault of its own: its process died, twice, or had no room to record it, or another version; the next time
 that the study runs it is tried again.
@@ -50,6 +53,10 @@ class Row:
     """One sentence, of a run that has not finished."""
     metrics: Mapping[str, float] = field(default_factory=dict)
     """By name, in SI units or as docs/studies.md says; NaN: there is none. Empty unless finished."""
+    asked: Mapping[str, str] = field(default_factory=dict, compare=False)
+    """By metric, what it was (`Setup.asked`), for one of the same name may have become another; empty if read from a
+    Parquet file.
+    """
     half_widths: Mapping[str, float | None] = field(default_factory=dict)
     """By metric that is a mean over time: of the 95 % interval by batch means of this run; None: it is too short."""
     simulated: float = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 import uuid
 from collections.abc import Iterator, Mapping
@@ -22,7 +23,7 @@ from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
-from conveyor_sim.studies.row import Job, Row, Status
+from conveyor_sim.studies.row import BAGS, Job, Row, Status
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -45,24 +46,31 @@ class Work:
 def make_row(work: Work) -> Row:
     """Make a run. Whatever fails in it is in its row."""
     job, clock = work.job, _Clock()
-    row = Row(job.point, job.seed, dict(job.parameters), "failed")
-    wanted = "none" if work.folder is None else work.setup.study.bags
-    bag = None if work.folder is None else work.folder / bag_name(job)
+    row = Row(job.point, job.seed, dict(job.parameters), "failed", asked=work.setup.asked)
     try:
         work.setup.require_same_versions()
     except StudyError as error:  # of this process, not of the run
         return replace(row, status="lost", error=str(error))
+    wanted = "none" if work.folder is None else work.setup.study.bags
+    place = (work.folder or Path()) / bag_name(job)
+    bag = place.parent / f".{uuid.uuid4().hex}" / place.name  # aside until it is whole
     try:
         row = simulate(work, bag if wanted == "all" else None, clock)
     except Exception as error:  # of the functions and controllers of whoever wrote the study, too
         status, said = failure_of(error)
         row = replace(row, status=status, error=said)
-        if bag is not None and wanted == "failed":
-            with suppress(Exception):  # it fails again, in the same tick
-                simulate(work, bag, _Clock())
-        if bag is not None and bag.exists():
-            row = replace(row, bag=bag_name(job))
-    return replace(row, wall=clock.wall, cpu=clock.cpu)
+    row = replace(row, wall=clock.wall, cpu=clock.cpu)
+    if row.status == wanted == "failed":
+        with suppress(Exception):  # it fails again, in the same tick
+            simulate(work, bag, _Clock())
+    if wanted != "none" and bag.is_dir():
+        if row.status != "lost":
+            shutil.rmtree(place, ignore_errors=True)  # of the same run, with other metrics
+            with suppress(OSError):
+                bag.rename(place)
+                row = replace(row, bag=bag_name(job))
+        shutil.rmtree(bag.parent, ignore_errors=True)
+    return row
 
 
 def failure_of(error: Exception) -> tuple[Status, str]:
@@ -73,7 +81,7 @@ def failure_of(error: Exception) -> tuple[Status, str]:
 
 def bag_name(job: Job) -> str:
     """Folder of the recording of a run, below that of its study."""
-    return f"bags/point_{job.point}_seed_{job.seed}"
+    return f"{BAGS}/point_{job.point}_seed_{job.seed}"
 
 
 def warm_start(work: Work) -> bytes:
@@ -142,10 +150,10 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> Row:
         dict(job.parameters),
         "finished",
         metrics={name: float(gauge.value()) for name, gauge in gauges.items()},
+        asked=work.setup.asked,
         half_widths={name: half_width(gauge) for name, gauge in gauges.items() if isinstance(gauge, Averaged)},
         simulated=(last - first) * scene.tick,
         dt=simulation.model.dt,
-        bag="" if bag is None else bag_name(job),
     )
 
 

@@ -67,11 +67,11 @@ class Runs(AbstractContextManager["Runs"]):
 
         total = len(rows) + len(todo)
         progress(len(rows), total, left(), None)
-        if todo:
-            self._compile(todo)
+        if todo or not self.journal.has_units:
+            self._compile(todo or jobs[:1])
         unstarted = self._warm(todo)
         for job in [job for job in todo if job.seed in unstarted]:
-            rows[job.key] = self._keep(Row(job.point, job.seed, dict(job.parameters), *unstarted[job.seed]))
+            rows[job.key] = self._keep(self._unmade(job, *unstarted[job.seed]))
         if self._setup.study.warm_up == MSER and len(rows) < total:
             works = [self._work(job) for job in todo if job.key not in rows]
             found = find_warm_up(works, self._engine, self.journal, self._say, progress)
@@ -79,8 +79,7 @@ class Runs(AbstractContextManager["Runs"]):
         works = [self._work(job) for job in todo if job.key not in rows]
         for work, made in self._engine.each(make_row, works):
             job = work.job
-            lost = Row(job.point, job.seed, dict(job.parameters), "lost", str(made))
-            row = lost if isinstance(made, DiedError) else made
+            row = self._unmade(job, "lost", str(made)) if isinstance(made, DiedError) else made
             rows[job.key] = self._keep(row)
             if row.status == "finished":
                 spent, counted = spent + row.wall, counted + 1
@@ -93,6 +92,9 @@ class Runs(AbstractContextManager["Runs"]):
             start = self.journal.start_of(job.seed).resolve()
             start = start if self._engine.is_here else start.read_bytes()
         return Work(self._setup, job, start, self.folder.resolve())
+
+    def _unmade(self, job: Job, status: Status, error: str) -> Row:
+        return Row(job.point, job.seed, dict(job.parameters), status, error, asked=self._setup.asked)
 
     def _keep(self, row: Row) -> Row:
         self.journal.add(row)

@@ -37,6 +37,10 @@ class Setup:
     """By name, what is kept."""
     code: Mapping[str, str] = field(default_factory=dict)
     """By file, a hash of what it held when the study was read."""
+    made_by: tuple[str, ...] = ()
+    """Those of `code` that make the line and its controller."""
+    asked: Mapping[str, str] = field(default_factory=dict)
+    """By metric, what it is: as the study says it, with the hashes of its files if it is a function."""
     engine: str = ENGINE_HASH
     sources: str = field(default_factory=sources_hash)
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -10,18 +12,23 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from studies.small import Here, setup_of
+from click.testing import CliRunner
+from studies.small import CODE, Here, setup_of, write_study
 
 from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.cli import main
 from conveyor_sim.errors import StudyError
 from conveyor_sim.studies.alone import job_of, run_alone
 from conveyor_sim.studies.journal import read_rows
+from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.results import read_results, run_command, write_parquet
 from conveyor_sim.studies.row import Job, Row
 from conveyor_sim.studies.run import Work, make_row, warm_start
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.sweep import sweep
+from conveyor_sim.studies.table import points_table
+from conveyor_sim.studies.verdict import verdicts
 
 METRICS = [
     "efficiency",
@@ -110,8 +117,61 @@ def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[Row]
             with pytest.raises(StudyError, match=what):
                 Runs(other, folder, Here())
         else:  # fewer seeds
-            with Runs(other, folder, Here()) as runs:
+            copied = shutil.copytree(folder, tmp_path / "copied")
+            with Runs(other, copied, Here()) as runs:
                 assert sweep(runs, other) == [row for row in rows if row.seed == 1]
+
+
+def test_a_metric_that_has_become_another_is_asked_of_new_runs(tmp_path: Path) -> None:
+    """Of the same name: what older runs say to it is an answer to another question."""
+    out = tmp_path / "out"
+    mean = setup_of(tmp_path, duration=0.5, seeds=3)
+    with Runs(mean, out, Here()) as runs:
+        first = sweep(runs, mean)
+    most = setup_of(tmp_path, duration=0.5, metrics=["stops", {"queue": "maximum belts/conveyor/bottles"}])
+    with Runs(most, out, engine := Here()) as runs:
+        found = sweep(runs, most)
+    assert engine.made == 4 and all(row.metrics["queue"].is_integer() for row in found)
+    results = read_results(out)
+    assert results.study == most.source and list(results.units) == ["stops", "queue"]
+    # Two runs of the third seed are still there, without an answer to what is asked today.
+    old = [row for row in results.rows if row.seed == 3]
+    assert len(results.rows) == 6 and all(math.isnan(row.metrics["queue"]) for row in old)
+    assert [row.metrics["stops"] for row in old] == [row.metrics["stops"] for row in first if row.seed == 3]
+    assert any("queue" in sentence for sentence in verdicts(results)) and points_table(results.rows, results.units, {})
+    with Runs(mean, out, engine := Here()) as runs:
+        assert [row.metrics for row in sweep(runs, mean)] == [row.metrics for row in first]
+    assert engine.made == 4
+    fewer = setup_of(tmp_path, duration=0.5, metrics=["stops"])
+    with Runs(fewer, out, engine := Here()) as runs:
+        sweep(runs, fewer)
+    assert engine.made == 0 and list(read_results(out).units) == ["stops"]
+
+
+def test_a_function_of_metrics_may_be_mended(tmp_path: Path) -> None:
+    """Its runs are made again, those that failed by it, too; a function that makes the line makes another study."""
+    (tmp_path / "mine.py").write_text("from helper import times\ndef fed(simulation):\n    return times(simulation)\n")
+    (tmp_path / "helper.py").write_text("def times(simulation):\n    raise ValueError('not yet')\n")
+    sys.path.append(str(tmp_path))
+    try:
+        for body, status in (
+            ("raise ValueError('not yet')", "failed"),
+            ("return 2.0 * simulation.counts.fed", "finished"),
+        ):
+            (tmp_path / "helper.py").write_text(f"def times(simulation):\n    {body}\n")
+            sys.modules.pop("helper", None)
+            setup = setup_of(tmp_path, metrics=[{"fed": "mine.py:fed"}], duration=0.5, seeds=1)
+            assert {Path(file).name for file in setup.code} == {"code.py", "mine.py", "helper.py"}
+            (tmp_path / "mine.py").touch()  # read again by this process
+            with Runs(setup, tmp_path / "out", Here()) as runs:
+                rows = sweep(runs, setup)
+            assert [row.status for row in rows] == [status] * 2, [row.error for row in rows]
+    finally:
+        sys.path.remove(str(tmp_path))
+    write_study(tmp_path, metrics=[{"fed": "mine.py:fed"}], duration=0.5, seeds=1)
+    (tmp_path / "code.py").write_text(CODE + "\n")
+    with pytest.raises(StudyError, match="another code"):
+        Runs(load_study(tmp_path / "study.yaml"), tmp_path / "out", Here())
 
 
 def test_the_table_is_a_parquet_file(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
@@ -134,6 +194,9 @@ def test_the_table_is_a_parquet_file(made: tuple[Setup, Path, list[Row]], tmp_pa
     query = f"import duckdb; print(duckdb.sql(\"select sum(queue) from '{path}' where rate > 5\").fetchall())"
     found = subprocess.run([sys.executable, "-c", query], capture_output=True, text=True, check=True)
     assert float(found.stdout.strip("[](), \n")) == pytest.approx(sum(row.metrics["queue"] for row in rows[3:]))
+    said = [CliRunner().invoke(main, ["study", str(read), "--no-pictures"]) for read in (folder, path)]
+    assert said[0].exit_code == 0 and said[0].output == said[1].output
+    assert all(sentence in said[0].output.splitlines() for sentence in verdicts(results))
     from pyarrow import parquet
 
     schema = parquet.read_schema(path)
@@ -172,8 +235,23 @@ def test_a_run_that_fails_says_why_and_leaves_a_recording(tmp_path: Path) -> Non
     every = setup_of(
         tmp_path, parameters=parameters, controller="code.py:Feeder", settings={"speed": 0.5}, duration=0.5, bags="all"
     )
-    row = make_row(Work(every, Job(3, {"until": 2.0}, 1), None, tmp_path / "out"))
-    assert row.metrics == good.metrics and (tmp_path / "out" / row.bag).is_dir()
+    place = tmp_path / "out" / "bags" / "point_3_seed_1"
+    place.mkdir()
+    (place / "cut_short.mcap").touch()  # by a process that was killed
+    for _ in range(2):
+        row = make_row(Work(every, Job(3, {"until": 2.0}, 1), None, tmp_path / "out"))
+        assert row.metrics == good.metrics and tmp_path / "out" / row.bag == place
+        assert sorted(path.name for path in place.iterdir()) == ["metadata.yaml", "point_3_seed_1_0.mcap"]
+    with open_bag(place) as bag:
+        assert bag.counts["outcomes"] > 0
+    assert sorted(path.name for path in place.parent.iterdir()) == ["point_0_seed_1", "point_3_seed_1"]
+
+
+def test_a_metric_that_is_no_number_is_said(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def words(simulation):\n    return 'many'\n")
+    setup = setup_of(tmp_path, metrics=[{"mine": "mine.py:words"}], duration=0.1)
+    row = make_row(Work(setup, Job(0, {"rate": 4.0}, 1)))
+    assert (row.status, row.error) == ("failed", 'words returned "many", expected a number')
 
 
 def test_controllers_are_compared_from_one_warm_line_a_seed(tmp_path: Path) -> None:
@@ -198,6 +276,12 @@ def test_controllers_are_compared_from_one_warm_line_a_seed(tmp_path: Path) -> N
         assert row.metrics == whole.metrics and row.simulated == 0.5
     assert rows[0].metrics["all"] > rows[0].metrics["scans"]
     # The checkpoint as bytes, as it travels to another machine, and as the run alone makes it.
+    # A metric that needs an effect begins from a checkpoint that has it, by the same motion.
+    forces = setup_of(tmp_path, **{**study, "metrics": [*study["metrics"], "peak_force"]})
+    with Runs(forces, tmp_path / "out", Here()) as runs:
+        again = sweep(runs, forces)
+    assert [row.status for row in again] == ["finished"] * 4, [row.error for row in again]
+    assert all(new.metrics.items() >= old.metrics.items() for new, old in zip(again, rows, strict=True))
     content = warm_start(Work(setup, Job(0, {}, 1)))
     assert make_row(Work(setup, Job(1, {"speed": 0.3}, 1), content)).metrics == rows[2].metrics
     assert run_alone(setup, job_of(setup, ["speed=0.3"], 1), None).metrics == rows[2].metrics
