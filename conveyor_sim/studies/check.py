@@ -25,12 +25,11 @@ def check_study(setup: Setup, first: Point | None = None) -> None:
     first: None is that of the design. Raises StudyError with a line for each value that can't be.
     """
     first = points_of(setup.study)[0] if first is None else first
-    path: Path = ("function",) if setup.function else ("scene",)
-    problems = [*_problems(setup, first, path)]
+    problems = [_at_parameter(setup, first, found) for found in _problems(setup, first)]
     for name, parameter in setup.study.parameters.items() if not problems else ():
         for place, value in _values(name, parameter):
             if value != first[name]:
-                found = next(_problems(setup, {**first, name: value}, place), None)
+                found = next(_problems(setup, {**first, name: value}), None)
                 problems += [Problem(place, f"{shown(value)} given, but {found.text}")] if found else []
     if problems:
         raise StudyError(str(refused(problems, Document(setup.source, setup.path), setup.path, {})))
@@ -76,18 +75,31 @@ def _unit_at(scene: Scene, path: Path) -> str:
     return "" if unit == "1" else unit
 
 
-def _problems(setup: Setup, point: Point, path: Path) -> Iterator[Problem]:
+def _problems(setup: Setup, point: Point) -> Iterator[Problem]:
     """The first thing that is wrong with the line of a point."""
+    path: Path = ("function",) if setup.function else ("scene",)
     try:
         scene = scene_of(setup, point, setup.study.seeds.first)
         warm_up, whole = setup.study.warm_up, scene.duration - (setup.study.warm_start or 0.0)
         if not isinstance(warm_up, str) and warm_up >= whole:
             yield Problem(("warm_up",), f"{warm_up:g} given, expected less than a run takes (s)")
+        path = ("controller",)
         controller_of(setup, point)
     except ConveyorError as error:
         yield Problem(path, str(error).splitlines()[0])
     except Exception as error:  # of a function of whoever wrote the study
         yield Problem(path, f"{type(error).__name__}: {error}")
+
+
+def _at_parameter(setup: Setup, point: Point, found: Problem) -> Problem:
+    """What is wrong with a point, at the parameter without which it would not be."""
+    for name, parameter in setup.study.parameters.items():
+        what = "field" if parameter.field is not None else "controller"
+        given = getattr(parameter, what)
+        rest = {other: value for other, value in point.items() if other != name}
+        if given is not None and next(_problems(setup, rest), None) is None:
+            return Problem(("parameters", name, what), f"{shown(given)} given, but {found.text}")
+    return found
 
 
 def _values(name: str, parameter: Parameter) -> Iterator[tuple[Path, Any]]:

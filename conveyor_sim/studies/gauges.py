@@ -246,8 +246,12 @@ class OfFunction:
         self._look()
 
     def value(self) -> float:
-        """As it says."""
-        return float(self._made(self._simulation) if self._watch is None else self._watch.value())
+        """As it says. Raises StudyError for what is no number."""
+        found = self._made(self._simulation) if self._watch is None else self._watch.value()
+        try:
+            return float(found)
+        except (TypeError, ValueError):
+            raise StudyError(f"{self._made.__name__} returned {shown(found)}, expected a number") from None
 
 
 def share_of(text: str) -> tuple[float, str]:

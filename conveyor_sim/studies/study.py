@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Len, Lt
-from pydantic import BeforeValidator, Strict, StrictBool, StrictFloat, StrictInt, StrictStr
+from pydantic import AllowInfNan, BeforeValidator, Strict, StrictBool, StrictFloat, StrictInt, StrictStr
 
 from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.problems import Problem
@@ -27,6 +28,7 @@ from conveyor_sim.scene.types import (
 from conveyor_sim.scene.words import listed, shown
 from conveyor_sim.studies.optimisation.part import Optimise
 
+LAST_SEED = 2**64 - 1
 LEAST_BATCH = 10
 """Runs of a point, at least, before it is asked whether there are enough: of fewer the spread is hardly known."""
 
@@ -36,15 +38,18 @@ MSER = "mser"
 HALF_WIDTH = "_half_width"
 """Behind the name of a metric: the column beside it that says how well the run alone knows it."""
 
+MOST_RUNS = 1_000_000
+"""Of a study: each is a file."""
+
 RESERVED = ("point", "seed", "status", "error", "simulated", "dt", "wall", "cpu", "bag")
 """Columns that every table of runs has."""
 
 Design = Literal["grid", "list", "latin_hypercube", "sobol", "saltelli"]
 
-Value = StrictBool | StrictInt | StrictFloat | StrictStr
-"""Of a parameter."""
-
-_Value = Annotated[Value, Says("a number, a text, true or false")]
+_Value = Annotated[
+    StrictBool | StrictInt | Annotated[StrictFloat, AllowInfNan(False)] | StrictStr,
+    Says("a number that is finite, a text, true or false"),
+]
 _Batch = Annotated[int, Strict(), Ge(LEAST_BATCH), Says(f"a whole number, {LEAST_BATCH} or greater")]
 _WarmUp = Annotated[NotNegative | Literal["mser"], Says('a number, 0 or greater, or "mser"')]
 _Confidence = Annotated[float, Strict(), Gt(0), Lt(1), Says("a number between 0 and 1")]
@@ -113,10 +118,13 @@ class Seeds(Part):
         if self.until is not None and self.most < self.batch:
             text = f"{shown(self.most)} given, expected at least the batch, {self.batch}"
             yield Problem((*path, "most"), text)
+        last = self.first + (self.most if self.count is None else self.count) - 1
+        if last > LAST_SEED:
+            yield Problem((*path, "first"), f"{self.first} given, expected one with which the last is at most 2^64 - 1")
 
 
 def _counted(value: Any) -> Any:
-    return {"count": value} if isinstance(value, int) and not isinstance(value, bool) else value
+    return {"count": value} if isinstance(value, (int, float)) and not isinstance(value, bool) else value
 
 
 def _named(value: Any) -> Any:
@@ -130,6 +138,16 @@ def _named(value: Any) -> Any:
     if len(set(map(str, names))) < len(names):
         raise ValueError("given twice")
     return dict(pairs)
+
+
+def _repeated(values: Sequence[Any]) -> Iterator[int]:
+    """Places of those that stand before, too. True is not 1."""
+    seen: set[Any] = set()
+    for place, value in enumerate(values):
+        one = tuple((isinstance(part, bool), part) for part in (value if isinstance(value, tuple) else (value,)))
+        if one in seen:
+            yield place
+        seen.add(one)
 
 
 def _is_reserved(name: str) -> bool:
@@ -227,12 +245,16 @@ class Study(Part):
                 yield Problem(("metrics", name), "given as a name, expected another: runs have a column of that name")
         yield from self._design_problems() if self.optimise is None else self._optimise_problems(self.optimise)
         yield from self.seeds.problems(("seeds",))
+        runs = self._point_count() * (self.seeds.batch if self.seeds.count is None else self.seeds.count)
+        if runs > MOST_RUNS:
+            yield Problem(("seeds",), f"{runs} runs given by all points and seeds, expected at most {MOST_RUNS}")
         if self.seeds.until is not None and self.seeds.until.metric not in self.metrics:
             text = f"{shown(self.seeds.until.metric)} given, expected one of {', '.join(self.metrics)}"
             yield Problem(("seeds", "until", "metric"), text)
 
     def _design_problems(self) -> Iterator[Problem]:
         """What is wrong with the points of a design."""
+        yield from self._given_twice()
         for name, parameter in self.parameters.items():
             path = ("parameters", name, "values")
             if self.design in ("grid", "list") and parameter.values is None:
@@ -249,8 +271,32 @@ class Study(Part):
             else:
                 yield Problem(("points",), f"{self.points} given, expected none: a {self.design} has them by values")
 
+    def _point_count(self) -> int:
+        """How many there are, in numbers alone."""
+        if self.optimise is not None:
+            return self.optimise.trials
+        lengths = [len(parameter.values or ()) for parameter in self.parameters.values()]
+        if self.design in ("grid", "list"):
+            return math.prod(lengths) if self.design == "grid" else min(lengths)
+        return (self.points or 1) * (len(lengths) + 2 if self.design == "saltelli" else 1)
+
+    def _given_twice(self) -> Iterator[Problem]:
+        """Points that would be run twice, and take part in comparisons as if they were two."""
+        values = {name: parameter.values or () for name, parameter in self.parameters.items()}
+        if self.design == "list":
+            points = list(zip(*values.values(), strict=False))
+            for place in _repeated(points):
+                what = ", ".join(f"{name} {shown(value)}" for name, value in zip(values, points[place], strict=True))
+                yield Problem(("design",), f"list given with the point {what} twice, expected each once")
+        else:
+            for name, found in values.items():
+                for place in _repeated(found):
+                    path = ("parameters", name, "values", place)
+                    yield Problem(path, f"{shown(found[place])} given twice, expected each value once")
+
     def _optimise_problems(self, wanted: Optimise) -> Iterator[Problem]:
         """What is wrong with an optimisation."""
+        yield from self._given_twice()
         for name in ("design", "points"):
             if name in self.model_fields_set:
                 yield Problem((name,), "given, expected none beside optimise, which chooses points")

@@ -14,6 +14,7 @@ from conveyor_sim.studies.load import load_study
 
 UNTIL = {"metric": "stops", "half_width": 1.0}
 RATE = {"argument": "rate", "values": [4.0]}
+RATE_TWICE = {"argument": "rate", "values": [4.0, 5.0, 4.0]}
 
 
 @pytest.mark.parametrize(
@@ -21,6 +22,7 @@ RATE = {"argument": "rate", "values": [4.0]}
     [
         ({"seed": 2}, r"study.yaml:\d+: seed: no such field, did you mean seeds\?"),
         ({"seeds": 0}, r"study.yaml:\d+: seeds.count: 0 given, expected a whole number, 1 or greater"),
+        ({"seeds": 2.5}, r"study.yaml:\d+: seeds.count: 2.5 given, expected a whole number, 1 or greater"),
         ({"seeds": None}, r"seeds: missing, expected a whole number, 1 or greater, or a mapping"),
         ({"seeds": {"first": 3}}, r"seeds: expected either count or until"),
         (
@@ -30,6 +32,14 @@ RATE = {"argument": "rate", "values": [4.0]}
         (
             {"seeds": {"until": {"metric": "stop", "half_width": 1.0}}},
             r"until.metric: \"stop\" given, expected one of thr",
+        ),
+        (
+            {"seeds": 2_000_000},
+            r"study.yaml:\d+: seeds: 4000000 runs given by all points and seeds, expected at most 10000",
+        ),
+        (
+            {"seeds": {"first": 2**64 - 2, "count": 5}},
+            r"seeds.first: 18446744073709551614 given, expected one with which",
         ),
         ({"scene": "push"}, r"study.yaml:1: expected either scene or function"),
         ({"function": "code.py:lin"}, r"study.yaml:\d+: function: .*code.py has no function lin"),
@@ -49,6 +59,14 @@ RATE = {"argument": "rate", "values": [4.0]}
         (
             {"parameters": {"x": {"argument": "x", "low": 2.0, "high": 1.0}}},
             r"x.high: 1 given, expected more than low, 2",
+        ),
+        (
+            {"parameters": {"x": {"argument": "x", "values": [1.0, 2, 1]}}},
+            r"x.values\[2\]: 1 given twice, expected each value once",
+        ),
+        (
+            {"design": "list", "parameters": {"x": {"argument": "x", "values": [1, 2, 1]}, "y": RATE_TWICE}},
+            r"study.yaml:\d+: design: list given with the point x 1, y 4 twice, expected each once",
         ),
         ({"warm_up": "msr"}, r'warm_up: "msr" given, expected a number, 0 or greater, or "mser"'),
         (
@@ -73,14 +91,26 @@ def test_a_study_that_cannot_be(tmp_path: Path, changes: dict[str, Any], said: s
         ),
         (
             {"parameters": {"v": {"field": "belts.convoyer.speed", "values": [0.1]}}},
-            r"function: belts.convoyer.speed: no belts.convoyer in the scene, did you mean conveyor\?",
+            r'study.yaml:\d+: parameters.v.field: "belts.convoyer.speed" given, but .* did you mean conveyor\?',
+        ),
+        (
+            {"parameters": {"r": RATE, "v": {"field": "belts.conveyor.sped", "values": [0.1]}}},
+            r'parameters.v.field: "belts.conveyor.sped" given, but .*sped: no such field, did you mean speed\?',
         ),
         (
             {"parameters": {"v": {"field": "base[3].friction", "values": [0.1]}}},
             r"the scene has no such entry of a list",
         ),
         ({"parameters": {"v": {"argument": "v", "values": [0.1]}}}, r"unexpected keyword argument 'v'; its arguments"),
-        ({"controller": "code.py:Feeder"}, r"missing a required argument: 'speed'"),
+        ({"controller": "code.py:Feeder"}, r"study.yaml:\d+: controller: .*missing a required argument: 'speed'"),
+        (
+            {
+                "controller": "code.py:Feeder",
+                "settings": {"speed": 1.0},
+                "parameters": {"u": {"controller": "untl", "values": [1.0]}},
+            },
+            r"parameters.u.controller: \"untl\" given, but .*unexpected keyword argument 'untl'",
+        ),
         ({"warm_up": 1.0}, r"warm_up: 1 given, expected less than a run takes \(s\)"),
     ],
 )
@@ -88,6 +118,14 @@ def test_a_line_that_cannot_be(tmp_path: Path, changes: dict[str, Any], said: st
     setup = setup_of(tmp_path, **changes)
     with pytest.raises(StudyError, match=said):
         check_study(setup)
+
+
+@pytest.mark.parametrize("value", [".nan", "-.inf"])
+def test_a_value_is_a_finite_number(tmp_path: Path, value: str) -> None:
+    path = write_study(tmp_path)
+    path.write_text(path.read_text().replace("6.0", value))
+    with pytest.raises(StudyError, match=rf"parameters.rate.values\[1\]: {value} given, expected a number that is fin"):
+        load_study(path)
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
