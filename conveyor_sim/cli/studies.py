@@ -99,12 +99,15 @@ def _sweep(setup: Setup, out: Path | None, engine: Callable[[], Engine]) -> None
     from conveyor_sim.studies.results import PARQUET, read_results, write_parquet
     from conveyor_sim.studies.sweep import study_folder, sweep
     from conveyor_sim.studies.table import points_table
+    from conveyor_sim.studies.verdict import wider_than_wanted
 
     folder = study_folder(setup) if out is None else out
     with shown_runs(setup, folder, engine) as (runs, display):
         rows = sweep(runs, setup, display.update)
     results = read_results(folder)
     show(points_table(rows, results.units, results.parameters))
+    for sentence in wider_than_wanted(results):
+        click.echo(sentence)
     for row in rows:
         if row.status != "finished":
             click.echo(f"{row.status}: {row.error}: {results.command(row)}")

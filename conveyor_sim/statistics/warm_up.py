@@ -32,15 +32,16 @@ def warm_up(series: Sequence[float] | NDArray[np.float64], batch: int = BATCH) -
     """How many values of a series (n,), at even times, to leave out; None: it is too short to say.
 
     That is where the mean still changes in the second half, so that the run may never have warmed up, or with less than
-    LEAST means. Of runs with many seeds, (runs, n), the rule is put to their mean series. To put it to each run by
-    itself would be wrong for what is skewed, such as queues: it leaves out the start of those that happen to get long.
+    LEAST means, or where one is not finite. Of runs with many seeds, (runs, n), the rule is put to their mean series.
+    To put it to each run by itself would be wrong for what is skewed, such as queues: it leaves out the start of those
+    that happen to get long.
     """
     values = np.asarray(series, dtype=np.float64)
     if values.ndim == 2:
         values = values.mean(axis=0)
     means = values[: len(values) // batch * batch].reshape(-1, batch).mean(axis=1)
     count = len(means)
-    if count < LEAST:
+    if count < LEAST or not np.isfinite(means).all():
         return None
     left = count - np.arange(count)  # by how many are left out
     about = means - means.mean()

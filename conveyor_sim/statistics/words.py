@@ -39,11 +39,11 @@ def told(difference: Interval, first: str, second: str, unit: str = "", confiden
     if needed is None:
         rest = "no number of seeds that can be run would tell it, if it is as it seems"
     else:
-        rest = f"about {_rounded(needed)} would, if it is as large as it seems"
+        rest = f"about {rounded(needed)} would, if it is as large as it seems"
     return f"{what}, can't be told from none with {seeds}; {rest}"
 
 
-def _rounded(runs: int) -> int:
+def rounded(runs: int) -> int:
     """Up to two digits: the rest would claim too much."""
     step = int(10 ** max(0, len(str(runs)) - 2))
     return -(-runs // step) * step

@@ -58,7 +58,8 @@ def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] 
     """A metric over the levels of a parameter.
 
     All points have the same seeds, so runs of one seed go together: its mean over the points at a level is one value,
-    and the interval rests on as many as there are seeds.
+    and the interval rests on as many as there are seeds. A seed that a point at the level lacks, as it was run less
+    often or a run failed, is left out there: its mean would be of other points than that of the others.
     """
     rows = results.rows if rows is None else rows
     title, across = titled(results, metric), titled(results, parameter)
@@ -70,13 +71,15 @@ def response(results: Results, parameter: str, metric: str, rows: Sequence[Row] 
     levels = levels_of(rows, parameter)
     means, halves = [], []
     for level in levels:
-        by_seed: dict[int, list[float]] = {}
         at_level = _at(rows, parameter, level)
+        by_point: dict[int, dict[int, float]] = {}
         for row in at_level:
             if row.status == "finished" and math.isfinite(row.metrics[metric]):
-                by_seed.setdefault(row.seed, []).append(row.metrics[metric])
-        values = [_mean(found) for found in by_seed.values()]
-        means.append(_mean(values))
+                by_point.setdefault(row.point, {})[row.seed] = row.metrics[metric]
+        seeds = set.intersection(*map(set, by_point.values())) if by_point else set()
+        values = [_mean([found[seed] for found in by_point.values()]) for seed in sorted(seeds)]
+        # Without a seed that all have, each point counts as much as another, and nothing is known of the interval.
+        means.append(_mean(values or [_mean(list(found.values())) for found in by_point.values()]))
         halves.append(mean_interval(values).half_width if len(values) > 1 else _of_one_run(at_level, metric))
     return Response(across, title, levels, np.array(means), np.array(halves))
 

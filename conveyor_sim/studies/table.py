@@ -52,7 +52,7 @@ def _mean(rows: Sequence[Row], metric: str) -> str:
     if not known:
         return "-"
     found = mean_interval(known)
-    half = found.half_width if len(known) > 1 else rows[0].half_widths.get(metric)
+    half = found.half_width if len(known) > 1 else rows[0].half_widths.get(metric) if len(rows) == 1 else None
     if not half:
         return f"{found.mean:.4g}"
     digits = max(0, 1 - math.floor(math.log10(half)))

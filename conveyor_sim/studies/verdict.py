@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from conveyor_sim.statistics.comparisons import best
+from conveyor_sim.statistics.comparisons import best, compare_paired
+from conveyor_sim.statistics.intervals import mean_interval
+from conveyor_sim.statistics.sample_size import runs_for
+from conveyor_sim.statistics.words import plus_minus, rounded
 from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import Row, point_text
 
@@ -18,31 +22,59 @@ LISTED = 3
 def verdicts(results: Results) -> Iterator[str]:
     """For each metric, by pairs of runs with the same seed, corrected for being so many comparisons.
 
-    Of a study with one run a point, instead: which metrics that run alone has no interval for.
+    Of a study with one run a point, instead: which metrics that run alone has no interval for. Of one whose seeds go on
+    until an interval is narrow, before that: where it is not. What can't be compared is said.
     """
     if results.one_run_each:
         yield from _of_single_runs(results)
         return
-    by_point: dict[int, dict[int, Row]] = {}
-    for row in results.rows:
-        if row.status == "finished":
-            by_point.setdefault(row.point, {})[row.seed] = row
+    yield from wider_than_wanted(results)
+    by_point = _by_point(results)
     seeds = set.intersection(*map(set, by_point.values())) if by_point else set()
-    if not 2 <= len(by_point) <= MOST or len(seeds) < 2:
+    if len(by_point) < 2:
+        return
+    if len(by_point) > MOST:
+        yield f"the {len(by_point)} points are not compared with each other: they are more than {MOST}"
+        return
+    if len(seeds) < 2:
+        yield "the points are not compared with each other: not two seeds have a finished run at each of them"
         return
     rows = [[by_point[point][seed] for seed in sorted(seeds)] for point in sorted(by_point)]
     for metric in results.units:
         values = [np.array([row.metrics[metric] for row in found]) for found in rows]
         if not np.isfinite(values).all():
+            lacking = [found[0] for found, made in zip(rows, values, strict=True) if not np.isfinite(made).all()]
+            yield f"{metric}: points are not compared, as there are runs without it at {_points(lacking)}"
             continue
-        sides = {word: best(values, highest=word == "highest") for word in ("lowest", "highest")}
-        if len(sides["highest"]) == len(rows):
+        if not any(pair.told for pair in compare_paired(values)):
             yield f"{metric}: no point can be told from another with {len(seeds)} seeds"
             continue
+        sides = {word: best(values, highest=word == "highest") for word in ("lowest", "highest")}
         for word, (top, *others) in sides.items():
             like = _points([rows[place][0] for place in others])
             rest = f"; not told from it with {len(seeds)} seeds: {like}" if others else ""
             yield f"{metric}: {word} at {point_text(rows[top][0].parameters)}{rest}"
+
+
+def wider_than_wanted(results: Results) -> Iterator[str]:
+    """The points that `seeds: until` leaves with an interval that is wider than it says, as `most` came before."""
+    until = results.until
+    if until is None or until.metric not in results.units:
+        return
+    said = []
+    for found in _by_point(results).values():
+        interval = mean_interval([row.metrics[until.metric] for row in found.values()], until.confidence)
+        wanted = until.half_width * (abs(interval.mean) if until.relative else 1.0)
+        if math.isfinite(interval.half_width) and interval.half_width > wanted:
+            needed = runs_for(interval, wanted, until.confidence)
+            said.append(
+                f"{until.metric} at {point_text(next(iter(found.values())).parameters)}: "
+                f"{plus_minus(interval, results.unit(until.metric))} with {interval.values} seeds, wider than the "
+                f"± {wanted:.3g} that is wanted" + ("" if needed is None else f"; about {rounded(needed)} would do")
+            )
+    yield from said[:LISTED]
+    if len(said) > LISTED:
+        yield f"{until.metric}: wider than wanted at {len(said) - LISTED} more points"
 
 
 def _of_single_runs(results: Results) -> Iterator[str]:
@@ -56,6 +88,15 @@ def _of_single_runs(results: Results) -> Iterator[str]:
                 f"{metric}: no interval at {_points(lacking)}: the run is too short for its batches to be independent, "
                 "expected a longer run, or more seeds"
             )
+
+
+def _by_point(results: Results) -> dict[int, dict[int, Row]]:
+    """Finished runs, by point and seed."""
+    found: dict[int, dict[int, Row]] = {}
+    for row in results.rows:
+        if row.status == "finished":
+            found.setdefault(row.point, {})[row.seed] = row
+    return found
 
 
 def _points(rows: Sequence[Row]) -> str:

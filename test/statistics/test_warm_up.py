@@ -55,4 +55,4 @@ def test_what_never_settles_is_said_so() -> None:
 def test_a_short_series_says_nothing() -> None:
     assert warm_up(np.ones(BATCH * LEAST - 1)) is None
     assert warm_up(np.ones(BATCH * LEAST)) == 0
-    assert warm_up([math.nan] * 3) is None
+    assert warm_up([1.0] * 80 + [math.nan] + [1.0] * 80) is None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from conveyor_sim.studies.design import saltelli
 from conveyor_sim.studies.effects import indices, interactions, main_effects, maps
 from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import Row
-from conveyor_sim.studies.verdict import verdicts
+from conveyor_sim.studies.verdict import verdicts, wider_than_wanted
 
 
 def results_of(points: list[dict[str, Any]], seeds: int, made: Callable[[Mapping[str, Any], int], float]) -> Results:
@@ -48,6 +49,18 @@ def test_main_effects_are_means_over_all_else_with_intervals_over_seeds() -> Non
     assert (kind.levels, kind.mean.tolist()) == (["steel", "glass"], [4.0, 5.0])
 
 
+def test_a_seed_that_a_point_lacks_shifts_no_mean() -> None:
+    """As where one point was run more often than others: its seeds by themselves say nothing of the level."""
+    found = results_of(GRID, 3, noisy)
+    often = [Row(1, seed, GRID[1], "finished", metrics={"y": 3.0 + (-1.0) ** seed}) for seed in range(3, 23)]
+    ((x,), _) = main_effects(replace(found, rows=[*found.rows, *often]))[0]
+    assert x.mean == pytest.approx([2.5, 4.5, 6.5])
+    assert x.half_width == pytest.approx([4.3027 / math.sqrt(3.0)] * 3, rel=1e-4)
+    apart = [row for row in found.rows if row.point != 0 or row.seed == 0] + often
+    ((x,), _) = main_effects(replace(found, rows=[row for row in apart if (row.point, row.seed) != (1, 0)]))[0]
+    assert x.mean[0] == pytest.approx(0.5 * (1.0 + (3.0 + 4.0 + 20 * 3.0) / 22)) and math.isnan(x.half_width[0])
+
+
 def test_interactions_and_maps() -> None:
     found = results_of(GRID, 3, noisy)
     ((across_x, across_kind),) = interactions(found, "y")
@@ -66,6 +79,41 @@ def test_what_cannot_be_told_is_said() -> None:
     draw = np.random.default_rng(3)
     noise = results_of(GRID, 5, lambda point, seed: float(draw.normal()))
     assert list(verdicts(noise)) == ["y: no point can be told from another with 5 seeds"]
+    # Two that are told apart, and a third, the highest on average, that scatters too much to be told from either.
+    scatter = [-300.0, 500.0, -100.0, 400.0, 100.0]
+    wild = results_of(GRID[:3], 5, lambda p, s: scatter[s] if p["x"] == 2.0 else noisy(p, s % 3))
+    lowest, highest = verdicts(wild)
+    assert lowest == "y: lowest at x 1, kind steel; not told from it with 5 seeds: x 2, kind steel"
+    assert highest.startswith(
+        "y: highest at x 2, kind steel; not told from it with 5 seeds: x 1, kind steel; x 1, kind"
+    )
+
+
+def test_what_is_not_compared_is_said() -> None:
+    found = results_of(GRID, 3, noisy)
+    lacks = [replace(row, metrics={"y": math.nan}) if row.key == (2, 1) else row for row in found.rows]
+    assert list(verdicts(replace(found, rows=lacks))) == [
+        "y: points are not compared, as there are runs without it at x 2, kind steel"
+    ]
+    failed = [replace(row, status="failed", metrics={}) if row.point == 2 and row.seed else row for row in found.rows]
+    assert list(verdicts(replace(found, rows=failed))) == [
+        "the points are not compared with each other: not two seeds have a finished run at each of them"
+    ]
+    many = results_of([{"x": float(x)} for x in range(101)], 2, lambda p, s: p["x"])
+    assert list(verdicts(many)) == ["the 101 points are not compared with each other: they are more than 100"]
+
+
+def test_an_interval_that_is_wider_than_wanted_is_named() -> None:
+    """Standard deviation 1 of three values: +-2.5 at 95 %."""
+    seeds = {"until": {"metric": "y", "half_width": 1.0}, "most": 10}
+    found = replace(results_of(GRID[:2], 3, noisy), study=json.dumps({"name": "made_up", "seeds": seeds}))
+    assert list(wider_than_wanted(found)) == [
+        "y at x 1, kind steel: 2.0 ± 2.5 N with 3 seeds, wider than the ± 1 that is wanted; about 7 would do",
+        "y at x 1, kind glass: 3.0 ± 2.5 N with 3 seeds, wider than the ± 1 that is wanted; about 7 would do",
+    ]
+    seeds["until"] = {"metric": "y", "half_width": 1.0, "relative": True}
+    relative = replace(found, study=json.dumps({"name": "made_up", "seeds": seeds}))
+    assert [sentence.partition(",")[0] for sentence in wider_than_wanted(relative)] == ["y at x 1"]
 
 
 def test_sobol_indices_of_a_function_whose_indices_are_known() -> None:
