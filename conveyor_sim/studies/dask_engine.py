@@ -62,7 +62,7 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
             raise
 
     def each(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[tuple[T, R | DiedError]]:
-        """As `Engine.each`. Raises StudyError if the scheduler stays away."""
+        """As `Engine.each`. Raises StudyError if the scheduler stays away, or its workers can't run the function."""
         todo = list(tasks)[::-1]
         pending: dict[Any, T] = {}
         done: SimpleQueue[Any] = SimpleQueue()
@@ -96,11 +96,22 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
         self._close()
 
     def _result(self, future: Any) -> Any:
-        """Of a task that is done. Raises what it raised."""
+        """Of a task that is done. Raises one of _GONE, or StudyError: functions keep to themselves what fails in a run,
+        so that anything else is of a worker that has not what it needs.
+        """
         try:
             return future.result(timeout=PATIENCE)
         except KilledWorker:
             return DiedError()
+        except _GONE:
+            raise
+        except Exception as error:
+            why = " ".join(f"{type(error).__name__}: {error}".split())
+            cause = "" if error.__cause__ is None else f" ({' '.join(str(error.__cause__).split())})"
+            raise StudyError(
+                f"{self._address}: a worker of Dask can't make runs: {why}{cause}; expected workers with the same "
+                "conveyor_sim and Python packages as here"
+            ) from None
 
     def _connect(self, patience: float) -> None:
         """To the scheduler, once it is there and has a worker."""

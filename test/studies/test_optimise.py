@@ -11,7 +11,9 @@ import pytest
 from conveyor_sim.errors import StudyError
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.optimisation.answer import answer, trials_data
+from conveyor_sim.studies.optimisation.objective import parse_objective
 from conveyor_sim.studies.optimisation.optimise import Optimum, optimise
+from conveyor_sim.studies.optimisation.trials import Trial
 from conveyor_sim.studies.row import Row
 from conveyor_sim.studies.runs import Runs
 from conveyor_sim.studies.sweep import sweep
@@ -86,8 +88,25 @@ def test_the_best_point_is_near_the_bound_and_better_than_the_start(bounded: Opt
     fresh, start = bounded.fresh
     assert {row.seed for row in fresh.rows} == {row.seed for row in start.rows} == set(range(3, 7))
     said = "\n".join(answer(bounded, UNITS))
-    assert "speed_is < 0.5 in 4 of 4 runs" in said
+    assert "speed_is < 0.5 on average, and in 4 of 4 runs" in said
     assert "is told from none with 4 seeds: best has more than start" in said
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([1.0, 1.1, 1.2, 1.3], "in 4 of 4 runs; on average it can't be told"),
+        ([1.0, 1.5, 1.0, 1.5], "in 2 of 4 runs; on average it can't be told"),
+        ([1.0, 1.0, 1.1, 1.1], "on average, and in 4 of 4 runs"),
+        ([2.0, 2.0, 2.1, 2.1], "in 0 of 4 runs; on average not"),
+    ],
+)
+def test_whether_a_bound_is_kept_is_said_with_what_is_not_known(values: list[float], said: str) -> None:
+    """The bound is on the mean, of which runs tell where it lies."""
+    rows = [Row(0, seed, {}, "finished", metrics={"y": value, "loss": value}) for seed, value in enumerate(values)]
+    trial, objective = Trial(0, {}, tuple(rows)), parse_objective("minimise y subject to loss < 1.35", ["y", "loss"])
+    found = Optimum(objective, (trial,), (trial,), (trial,), False, (trial,))
+    assert f"  loss < 1.35 {said}" in answer(found, {"y": "1", "loss": "J"})
 
 
 def test_it_is_the_same_again_and_from_where_it_was_interrupted(study: Study, bounded: Optimum) -> None:

@@ -11,7 +11,7 @@ from conveyor_sim.plot.trials_data import TrialsData
 from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.statistics.paired import paired_difference
 from conveyor_sim.statistics.words import plus_minus, told
-from conveyor_sim.studies.optimisation.objective import Objective
+from conveyor_sim.studies.optimisation.objective import Constraint, Objective
 from conveyor_sim.studies.optimisation.optimise import Optimum
 from conveyor_sim.studies.optimisation.trials import Trial, feasible
 
@@ -70,8 +70,7 @@ def _best(optimum: Optimum, units: Units) -> Iterator[str]:
     yield f"with {_seeds(fresh)} that no trial had (the best of many owes a part of its place to its seeds):"
     yield f"  best: {_metrics(fresh, objective, units)}"
     for constraint in objective.constraints:
-        keeps = sum(constraint.violation(value) <= 0.0 for value in fresh.values(constraint.metric).tolist())
-        yield f"  {constraint} in {keeps} of {len(fresh.rows)} runs"
+        yield f"  {constraint} {_kept(constraint, fresh)}"
     if not start:
         return
     if start[0].failure:
@@ -81,6 +80,18 @@ def _best(optimum: Optimum, units: Units) -> Iterator[str]:
     metric = objective.goals[0].metric
     apart = paired_difference(fresh.values(metric), start[0].values(metric))
     yield f"  {metric}: {told(apart, 'best', 'start', _unit(units, metric))}"
+
+
+def _kept(constraint: Constraint, trial: Trial) -> str:
+    """Of a bound: in how many runs, and whether the mean, which it is on, can be told to keep it."""
+    values = trial.values(constraint.metric)
+    keeps = sum(constraint.violation(value) <= 0.0 for value in values.tolist())
+    runs = f"in {keeps} of {len(values)} runs"
+    interval = mean_interval(values)
+    ends = [constraint.violation(end) <= 0.0 for end in (interval.low, interval.high)]
+    if all(ends):
+        return f"on average, and {runs}"
+    return f"{runs}; on average " + ("it can't be told" if any(ends) else "not")
 
 
 def _point(trial: Trial) -> str:
