@@ -11,11 +11,12 @@ from conveyor_sim.studies.check import check_study
 from conveyor_sim.studies.design import points_of
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.metrics import WORDS
-from conveyor_sim.studies.results import FIXED_UNITS
+from conveyor_sim.studies.results import FIXED_UNITS, read_results
 from conveyor_sim.studies.study import RESERVED, Parameter, Seeds, Study, Until
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLES = sorted((ROOT / "examples" / "studies").glob("*.yaml"))
+SHIPPED = sorted((ROOT / "docs" / "studies").glob("*/study.yaml"))
 PAGE = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
 
 
@@ -24,6 +25,15 @@ def test_examples_can_be_run(path: Path) -> None:
     setup = load_study(path)
     check_study(setup)
     assert points_of(setup.study)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.parent.name)
+def test_results_that_are_shipped_are_those_of_the_study_beside_them(path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    found = read_results(path.parent / "results.parquet")
+    assert found.study == path.read_text(encoding="utf-8")
+    assert {row.status for row in found.rows} == {"finished"}
+    assert sum(row.cpu for row in found.rows) < 30.0 * 60.0
 
 
 def test_the_first_study_is_the_example() -> None:
