@@ -25,10 +25,10 @@ def points_table(
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     names = list(first[0].parameters) if first else []
     for name in names:
-        table.add_column(with_unit(name, of_parameters.get(name, "")))
+        table.add_column(with_unit(name, of_parameters.get(name, "")), overflow="fold")
     table.add_column("runs", justify="right")
     for name, unit in units.items():
-        table.add_column(with_unit(name, unit), justify="right")
+        table.add_column(with_unit(name, unit), justify="right", overflow="fold")
     for point in sorted(by_point)[:longest]:
         found = by_point[point]
         finished = [row for row in found if row.status == "finished"]

@@ -104,8 +104,9 @@ def test_the_best_point_is_near_the_bound_and_better_than_the_start(bounded: Opt
 def test_whether_a_bound_is_kept_is_said_with_what_is_not_known(values: list[float], said: str) -> None:
     """The bound is on the mean, of which runs tell where it lies."""
     rows = [Row(0, seed, {}, "finished", metrics={"y": value, "loss": value}) for seed, value in enumerate(values)]
-    trial, objective = Trial(0, {}, tuple(rows)), parse_objective("minimise y subject to loss < 1.35", ["y", "loss"])
-    found = Optimum(objective, (trial,), (trial,), (trial,), False, (trial,))
+    kept = Trial(0, {}, (Row(0, 9, {}, "finished", metrics={"y": 1.0, "loss": 1.0}),))
+    objective = parse_objective("minimise y subject to loss < 1.35", ["y", "loss"])
+    found = Optimum(objective, (kept,), (kept,), (kept,), False, (Trial(0, {}, tuple(rows)),))
     assert f"  loss < 1.35 {said}" in answer(found, {"y": "1", "loss": "J"})
 
 
