@@ -127,7 +127,11 @@ def levels_of(rows: Iterable[Row], parameter: str) -> list[Any]:
 
 
 def _levelled(results: Results) -> list[str]:
-    """The parameters at whose values several points were run, or that have few."""
+    """The parameters at whose values several points were run, or that have few; none of a Saltelli sample, whose points
+    share values by how it is made.
+    """
+    if parse_overrides(results.study).get("design") == "saltelli":
+        return []
     points = len({row.point for row in results.rows})
     levels = {name: len(levels_of(results.rows, name)) for name in results.parameters}
     few = len(results.parameters) == 1

@@ -12,9 +12,11 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.errors import StudyError
+from conveyor_sim.errors import SceneError, StudyError
+from conveyor_sim.scene import parse_overrides
 from conveyor_sim.studies.row import BAGS, Job, Pilot, Row
 from conveyor_sim.studies.setup import Setup
+from conveyor_sim.studies.study import Study
 from conveyor_sim.support.files import FileError, write_file
 
 ORIGIN = "study.json"
@@ -156,11 +158,21 @@ class Journal(AbstractContextManager["Journal"]):
         self.warm_up = found.get(WARM_UP) if isinstance(found, dict) else None
         other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
         if other:
+            fields = ", ".join(self._other_fields())
+            named = [f"{what} ({fields})" if what == "study" and fields else what for what in other]
             raise StudyError(
-                f"{self.folder}: its runs were made with another {' and another '.join(other)}, so they can't be "
+                f"{self.folder}: its runs were made with another {' and another '.join(named)}, so they can't be "
                 "compared with new ones; expected another folder, or this one emptied to begin anew"
             )
         self._keep_source()
+
+    def _other_fields(self) -> list[str]:
+        """Of the study, those that decide a run and are others than where its runs were made."""
+        with suppress(OSError, ValueError, SceneError):
+            before = Study.model_validate(parse_overrides((self.folder / SOURCE).read_text(encoding="utf-8")))
+            then, now = _deciding(before), _deciding(self._setup.study)
+            return [name for name, value in now.items() if then[name] != value]
+        return []
 
     def _keep_source(self) -> None:
         """The study as it is now: some of its fields may have changed since the folder was made."""
@@ -176,14 +188,18 @@ def _pilot(job: Job) -> Path:
 
 def origin_of(setup: Setup) -> dict[str, str]:
     """What decides a run beside its parameters and seed, by what it is."""
-    study = setup.study.model_dump(mode="json", exclude=set(FREE))
     return {
-        "study": _hash(json.dumps(study, sort_keys=True)),
+        "study": _hash(json.dumps(_deciding(setup.study), sort_keys=True)),
         "scene": _hash(setup.text, setup.overrides),
         "code": _hash(*(f"{Path(file).name} {setup.code[file]}" for file in setup.made_by)),
         "engine": setup.engine,
         VERSION: setup.sources,
     }
+
+
+def _deciding(study: Study) -> dict[str, Any]:
+    """The fields of a study that decide its runs."""
+    return study.model_dump(mode="json", exclude=set(FREE))
 
 
 def fingerprint(setup: Setup) -> str:

@@ -79,7 +79,10 @@ class Runs(AbstractContextManager["Runs"]):
         works = [self._work(job) for job in todo if job.key not in rows]
         for work, made in self._engine.each(make_row, works):
             job = work.job
-            row = self._unmade(job, "lost", str(made)) if isinstance(made, DiedError) else made
+            if isinstance(made, DiedError):
+                row = self._unmade(job, "lost", str(made))
+            else:  # what a worker of another version refuses is a row of that version
+                row = self._unmade(job, "lost", made.error) if made.status == "lost" else made
             rows[job.key] = self._keep(row)
             if row.status == "finished":
                 spent, counted = spent + row.wall, counted + 1

@@ -65,10 +65,10 @@ class Cluster:
         self.port = int(found.rpartition(":")[2])
         return found
 
-    def worker(self, address: str, path: str = "") -> None:
-        """Start one more. path: where it looks for modules first."""
+    def worker(self, address: str) -> None:
+        """Start one more."""
         options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1"]
-        self._start("worker", ["worker", address, *options, "--local-directory", str(self._folder)], path)
+        self._start("worker", ["worker", address, *options, "--local-directory", str(self._folder)])
 
     def kill(self) -> None:
         """All of it, without a word."""
@@ -77,12 +77,11 @@ class Cluster:
         for process in self._processes.values():
             process.wait()
 
-    def _start(self, what: str, arguments: list[str], path: str = "") -> subprocess.Popen[bytes]:
+    def _start(self, what: str, arguments: list[str]) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", *arguments]
         log = (self._folder / f"{what}_{len(self._processes)}.log").open("w")
-        paths = os.pathsep.join(filter(None, [path, os.environ.get("PYTHONPATH", "")]))
         with log:
-            process = subprocess.Popen(command, stdout=log, stderr=log, env=os.environ | {"PYTHONPATH": paths})
+            process = subprocess.Popen(command, stdout=log, stderr=log)
         self._processes[process.pid] = process
         return process
 
@@ -167,23 +166,6 @@ def test_a_scheduler_that_stays_away(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(dask_engine, "PATIENCE", 0.5)
     with pytest.raises(StudyError, match=r"no scheduler of Dask with workers within 0 s .*the same command goes on"):
         DaskEngine("tcp://127.0.0.1:1", None, lambda _: None)
-
-
-def test_a_worker_without_the_package_is_said(tmp_path: Path) -> None:
-    """It has one of that name in which nothing is found."""
-    (tmp_path / "conveyor_sim").mkdir()
-    (tmp_path / "conveyor_sim" / "__init__.py").touch()
-    setup = setup_of(tmp_path, parameters=RATES, duration=1.0)
-    made = Cluster(tmp_path)
-    try:
-        address = made.scheduler()
-        made.worker(address, str(tmp_path))
-        said = "a worker of Dask can't make runs: .*No module named .*expected workers with the same conveyor_sim"
-        engine = DaskEngine(address, None, lambda _: None)
-        with pytest.raises(StudyError, match=said), Runs(setup, tmp_path / "out", engine) as runs:
-            sweep(runs, setup)
-    finally:
-        made.kill()
 
 
 def test_workers_of_this_machine(tmp_path: Path, expected: list[dict[str, float]]) -> None:

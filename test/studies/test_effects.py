@@ -130,6 +130,9 @@ def test_sobol_indices_of_a_function_whose_indices_are_known() -> None:
     with pytest.raises(StudyError, match="expected design: saltelli"):
         indices(found)
     text = json.dumps({"name": "ishigami", "design": "saltelli", "points": base})
+    few = [replace(row, parameters={**row.parameters, "c": 0.0}) for row in found.rows[:20]]
+    sample = replace(found, study=text, rows=few)
+    assert all(panel[0].scattered for panel in main_effects(sample)[0]) and not interactions(sample, "y")
     (shares,) = indices(Results(text, found.path, found.units, dict.fromkeys(names, ""), {}, found.rows))
     assert shares.first == pytest.approx([0.314, 0.442, 0.0], abs=0.1)
     assert shares.total == pytest.approx([0.558, 0.442, 0.244], abs=0.1)

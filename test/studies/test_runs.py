@@ -110,7 +110,7 @@ def test_finished_runs_are_not_made_again(made: tuple[Setup, Path, list[Row]]) -
 def test_runs_of_another_study_are_left_alone(made: tuple[Setup, Path, list[Row]], tmp_path: Path) -> None:
     _, folder, rows = made
     for other, what in (
-        (setup_of(tmp_path, metrics=METRICS, warm_up=0.2, duration=2.0), "another study"),
+        (setup_of(tmp_path, metrics=METRICS, warm_up=0.2, duration=2.0), r"with another study \(warm_up\), so they"),
         (setup_of(tmp_path, metrics=METRICS, warm_up=0.4, duration=2.0, seeds=1), ""),
     ):
         if what:

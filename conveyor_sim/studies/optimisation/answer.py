@@ -58,7 +58,8 @@ def trials_data(name: str, optimum: Optimum, units: Units) -> TrialsData:
 def _best(optimum: Optimum, units: Units) -> Iterator[str]:
     objective, trials, best = optimum.objective, optimum.trials, optimum.front[0]
     others = len(optimum.as_good) - 1
-    yield f"best of {len(trials)} points: {_point(best)}"
+    is_start = ", the start" if optimum.started and best.number == 0 else ""
+    yield f"best of {len(trials)} points: {_point(best)}{is_start}"
     yield f"  {_metrics(best, objective, units)} ({_seeds(best)})"
     if others:
         kept = len(feasible(trials, objective))
