@@ -2,9 +2,9 @@
 
 Modbus identifies nobody: whoever reaches the port can read, and writes are refused unless the server was given a role
 to write in. What is refused gets an exception: 1 if nobody may write, and for a function that is not served; 2 for an
-address that is not in the map, or a value written in part; 3 for a value out of range; 6 for a device that is in
-other hands, or if too much waits already; 11, for reads too, while the line behind the server is lost, so that nothing
-old is taken for new (Modbus Application Protocol 1.1b3, 7).
+address that is not in the map, or a value written in part; 3 for a value out of range, or a request that is not as its
+function has it; 6 for a device that is in other hands, or if too much waits already; 11, for reads too, while the line
+behind the server is lost, so that nothing old is taken for new (Modbus Application Protocol 1.1b3, 7).
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
+import struct
 import time
 from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from typing import Any
 
 from pymodbus.constants import ExcCodes
-from pymodbus.pdu import ExceptionResponse
+from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.server import ModbusTcpServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
@@ -42,6 +43,14 @@ SILENCE = 30.0
 
 MOST_UNREAD = 64 * 1024
 """Bytes of answers that a client may leave lying; then its connection ends."""
+
+MOST_UNANSWERED = 4096
+"""Bytes of requests that wait for those before them; no more are read of that connection until then."""
+
+_HEADER = struct.Struct(">HHHB")  # MBAP: transaction, protocol, length from the unit on, unit
+_ONE_COIL, _ONE_REGISTER = 5, 6  # functions
+_ON_OR_OFF = (b"\xff\x00", b"\x00\x00")
+_LENGTHS = range(2, 255)  # of unit, function and data (Modbus Messaging on TCP/IP 1.0b, 3.1.3 and 4.1)
 
 _LOOK = 0.5  # s of wall time between two looks at who is silent
 _KEEP_ALIVE = {socket.TCP_KEEPIDLE: 10, socket.TCP_KEEPINTVL: 5, socket.TCP_KEEPCNT: 3}  # s, s, 1
@@ -106,10 +115,9 @@ class ModbusServer:
         logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs whatever clients send
         host, port = self._at
         require_free(MODBUS, host, port)
-        # The library wants a device of its own; the image takes its place.
+        # The library wants a device of its own; the image takes its place at each request.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
-        server.context = self._image  # type: ignore[assignment]
-        server.silence, server.holding = self._silence, self._image.holding
+        server.image, server.silence, server.holding = self._image, self._silence, self._image.holding
         try:
             await server.serve_forever(background=True)
         except (OSError, RuntimeError) as error:
@@ -129,6 +137,8 @@ class ModbusServer:
 
 
 class _Server(ModbusTcpServer):
+    image: Any
+    """An _Image: to the library, what a request is done to."""
     silence: float
     holding: Holding
 
@@ -168,6 +178,9 @@ class _Handler(ServerRequestHandler):
     """Who its client is on record."""
     asked = 0.0
     """s of wall time, when it asked for something last."""
+    _received = b""
+    """What has come of requests that are not answered yet."""
+    _answering: asyncio.Task[None] | None = None
 
     def callback_connected(self) -> None:
         super().callback_connected()
@@ -191,33 +204,71 @@ class _Handler(ServerRequestHandler):
         super().callback_disconnected(exc)
 
     @property
-    def _stream(self) -> asyncio.WriteTransport:
-        assert isinstance(self.transport, asyncio.WriteTransport)
+    def _stream(self) -> asyncio.Transport:
+        assert isinstance(self.transport, asyncio.Transport)
         return self.transport
 
     def cut(self) -> None:
         """End the connection at once; what was not sent is lost."""
         self._stream.abort()
 
-    async def handle_request(self) -> None:
-        began = time.perf_counter()
-        self.asked = time.monotonic()
-        if self._stream.get_write_buffer_size() > MOST_UNREAD:
-            self.cut()  # it asks, and does not read what it is answered
-            return
-        await self._answer()
-        self.server.longest = max(self.server.longest, time.perf_counter() - began)
+    def data_received(self, data: bytes) -> None:
+        """Requests that come together are answered in their order; the library would drop all but the first."""
+        self._received += data
+        if len(self._received) > MOST_UNANSWERED:
+            self._stream.pause_reading()
+        if self._answering is None:
+            self._answering = self.loop.create_task(self._answer_all())
 
-    async def _answer(self) -> None:
-        asked = self.last_pdu
-        if asked is not None and asked.function_code not in _TABLE_OF:
-            # Of the library's own functions some would change how it serves all others.
-            answer = ExceptionResponse(asked.function_code, ExcCodes.ILLEGAL_FUNCTION)
-            answer.transaction_id, answer.dev_id = asked.transaction_id, asked.dev_id
-            self.server_send(answer, self.last_addr)
-        elif self.writer:
-            _writer.set(self.writer)
-            await super().handle_request()
+    async def _answer_all(self) -> None:
+        try:
+            while self.is_active() and not self._stream.is_closing() and (asked := self._next()) is not None:
+                began, self.asked = time.perf_counter(), time.monotonic()
+                if self._stream.get_write_buffer_size() > MOST_UNREAD:
+                    self.cut()  # it asks, and does not read what it is answered
+                    return
+                _writer.set(self.writer)
+                self.server_send(await self._answer(*asked), None)
+                self.server.longest = max(self.server.longest, time.perf_counter() - began)
+                await asyncio.sleep(0)  # others, too
+        finally:
+            self._answering = None
+        if self.is_active() and not self._stream.is_closing():
+            self._stream.resume_reading()
+
+    def _next(self) -> tuple[int, int, bytes] | None:
+        """Transaction, unit, and function with data of the next request; None: it is not whole yet, or none."""
+        if len(self._received) < _HEADER.size:
+            return None
+        transaction, protocol, length, unit = _HEADER.unpack_from(self._received)
+        if protocol != 0 or length not in _LENGTHS:
+            self.cut()  # where a next one would begin, nobody knows
+            return None
+        end = _HEADER.size - 1 + length
+        if len(self._received) < end:
+            return None
+        found, self._received = self._received[_HEADER.size : end], self._received[end:]
+        return transaction, unit, found
+
+    async def _answer(self, transaction: int, unit: int, asked: bytes) -> ModbusPDU:
+        function = asked[0]
+        # Of the library's own functions some would change how it serves all others.
+        request = self.framer.decoder.decode(asked) if function in _TABLE_OF else None
+        answer: ModbusPDU
+        if function not in _TABLE_OF:
+            answer = ExceptionResponse(function, ExcCodes.ILLEGAL_FUNCTION)
+        elif request is None or (function == _ONE_COIL and asked[3:5] not in _ON_OR_OFF):
+            answer = ExceptionResponse(function, ExcCodes.ILLEGAL_VALUE)
+        else:
+            try:
+                answer = await request.datastore_update(self.server.image, unit)
+            except Exception as error:  # rather an answer than silence
+                logging.getLogger(__name__).error("modbus: function %d failed: %r", function, error)
+                answer = ExceptionResponse(function, ExcCodes.DEVICE_FAILURE)
+            if function in (_ONE_COIL, _ONE_REGISTER) and not answer.isError():
+                answer = request  # by the standard; the library answers with what is in force before the next tick
+        answer.transaction_id, answer.dev_id = transaction, unit
+        return answer
 
 
 class _Image:
@@ -229,10 +280,6 @@ class _Image:
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
-
-    def device_ids(self) -> list[int]:
-        """It answers to all."""
-        return [0]
 
     async def async_getValues(self, device: int, function: int, address: int, count: int = 1) -> Any:
         """Words or bits of one tick, (count,)."""

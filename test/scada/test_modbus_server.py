@@ -10,24 +10,31 @@ import subprocess
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
-from scada.waiting import until
+from scada.modbus_line import (
+    BUSY,
+    ILLEGAL_ADDRESS,
+    ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
+    NO_RESPONSE,
+    SETPOINT,
+    SHORT,
+    SPEED,
+    Line,
+    serving,
+)
 
 from conveyor_sim.bag.messages import Header, line_message
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
-from conveyor_sim.line.inputs import DISOWN, OWN, WriterKind
+from conveyor_sim.line.inputs import DISOWN, OWN
 from conveyor_sim.scada.face import FaceError
-from conveyor_sim.scada.modbus_map import HANDSHAKE, Row, modbus_map
+from conveyor_sim.scada.modbus_map import HANDSHAKE
 from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import MOST_WAITING, Control, TickSource
+from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import View
-from conveyor_sim.scene import load_scene
-from conveyor_sim.simulation import Simulation
 
 pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
 
@@ -35,82 +42,12 @@ from pymodbus.client import ModbusTcpClient
 
 from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer
 
-ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY, NO_RESPONSE = 1, 2, 3, 6, 11
-LONG, SHORT = 600.0, 0.2  # s of wall time that the server has with who is silent
-SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
-
-
-@dataclass
-class Line:
-    """One that is stepped by the test, and served."""
-
-    simulation: Simulation
-    source: TickSource
-    rows: dict[str, Row]
-    server: ModbusServer
-    client: ModbusTcpClient
-
-    def lose_patience(self) -> None:
-        """From now on with whoever has been silent."""
-        assert self.server._server is not None
-        self.server._server.silence = SHORT
-
-    def advance(self, ticks: int = 1) -> None:
-        for _ in range(ticks):
-            self.source.before_tick()
-            self.simulation.advance()
-            self.source.after_tick()
-
-    def advance_until(self, condition: Callable[[], Any], what: str) -> None:
-        """What clients do comes when it comes."""
-
-        def is_so() -> bool:
-            self.advance()
-            return bool(condition())
-
-        until(is_so, what)
-
-    def read(self, name: str) -> float:
-        """As the client's own library decodes it."""
-        return self.read_with(self.client, name)
-
-    def read_with(self, client: ModbusTcpClient, name: str) -> float:
-        row = self.rows[name]
-        ask = {
-            "coil": client.read_coils,
-            "discrete input": client.read_discrete_inputs,
-            "input register": client.read_input_registers,
-            "holding register": client.read_holding_registers,
-        }[row.table]
-        answer = ask(row.address, count=row.words)
-        assert not answer.isError(), answer
-        if row.type == "bool":
-            return float(answer.bits[0])
-        kind = client.DATATYPE[row.type.upper()]
-        return float(client.convert_from_registers(answer.registers, kind, word_order=row.word_order))
-
-    def write(self, name: str, value: float) -> Any:
-        row, client = self.rows[name], self.client
-        if row.type == "bool":
-            return client.write_coil(row.address, bool(value))
-        kind = client.DATATYPE[row.type.upper()]
-        words = client.convert_to_registers(value, kind, word_order=row.word_order)
-        return client.write_registers(row.address, words)
-
 
 @pytest.fixture(params=["operator"])
 def line(request: pytest.FixtureRequest) -> Iterator[Line]:
     """The zoned line, in which clients write as what the test says; None: they may not."""
-    role: WriterKind | None = request.param
-    simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
-    source = TickSource(simulation)
-    rows = modbus_map(source.about.tags)
-    server = ModbusServer(source, rows, role, silence=LONG)
-    with ServerThread() as thread:
-        thread.run(server.start())
-        with ModbusTcpClient("127.0.0.1", port=server.port, timeout=60) as client:
-            yield Line(simulation, source, {row.name: row for row in rows}, server, client)
-        thread.run(server.stop())
+    with serving(request.param) as found:
+        yield found
 
 
 controller = pytest.mark.parametrize("line", ["controller"], indirect=True)
@@ -216,26 +153,6 @@ def test_more_writes_than_can_wait_are_refused_and_no_more_is_kept(line: Line) -
     line.advance()
     assert len(line.simulation.take_outcomes()) == MOST_WAITING
     assert not line.write(SETPOINT, 0.2).isError()
-
-
-@controller
-def test_packets_that_are_none_end_nothing(line: Line) -> None:
-    """Wrong lengths, wrong protocol, half a packet, a megabyte of noise: the next client is served all the same."""
-    noise = [
-        b"\x00",
-        b"\x00\x01\x00\x00\x00\x06\x01\x03\x00\x00",
-        b"\x00\x01\x00\x00\xff\xff\x01\x03\x00\x00\x00\x01",
-        b"\x00\x01\x00\x07\x00\x06\x01\x03\x00\x00\x00\x01",
-        struct.pack(">HHHBBHHB", 1, 0, 7, 1, 16, 0, 2, 4),
-        bytes(range(256)) * 4096,
-        b"GET / HTTP/1.1\r\n\r\n",
-    ]
-    for packet in noise:
-        with socket.create_connection(("127.0.0.1", line.server.port), timeout=60) as raw:
-            raw.sendall(packet)
-    assert not line.write(SETPOINT, 0.1).isError()
-    line.advance()
-    assert [outcome.names for outcome in line.simulation.take_outcomes()] == [(), (SETPOINT,)]
 
 
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
