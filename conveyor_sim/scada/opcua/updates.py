@@ -100,46 +100,49 @@ class Updates:
                 if variable.text is not None:
                     text = ua.Variant(ua.LocalizedText(variable.tag.texts.get(int(value), "")))
                     await self._nodes.write(variable.text, text, stamp, code)
-        if shown.read_back is not self._read_back and shown.read_back is not None:
+        if shown.read_back is not None and (every or shown.read_back is not self._read_back):
             self._read_back = shown.read_back
-            await self._bring_read_back(shown.read_back, stamp)
+            if every:
+                self._written.clear()
+            await self._bring_read_back(shown.read_back, stamp, status)
         for follow in self._others:
             await follow(shown, heard, back)
-        await self._bring_run(shown, last, stamp)  # at last: who sees the tick finds all else of it
+        await self._bring_run(shown, last, stamp, every)  # at last: who sees the tick finds all else of it
 
-    async def _bring_run(self, shown: Shown, last: Shown | None, stamp: datetime) -> None:
-        """Always Good: it says what has become of the rest."""
+    async def _bring_run(self, shown: Shown, last: Shown | None, stamp: datetime, every: bool) -> None:
+        """Good even where the rest is not, as it says what has become of that; but for what nobody knows of."""
         tick = shown.tick
-        if self._run_tag is not None and (last is None or last.run.state != shown.run.state):
+        code = ua.StatusCodes.BadNoCommunication if shown.lost else ua.StatusCodes.Good
+        if self._run_tag is not None and (last is None or every or last.run.state != shown.run.state):
             tag, state = self._run_tag, float(shown.run.state)
-            await self._nodes.write(tag.name, as_variant(tag, state), stamp)
+            await self._nodes.write(tag.name, as_variant(tag, state), stamp, code)
             if has_text(tag):
                 text = ua.Variant(ua.LocalizedText(shown.run.text))
-                await self._nodes.write(f"{tag.name}/{VALUE_AS_TEXT}", text, stamp)
-        if last is None or last.tick != tick:
+                await self._nodes.write(f"{tag.name}/{VALUE_AS_TEXT}", text, stamp, code)
+        if last is None or every or last.run.reason != shown.run.reason:
+            reason = ua.Variant(shown.run.reason, ua.VariantType.String)
+            await self._nodes.write(f"{RUN}/reason", reason, stamp, code)
+        if last is None or every or last.lost != shown.lost:
+            await self._nodes.write(f"{RUN}/lost", ua.Variant(shown.lost, ua.VariantType.String), stamp)
+        if last is None or every or last.tick != tick:
             now = self._clock.simulated(tick)
             for name in (TICK, TARGET):
-                await self._nodes.write(name, ua.Variant(tick, ua.VariantType.Int64), stamp)
+                await self._nodes.write(name, ua.Variant(tick, ua.VariantType.Int64), stamp, code)
             seconds = tick * self._source.about.tick
-            await self._nodes.write(f"{RUN}/time", ua.Variant(seconds, ua.VariantType.Double), stamp)
-            await self._nodes.write(f"{RUN}/date_time", ua.Variant(now, ua.VariantType.DateTime), stamp)
-        for name, text, before in (
-            ("reason", shown.run.reason, last and last.run.reason),
-            ("lost", shown.lost, last and last.lost),
-        ):
-            if text != before:
-                await self._nodes.write(f"{RUN}/{name}", ua.Variant(text, ua.VariantType.String), stamp)
+            await self._nodes.write(f"{RUN}/time", ua.Variant(seconds, ua.VariantType.Double), stamp, code)
+            await self._nodes.write(f"{RUN}/date_time", ua.Variant(now, ua.VariantType.DateTime), stamp, code)
 
-    async def _bring_read_back(self, columns: ReadBackColumns, stamp: datetime) -> None:
+    async def _bring_read_back(self, columns: ReadBackColumns, stamp: datetime, status: int) -> None:
         rows = zip(self._commands, columns.since.tolist(), columns.writer.tolist(), strict=True)
         for name, since, writer in rows:
             kind, by = columns.writer_kinds[writer], columns.writers[writer]
             row = (since, by if by == kind or kind == "line" else f"{kind} {by}")
             if self._written.get(name) != row:
                 self._written[name] = row
+                who = ua.Variant(row[1], ua.VariantType.String)
                 at = ua.Variant(self._clock.simulated(since), ua.VariantType.DateTime)
-                await self._nodes.write(f"{name}/{WRITTEN_BY}", ua.Variant(row[1], ua.VariantType.String), stamp)
-                await self._nodes.write(f"{name}/{WRITTEN_AT}", at, stamp)
+                await self._nodes.write(f"{name}/{WRITTEN_BY}", who, stamp, status)
+                await self._nodes.write(f"{name}/{WRITTEN_AT}", at, stamp, status)
 
 
 class _Variable:

@@ -46,17 +46,25 @@ WORTH = [
 
 
 def test_the_status_says_what_values_are_worth(line: Line) -> None:
+    """Of all variables, who has written a command among them: nothing old is Good."""
     for run, lost, code in WORTH:
-        why = f"{run} {lost}"
-        line.source.show(run=RunState(run, why), lost=lost, forced=frozenset({SPEED}))
-        line.until(lambda why=why: line.read("run/reason") == why)
-        assert line.read("run/lost") == lost
+        line.source.show(run=RunState(run, f"{run} {lost}"), lost=lost, forced=frozenset({SPEED}))
+        worth = Codes.BadNoCommunication if lost else Codes.Good
+        line.until(
+            lambda run=run, lost=lost: (
+                line.read("run/lost") == lost and (bool(lost) or line.read("run/reason") == f"{run} {lost}")
+            )
+        )
         override = Codes.GoodLocalOverride if code == Codes.Good else code
         for name, expected in ((SETPOINT, code), (SPEED, override), ("alarm_states/belts/zone1/tripped/state", code)):
             found = line.node(name).read_data_value(raise_on_bad_status=False)
             assert found.StatusCode.value == expected, (name, run)
             assert (found.Value.Value is None) == (code >= 0x80000000)
-        assert line.read("run/state") == run  # which is Good
+        for name in (f"{SETPOINT}/written_by", f"{SETPOINT}/written_at"):
+            assert line.node(name).read_data_value(raise_on_bad_status=False).StatusCode.value == code, (name, run)
+        for name, expected in (("state", run), ("reason", f"{run} {lost}"), ("tick", 0), ("time", 0.0)):
+            found = line.node(f"run/{name}").read_data_value(raise_on_bad_status=False)
+            assert (found.StatusCode.value, found.Value.Value) == (worth, None if lost else expected), name
 
 
 def test_nothing_is_taken_where_nothing_would_act(line: Line) -> None:
@@ -91,6 +99,8 @@ def test_after_a_step_back_nothing_is_of_the_future(simulated: Line) -> None:
     for tag in simulated.source.about.tags:
         if tag.role != "fault" and tag.role != "run":
             assert simulated.node(tag.name).read_data_value().SourceTimestamp == heard.stamps[-1], tag.name
+    for name in ("run/state", "run/reason", "run/lost", "run/date_time", f"{SETPOINT}/written_by"):
+        assert simulated.node(name).read_data_value().SourceTimestamp == heard.stamps[-1], name
 
 
 def test_wall_stamps_are_of_now_and_of_changes_only(line: Line) -> None:
