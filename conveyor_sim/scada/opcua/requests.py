@@ -121,42 +121,34 @@ class Requests:
         """Have a line in lockstep go on up to a tick."""
         if _kind(client) not in MAY_GO_ON:
             return int(Codes.BadUserAccessDenied)
-        if value.AttributeId != ua.AttributeIds.Value:
-            return int(Codes.BadNotWritable)
-        variant = value.Value.Value
-        if variant is None or variant.VariantType is not ua.VariantType.Int64 or isinstance(variant.Value, list):
-            return int(Codes.BadTypeMismatch)
+        if (code := _judge_form(value, ua.VariantType.Int64)) != Codes.Good:
+            return code
         if "target" not in self._source.controls:
             return int(Codes.BadInvalidState)
-        refused = self._source.control("target", variant.Value, _writer(client))
+        refused = self._source.control("target", value.Value.Value.Value, _writer(client))
         return int(Codes.BadOutOfRange if refused else Codes.GoodCompletesAsynchronously)
 
     def _set_mode(self, client: User, value: ua.WriteValue) -> int:
         """Put a device into a mode, for clients that can only write."""
         if not self.may(client, MODE):
             return int(Codes.BadUserAccessDenied)
-        tag, variant = self._modes[name_of(value.NodeId)], value.Value.Value
-        if value.AttributeId != ua.AttributeIds.Value:
-            return int(Codes.BadNotWritable)
-        if variant is None or variant.VariantType is not type_of(tag) or isinstance(variant.Value, list):
-            return int(Codes.BadTypeMismatch)
-        if variant.Value not in MODES:
+        tag = self._modes[name_of(value.NodeId)]
+        if (code := _judge_form(value, type_of(tag))) != Codes.Good:
+            return code
+        if (mode := value.Value.Value.Value) not in MODES:
             return int(Codes.BadOutOfRange)
-        return self._give(client, MODE, (tag.device,), (float(variant.Value),), ())
+        return self._give(client, MODE, (tag.device,), (float(mode),), ())
 
     def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
         """Whether a value can be given, and as what number."""
         if not self.may(client, SET):
             return Codes.BadUserAccessDenied, 0.0
         tag = self._commands.get(name_of(value.NodeId))
-        if tag is None or value.AttributeId != ua.AttributeIds.Value:
+        if tag is None:
             return Codes.BadNotWritable, 0.0
-        if value.IndexRange:
-            return Codes.BadIndexRangeInvalid, 0.0
-        variant = value.Value.Value
-        if variant is None or variant.VariantType is not type_of(tag) or isinstance(variant.Value, list):
-            return Codes.BadTypeMismatch, 0.0
-        number = float(variant.Value)
+        if (code := _judge_form(value, type_of(tag))) != Codes.Good:
+            return code, 0.0
+        number = float(value.Value.Value.Value)
         return self._judge_number(client, tag, number), number
 
     def _judge_number(self, client: User, tag: Tag, number: float) -> int:
@@ -186,6 +178,20 @@ class Requests:
             return Codes.BadInvalidState
         given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
         return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
+
+
+def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:
+    """Whether that is one value of a type, and nothing but that."""
+    if value.AttributeId != ua.AttributeIds.Value:
+        return int(Codes.BadNotWritable)
+    if value.IndexRange:
+        return int(Codes.BadIndexRangeInvalid)
+    status, variant = value.Value.StatusCode, value.Value.Value
+    if status is not None and not status.is_good():
+        return int(Codes.BadWriteNotSupported)
+    if variant is None or variant.VariantType is not kind or isinstance(variant.Value, list):
+        return int(Codes.BadTypeMismatch)
+    return int(Codes.Good)
 
 
 def _kind(client: User) -> WriterKind | None:

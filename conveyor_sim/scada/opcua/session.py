@@ -162,7 +162,12 @@ class Session(InternalSession):
         """Commands, as `Requests.write` has it."""
         if self.iserver.requests is None:
             raise ServiceError(Codes.BadServerHalted)
-        return self.iserver.requests.write(self.user, params.NodesToWrite or [])
+        asked = params.NodesToWrite or []
+        codes = self.iserver.requests.write(self.user, asked)
+        for place, value in enumerate(asked):
+            if codes[place].value == Codes.BadNotWritable and value.NodeId not in self.aspace:
+                codes[place] = ua.StatusCode(Codes.BadNodeIdUnknown)
+        return codes
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Methods of this package; and those of the library that send conditions again."""

@@ -52,9 +52,9 @@ REFUSED: list[tuple[str, object, ua.VariantType, int]] = [
     (SETPOINT, None, ua.VariantType.Null, Codes.BadTypeMismatch),
     ("machines/filler/cntrl_cmd", 77, ua.VariantType.UInt32, Codes.BadOutOfRange),
     (SPEED, 0.1, ua.VariantType.Double, Codes.BadNotWritable),
-    ("belts/zone1/trip", True, ua.VariantType.Boolean, Codes.BadNotWritable),
+    ("belts/zone1/trip", True, ua.VariantType.Boolean, Codes.BadNodeIdUnknown),
     ("run/state", 1, ua.VariantType.UInt32, Codes.BadNotWritable),
-    ("belts/nowhere/speed", 0.1, ua.VariantType.Double, Codes.BadNotWritable),
+    ("belts/nowhere/speed", 0.1, ua.VariantType.Double, Codes.BadNodeIdUnknown),
 ]
 
 
@@ -73,6 +73,9 @@ def test_only_values_can_be_written(line: Line) -> None:
     for attribute in (ua.AttributeIds.Description, ua.AttributeIds.AccessLevel, ua.AttributeIds.BrowseName):
         with refused(Codes.BadNotWritable):
             node.write_attribute(attribute, ua.DataValue(ua.Variant(1, ua.VariantType.Byte)))
+    for name, value in ((SETPOINT, ua.Variant(0.1)), ("belts/zone1/mode", ua.Variant(3, ua.VariantType.UInt32))):
+        with refused(Codes.BadWriteNotSupported):
+            line.node(name, line.open[0]).write_value(ua.DataValue(value, ua.StatusCode(Codes.BadSensorFailure)))
     assert line.node(SETPOINT).read_description().Text != "1"
 
 
