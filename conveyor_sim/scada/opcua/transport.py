@@ -22,6 +22,9 @@ CHUNK, MESSAGE = 65_535, 4_000_000
 ACTIVATION = 30.0
 """s that a connection has for beginning a session, and may stay without one."""
 
+_SIZE = slice(4, 8)
+"""Bytes of a message that say how long it is (OPC 10000-6, 7.1.2.2)."""
+
 _WAITING = 200
 """Messages of a connection that wait to be answered."""
 
@@ -73,11 +76,12 @@ class Connection(OPCUAProtocol):
             self.processor.session = None
 
     def data_received(self, data: bytes) -> None:
-        """What has come so far of a message is kept by the library, whatever its length."""
+        """What has come so far of a message is kept by the library, whatever its length, and waited for."""
         if self.transport is None or self.transport.is_closing():
             return
         super().data_received(data)
-        if len(self._buffer) > CHUNK:
+        said = int.from_bytes(self._buffer[_SIZE], "little") if len(self._buffer) >= _SIZE.stop else 0
+        if max(said, len(self._buffer)) > CHUNK:
             self._refuse(ua.StatusCodes.BadTcpMessageTooLarge, "")
 
     async def _activation_watchdog(self) -> None:

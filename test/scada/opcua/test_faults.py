@@ -68,6 +68,14 @@ def test_packets_that_are_none_are_answered_by_the_end_of_the_connection(line: L
     line.advance()
 
 
+@pytest.mark.parametrize("packet", [PACKETS["http"], struct.pack("<3scI", b"HEL", b"F", 2**32 - 1)])
+def test_a_length_that_can_not_be_is_refused_at_once(line: Line, packet: bytes) -> None:
+    with raw(line) as connection:
+        connection.sendall(packet)
+        answer = closed(connection)
+    assert struct.unpack_from("<3s5xI", answer) == (b"ERR", ua.StatusCodes.BadTcpMessageTooLarge)
+
+
 def test_a_message_without_end_is_not_kept(line: Line) -> None:
     """Its header says four gigabytes."""
     with raw(line) as connection:
