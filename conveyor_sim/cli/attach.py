@@ -43,7 +43,7 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     password = click.prompt("password", hide_input=True, err=True) if user else ""
     with ExitStack() as stack:
         source = stack.enter_context(scene_source(scene, console, **of_scene))
-        kind = of_plc(url, tags, user, password, period, console.print)
+        kind = of_plc(url, tags, user, password, period, console.print, source.observe)
         with Serving(source, [(kind, 0)], Settings()) as serving:
             source.control("resume", 0.0, "")
             watch(serving, console, [f"{url} commands the line, and reads its signals"])

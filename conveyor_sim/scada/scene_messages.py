@@ -54,6 +54,13 @@ class Go(NamedTuple):
     inputs: Sequence[Input]
 
 
+class Observe(NamedTuple):
+    """Sent to the process: what a controller's own variables are, to be recorded."""
+
+    names: Sequence[str]
+    values: Sequence[float]
+
+
 class Watch(NamedTuple):
     """Sent to the process: whether what is drawn is to be copied, too."""
 

@@ -29,7 +29,7 @@ from conveyor_sim.live.session import Session
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.runs.compilation import Cancelled, Compilation
 from conveyor_sim.scada.handshake import HANDSHAKE
-from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task, Watch
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
 from conveyor_sim.scada.source import MOST_EVENTS, Control
 from conveyor_sim.scada.view import DRAWN, HEARD
 from conveyor_sim.simulation import Simulation
@@ -255,7 +255,7 @@ class _Process:
         time.sleep(PATIENCE)
         os._exit(1)
 
-    def _do(self, request: Give | Go | Ask | Watch) -> None:
+    def _do(self, request: Give | Go | Ask | Observe | Watch) -> None:
         if isinstance(request, Watch):
             self._pictured = ("", -1)
             self._copies.watched = request.on
@@ -268,6 +268,9 @@ class _Process:
                 stepper.inbox.receive()
             stepper.give(request.given, size_of(request.given))
             self._handed += 1
+            return
+        if isinstance(request, Observe):
+            stepper.call(lambda: stepper.session.outputs.show_variables(*request))
             return
         if isinstance(request, Go):
             self._goals.append(request)

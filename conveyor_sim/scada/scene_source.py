@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from functools import partial
@@ -23,7 +23,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.scada.handshake import TARGET, problem
-from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Task, Watch
+from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
 from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import DRAWN, HEARD, View
 
@@ -57,7 +57,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         self._given = self._handed = self._waiting = 0
         self._target = 0  # in lockstep: up to which tick it goes
         self._set: list[Input] = []  # that acts with the next target
-        self._requests: SimpleQueue[Task | Give | Go | Ask | Watch | None] = SimpleQueue()
+        self._requests: SimpleQueue[Task | Give | Go | Ask | Observe | Watch | None] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._thread = threading.Thread(target=self._supervise, name="scene", daemon=True)
@@ -153,6 +153,14 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 self._requests.put(Go(self._target, tuple(self._set)))
                 self._set.clear()
         return ""
+
+    def observe(self, values: Mapping[str, float]) -> None:
+        """Have a controller's own variables recorded with the present tick, by name. Where it is far behind, they are
+        left out.
+        """
+        with self._lock:
+            if self._requests.qsize() < MOST_WAITING:
+                self._requests.put(Observe(tuple(values), tuple(values.values())))
 
     def discard(self) -> None:
         """Leave no recording of a line that no tick has passed of. Once it is closed."""

@@ -6,6 +6,7 @@ outputs are in place, so the test has the same bits however fast the PLC is.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, ExitStack
@@ -39,8 +40,10 @@ class ServedPlc(AbstractContextManager["ServedPlc"]):
         self._url, self._patience = url, patience
         self._target = -1
         self._answer: dict[str, float] = {}
-        self.variables: dict[str, float] = {}
-        """Values of the PLC's own (plc/<name>), as they were after its last scan."""
+        self.variables = {each.tag.name: math.nan for each in self._map.own}
+        """Values of the PLC's own (plc/<name>), as they were after its last scan; NaN before."""
+        self.record = tuple(self.variables)
+        """Names of those that are recorded: all."""
         with ExitStack() as stack:
             self._thread = stack.enter_context(ServerThread())
             self._link = link(url, all_of(self._map), user, password)

@@ -116,6 +116,7 @@ class ScanCycle:
         self.close()
         image = self._simulation.process_image
         self._plc = self._controller = ServedPlc(image, url, tags, user, password, patience)
+        self.recorded = Recorded(self._plc)
 
     def snapshot(self) -> dict[str, Any] | None:
         """What the controller remembers and has answered last; None without one, or for a node or PLC."""

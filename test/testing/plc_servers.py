@@ -64,9 +64,13 @@ class OpcUaPlc:
                 await self._write("target", tick + 1, "UInt32")
             await asyncio.sleep(0.0005)
 
-    async def stop(self) -> None:
+    async def halt(self) -> None:
+        """Scan no more; the server stays."""
         self._task.cancel()
         await asyncio.wait({self._task}, timeout=10.0)
+
+    async def stop(self) -> None:
+        await self.halt()
         await self._server.stop()
 
     @staticmethod
@@ -115,9 +119,13 @@ class ModbusPlc:
                 await client.write_registers(10, client.convert_to_registers(tick + 1, word))
             await asyncio.sleep(0.0005)
 
-    async def stop(self) -> None:
+    async def halt(self) -> None:
+        """Scan no more; the server stays."""
         self._task.cancel()
         await asyncio.wait({self._task}, timeout=10.0)
+
+    async def stop(self) -> None:
+        await self.halt()
         self._client.close()
         await self._server.shutdown()
 

@@ -7,7 +7,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,9 @@ def test_a_served_plc_gives_the_bits_of_its_program(plc: Plc, tmp_path: Path) ->
         assert outside.signals[OWN] == outside.simulation.tick + 1
         assert plc.made.scans == SECONDS / inside.scene.tick + 1
     assert replay(tmp_path / "bag").difference is None
+    with open_bag(tmp_path / "bag") as bag:
+        told = [(tuple(frame.data.name), *frame.data.value) for frame in bag.read("variables")]
+    assert told == [((OWN,), tick + 1) for tick in range(len(told))] and len(told) == plc.made.scans
 
 
 def test_a_plc_that_goes_away_fails_the_test(plc: Plc) -> None:
@@ -92,7 +96,7 @@ def test_a_plc_that_goes_away_fails_the_test(plc: Plc) -> None:
 
 
 def test_a_plc_that_does_not_scan_is_waited_for_so_long(plc: Plc) -> None:
-    plc.made._task.cancel()
+    plc.thread.run(plc.made.halt())
     with Scenario(LINE) as plant, pytest.raises(ControlError, match=r"no run/target_tick after 0 within 0\.2 s"):
         plant.attach_plc(plc.url, plc.tags, patience=0.2)
 
@@ -122,6 +126,7 @@ def test_the_command_attach_records_what_a_plc_commands(plc: Plc, tmp_path: Path
     assert replay(tmp_path / "bag").difference is None
     with open_bag(tmp_path / "bag") as bag:
         assert any(SETPOINT in frame.data.names for frame in bag.outcomes())
+        assert any(tuple(frame.data.name) == (OWN,) and frame.data.value[0] > 1 for frame in bag.read("variables"))
 
 
 def test_attach_says_that_there_is_no_plc(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -220,31 +225,76 @@ def test_a_variable_that_the_plc_lacks_is_named(tmp_path: Path) -> None:
         plc.thread.close()
 
 
-def test_a_free_running_plc_commands_a_line_and_is_reached_again(plc: Plc) -> None:
-    """Real time has no bits to compare: what it sees reaches it, what it says acts, and its loss is told."""
-    said: list[str] = []
-    with Scenario(LINE) as plant, ServerThread() as thread:
+class FreeRunning:
+    """A line that a PLC commands without waiting for it, run by a test."""
+
+    def __init__(self, plant: Scenario, plc: Plc, thread: ServerThread) -> None:
+        self.plant, self.plc, self._thread = plant, plc, thread
+        self.said: list[str] = []
+        self.observed: list[Mapping[str, float]] = []
         source = plant.source()
         tags = read_tag_map(plc.tags, source.about.tags)
-        face = PlcFace(source, plc.url, tags, lambda: link(plc.url, all_of(tags)), 0.005, said.append)
-        thread.run(face.start())
+        way = partial(link, plc.url, all_of(tags))
+        self.face = PlcFace(source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
+        thread.run(self.face.start())
 
-        def until(done: Any) -> None:
-            end = time.monotonic() + 60.0
-            while not done():
-                assert time.monotonic() < end
-                plant.run_for(0.05)
-                time.sleep(0.01)
+    def until(self, done: Callable[[], object]) -> None:
+        end = time.monotonic() + 60.0
+        while not done():
+            assert time.monotonic() < end, self.said
+            self.plant.run_for(0.05)
+            time.sleep(0.01)
 
-        until(lambda: plant.signals[BOTTLES] > 2)
-        until(lambda: plant.simulation.line.read_back.values[0] == 0.0 and ALARM in plant.signals)
-        assert plant.simulation.line.read_back.writers[0] == (f"plc {plc.url}", "controller")
-        status = face.status()
-        assert status.clients == 1 and status.writes > 0 and status.refused == 0 and 0.0 < status.latency < 60.0
-        plc.thread.run(plc.made.stop())
-        until(lambda: said and face.status().clients == 0)
-        assert said[0].endswith("it commands nothing until it is reached again")
-        plc.thread.run(plc.made.start(int(plc.url.rpartition(":")[2])))
-        until(lambda: face.status().clients == 1 and face.status().writes > status.writes)
-        assert said[-1] == f"{plc.url}: reached again"
-        thread.run(face.stop())
+    def stop(self) -> None:
+        self._thread.run(self.face.stop())
+
+
+@pytest.fixture
+def free(plc: Plc) -> Iterator[FreeRunning]:
+    with Scenario(LINE) as plant, ServerThread() as thread:
+        free = FreeRunning(plant, plc, thread)
+        yield free
+        free.stop()
+
+
+def test_a_free_running_plc_commands_a_line_and_is_reached_again(free: FreeRunning) -> None:
+    """Real time has no bits to compare: what it sees reaches it, what it says acts, and its loss is told."""
+    plant, plc, face, said = free.plant, free.plc, free.face, free.said
+    free.until(lambda: plant.signals[BOTTLES] > 2)
+    free.until(lambda: plant.simulation.line.read_back.values[0] == 0.0 and ALARM in plant.signals)
+    assert plant.simulation.line.read_back.writers[0] == (f"plc {plc.url}", "controller")
+    status = face.status()
+    assert status.clients == 1 and status.writes > 0 and status.refused == 0 and 0.0 < status.latency < 60.0
+    assert 0.0 < free.observed[-1][OWN] <= plant.simulation.tick + 1
+    plc.thread.run(plc.made.stop())
+    free.until(lambda: said and face.status().clients == 0)
+    assert said[0].endswith("it commands nothing until it is reached again")
+    plc.thread.run(plc.made.start(int(plc.url.rpartition(":")[2])))
+    free.until(lambda: face.status().clients == 1 and face.status().writes > status.writes)
+    assert said[-1] == f"{plc.url}: reached again"
+
+
+@pytest.mark.parametrize("plc", ["opcua"], indirect=True)
+def test_what_the_plc_calls_bad_is_no_command(free: FreeRunning) -> None:
+    """Nor does it end the run: the PLC is looked at again until it stands by its value."""
+    from asyncua import ua
+
+    made, face = free.plc.made, free.face
+
+    def set_speed(value: float, code: int) -> None:
+        given = ua.DataValue(ua.Variant(value, ua.VariantType.Float), ua.StatusCode(code))
+        free.plc.thread.run(made._nodes["speed"].write_value(given))
+
+    free.until(lambda: face.status().writes > 0)
+    free.plc.thread.run(made.halt())
+    set_speed(0.25, ua.StatusCodes.BadSensorFailure)
+    free.until(lambda: len(free.said) > 1)
+    assert face.status().clients == 0
+    assert [text.partition("GVL.speed ")[2] for text in free.said] == [
+        f"({SETPOINT}) is BadSensorFailure; it commands nothing until it is reached again",
+        "is BadSensorFailure, expected a number or a bool; it commands nothing until it is reached again",
+    ]
+    assert free.plant.signals["belts/zone1/speed"] != 0.25
+    set_speed(0.25, ua.StatusCodes.Good)
+    free.until(lambda: free.plant.signals["belts/zone1/speed"] == 0.25)
+    assert free.said[-1] == f"{free.plc.url}: reached again"

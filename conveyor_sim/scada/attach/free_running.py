@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from conveyor_sim.control.scan import ALARMS, AlarmChanges
+from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import SET, Input
 from conveyor_sim.scada.attach.link import Link, LinkError
 from conveyor_sim.scada.attach.links import all_of, link
@@ -21,6 +22,7 @@ from conveyor_sim.scada.attach.tag_map import TagMap, read_tag_map
 from conveyor_sim.scada.face import Face, Settings, Status
 from conveyor_sim.scada.faces import Kind
 from conveyor_sim.scada.source import PLC, Shown, TagSource
+from conveyor_sim.support.printable import SENTENCE, printable
 
 AGAIN = 1.0
 """s of wall time between two attempts to reach a PLC that was lost."""
@@ -37,10 +39,13 @@ class PlcFace:
         make: Callable[[], Link],
         period: float,
         say: Callable[[str], object],
+        observe: Callable[[Mapping[str, float]], object],
     ) -> None:
-        """make: the way to it. period: s of wall time from scan to scan. say: takes sentences for the user."""
+        """make: the way to it. period: s of wall time from scan to scan. say: takes sentences for the user.
+        observe: takes the PLC's own values (plc/<name>) after each scan, to be recorded.
+        """
         self._source, self._url, self._tags, self._make = source, url, tags, make
-        self._period, self._say = period, say
+        self._period, self._say, self._observe = period, say, observe
         self._writer = f"{PLC} {url}"
         self._link: Link | None = None
         self._task: asyncio.Task[None] | None = None
@@ -73,16 +78,23 @@ class PlcFace:
         return Status(int(self._link is not None), 0, self._given, self._refused, lag)
 
     async def _run(self) -> None:
+        told = ""
         while True:
             began = time.monotonic()
             try:
                 if self._link is None:
                     self._link = await self._reach()
                     self._say(f"{self._url}: reached again")
+                    told = ""
                 await self._scan(self._link)
-            except LinkError as error:
-                if self._link is not None:
-                    self._say(f"{error}; it commands nothing until it is reached again")
+            except (
+                Exception
+            ) as error:  # whatever it is: a PLC may be loaded with another program, and with this one again
+                text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
+                # Of attempts that fail, those are told whose reason is another one than that there is no PLC.
+                if text != told and (self._link is not None or not isinstance(error, LinkError)):
+                    told = text
+                    self._say(f"{printable(text, SENTENCE)}; it commands nothing until it is reached again")
                 await self._leave()
                 await asyncio.sleep(AGAIN)
             await asyncio.sleep(max(0.0, self._period - (time.monotonic() - began)))
@@ -99,8 +111,11 @@ class PlcFace:
         if changed:
             await link.write(changed)
         self._written = shown
-        if self._tags.read:
-            self._give(await link.read([each.tag.name for each in self._tags.read]))
+        if asked := [each.tag.name for each in (*self._tags.read, *self._tags.own)]:
+            found = await link.read(asked)
+            if own := {each.tag.name: found.pop(each.tag.name) for each in self._tags.own}:
+                self._observe(own)
+            self._give(found)
         self._lag = max(self._lag, time.monotonic() - began)
 
     def _give(self, answer: dict[str, float]) -> None:
@@ -109,6 +124,8 @@ class PlcFace:
         if commands:
             given = Input(PLC, self._writer, "controller", SET, tuple(commands), tuple(commands.values()))
             refused = bool(self._source.give(given))
+            if refused:
+                self._alarms = AlarmChanges()  # none of them is known to the line
             self._given, self._refused = self._given + (not refused), self._refused + refused
 
     async def _reach(self) -> Link:
@@ -128,12 +145,22 @@ class PlcFace:
                 await link.close()
 
 
-def of_plc(url: str, tags: Path, user: str, password: str, period: float, say: Callable[[str], object]) -> Kind:
-    """What serves a source to a PLC, as one of the faces. url, user, password: as `link`. tags: the map."""
+def of_plc(
+    url: str,
+    tags: Path,
+    user: str,
+    password: str,
+    period: float,
+    say: Callable[[str], object],
+    observe: Callable[[Mapping[str, float]], object],
+) -> Kind:
+    """What serves a source to a PLC, as one of the faces. url, user, password: as `link`. tags: the map. The others: as
+    `PlcFace`.
+    """
 
     def make(source: TagSource, _: int, __: Settings) -> Face:
         mapped = read_tag_map(tags, source.about.tags)
-        return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say)
+        return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say, observe)
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
     return Kind(PLC, 0, library, make, lambda _: "command it")

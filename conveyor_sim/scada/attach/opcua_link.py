@@ -59,11 +59,9 @@ class OpcUaLink:
                 value = await self._ask(client.get_node(node).read_data_value(raise_on_bad_status=False))
             except LinkError as error:
                 raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)}: {error}") from error
-            kind = None if value.Value is None else value.Value.VariantType
-            if kind not in (*_WHOLE, *_REAL, ua.VariantType.Boolean):
-                shown = printable(value.StatusCode.name if kind is None else kind.name)
-                raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)} is {shown}, expected a number or a bool")
-            self._types[name] = kind
+            if (bad := _problem(value)) is not None:
+                raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)} is {bad}, expected a number or a bool")
+            self._types[name] = value.Value.VariantType
 
     async def write(self, values: Mapping[str, float]) -> None:
         """Set variables."""
@@ -73,13 +71,14 @@ class OpcUaLink:
         await self._ask(client.write_values(nodes, variants))
 
     async def read(self, names: Sequence[str]) -> dict[str, float]:
-        """Values by our names."""
-        client = self._there()
-        values = await self._ask(client.read_values([client.get_node(self._ids[name]) for name in names]))
-        for name, value in zip(names, values, strict=True):
-            if value is None:
-                raise LinkError(f"{self._url}: {printable(self._mapped[name].theirs)} ({name}) has no value")
-        return {name: float(value) for name, value in zip(names, values, strict=True)}
+        """Values by our names. LinkError, too, for one that the PLC itself calls bad."""
+        client, found = self._there(), {}
+        nodes = [client.get_node(self._ids[name]) for name in names]
+        for name, data in zip(names, await self._ask(client.read_attributes(nodes)), strict=True):
+            if (bad := _problem(data)) is not None:
+                raise LinkError(f"{self._url}: {printable(self._mapped[name].theirs)} ({name}) is {bad}")
+            found[name] = float(data.Value.Value)
+        return found
 
     async def close(self) -> None:
         """Leave it."""
@@ -98,6 +97,16 @@ class OpcUaLink:
             return await asyncio.wait_for(request, 2.0 * PATIENCE)
         except (UaError, OSError, asyncio.TimeoutError) as error:
             raise LinkError(f"{self._url}: {printable(error) or type(error).__name__}") from error
+
+
+def _problem(data: ua.DataValue) -> str | None:
+    """What it is instead of a number or a bool; None: one of these."""
+    if data.StatusCode.is_bad():
+        return printable(data.StatusCode.name)
+    if data.Value.is_array:
+        return "an array"
+    kind = data.Value.VariantType
+    return None if kind in (*_WHOLE, *_REAL, ua.VariantType.Boolean) else printable(kind.name)
 
 
 def _node_id(mapped: Mapped) -> ua.NodeId:
