@@ -34,6 +34,9 @@ NAME = "PackML"
 _TYPE = 6
 """PackMLBaseObjectType."""
 
+_MODES = 11
+"""ProductionMaintenanceModeEnum: the modes are those of it, with its numbers."""
+
 _METHODS: Mapping[int, Command] = {
     361: Command.RESET,
     376: Command.RESET,
@@ -61,6 +64,15 @@ _OF: Mapping[str, tuple[int, ...]] = {
     _EXECUTE: (361, 365, 366, 367, 368, 369, 372),
 }
 """Methods of each of the three state machines, one in the other."""
+
+_TYPES: Mapping[str, int] = {_BASE: 3, _MACHINE: 2, _EXECUTE: 1}
+"""Types of the state machines."""
+
+_PARTS: Mapping[str, tuple[int, ...]] = {
+    "AvailableStates": (ua.ObjectIds.StateType, ua.ObjectIds.InitialStateType),
+    "AvailableTransitions": (ua.ObjectIds.TransitionType,),
+}
+"""Variables of a state machine, and of which types the parts of its own type are that they list."""
 
 _CLEARED, _RUNNING = ("Cleared", 71), ("Running", 75)
 
@@ -109,6 +121,8 @@ class PackMl:
         await server.import_xml(NODESET)
         self._index = await server.get_namespace_index(NAMESPACE)
         kind = server.get_node(ua.NodeId(_TYPE, self._index))
+        parts = await self._parts(server)
+        modes, data_type = ua.NodeId(_MODES, self._index), ua.AttributeIds.DataType
         for machine in self._machines:
             root = f"{machine}/{NAME}"
             parent, name = server.get_node(node_id(machine)), ua.QualifiedName(NAME, INDEX)
@@ -122,8 +136,23 @@ class PackMl:
             rate = self._tags[f"{machine}/rate"]
             span = ua.Variant(ua.Range(rate.low * A_MINUTE, rate.high * A_MINUTE))
             now = self._clock.simulated(0)
+            for name, found in parts.items():
+                await nodes.write(f"{root}.{name}", found, now)
+            await nodes.write(f"{root}.Status.UnitSupportedModes", ua.Variant(modes), now)
+            mode = server.get_node(node_id(f"{root}.Status.UnitModeCurrent"))
+            await mode.write_attribute(data_type, ua.DataValue(ua.Variant(modes)))
             for speed in ("MachSpeed", "CurMachSpeed"):
                 await nodes.write(f"{root}.Status.{speed}.EURange", span, now)
+
+    async def _parts(self, server: Server) -> dict[str, ua.Variant]:
+        """Ids of the states and transitions of each state machine, by the variables that list them."""
+        found: dict[str, ua.Variant] = {}
+        for state_machine, kind in _TYPES.items():
+            parts = await server.get_node(ua.NodeId(kind, self._index)).get_children_descriptions()
+            for name, kinds in _PARTS.items():
+                ids = [part.NodeId for part in parts if part.TypeDefinition in [ua.NodeId(each) for each in kinds]]
+                found[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
+        return found
 
     async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
         """Bring in what has changed."""

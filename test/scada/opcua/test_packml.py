@@ -9,7 +9,7 @@ from asyncua import ua
 
 from conveyor_sim.line.alarms.alarm import AlarmState
 from conveyor_sim.line.packml import Command, State
-from conveyor_sim.scada.opcua.packml import NAMESPACE
+from conveyor_sim.scada.opcua.packml import NAMESPACE, NODESET
 from test.scada.opcua.conftest import refused
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def child(client: Client, *names: str) -> SyncNode:
     """By the standard's browse names."""
     index = client.get_namespace_index(NAMESPACE)
     filler = client.get_node(f"ns=2;s={OBJECT}")
-    standard = ("CurrentState", "Id", "EURange")
+    standard = ("CurrentState", "Id", "EURange", "AvailableStates", "AvailableTransitions")
     return filler.get_child([f"{0 if name in standard else index}:{name}" for name in names])
 
 
@@ -51,7 +51,18 @@ def test_a_machine_is_an_object_of_the_standards_type(line: Line) -> None:
     assert child(client, "Status", "CurMachSpeed").read_value() == pytest.approx(shown["machines/filler/cur_rate"] * 60)
     assert child(client, "Status", "MachSpeed").read_value() == pytest.approx(shown["machines/filler/rate"] * 60)
     assert child(client, "Status", "MachSpeed", "EURange").read_value().High == pytest.approx(96.0)  # 1.6 a second
-    assert child(client, "Status", "UnitModeCurrent").read_value() == 1
+    mode = child(client, "Status", "UnitModeCurrent")
+    assert mode.read_value() == 1
+    assert mode.read_data_type() == child(client, "Status", "UnitSupportedModes").read_value()
+    assert client.get_node(mode.read_data_type()).read_browse_name().Name == "ProductionMaintenanceModeEnum"
+    path = ("BaseStateMachine", "MachineState", "ExecuteState")
+    transitions: list[ua.NodeId] = []
+    for depth, count in enumerate((3, 4, 12), start=1):
+        listed = child(client, *path[:depth], "AvailableStates").read_value()
+        names = {client.get_node(each).read_browse_name().Name for each in listed}
+        assert len(names) == count and states(line)[depth - 1] in names
+        transitions += child(client, *path[:depth], "AvailableTransitions").read_value()
+    assert len(set(transitions)) == len(transitions) == NODESET.read_text().count('"HasTypeDefinition">i=2310<')
     assert child(client, "Status", "EquipmentBlocked").read_value() is False
     assert states(line) == ["Cleared", "Running", "Execute"]
     id = child(client, "BaseStateMachine", "CurrentState", "Id").read_value()
