@@ -232,10 +232,10 @@ class FreeRunning:
         self.plant, self.plc, self._thread = plant, plc, thread
         self.said: list[str] = []
         self.observed: list[Mapping[str, float]] = []
-        source = plant.source()
-        tags = read_tag_map(plc.tags, source.about.tags)
+        self.source = plant.source()
+        tags = read_tag_map(plc.tags, self.source.about.tags)
         way = partial(link, plc.url, all_of(tags))
-        self.face = PlcFace(source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
+        self.face = PlcFace(self.source, plc.url, tags, way, 0.005, self.said.append, self.observed.append)
         thread.run(self.face.start())
 
     def until(self, done: Callable[[], object]) -> None:
@@ -298,3 +298,28 @@ def test_what_the_plc_calls_bad_is_no_command(free: FreeRunning) -> None:
     set_speed(0.25, ua.StatusCodes.Good)
     free.until(lambda: free.plant.signals["belts/zone1/speed"] == 0.25)
     assert free.said[-1] == f"{free.plc.url}: reached again"
+
+
+@pytest.mark.parametrize("plc", ["opcua"], indirect=True)
+def test_a_command_out_of_range_is_refused_once_and_alone(free: FreeRunning) -> None:
+    made = free.plc.made
+
+    def set_value(name: str, value: float | bool, kind: str) -> None:
+        free.plc.thread.run(made._write(name, value, kind))
+
+    def refused() -> list[str]:
+        return [event.name for event in free.source.events(0)[1] if event.kind == "command_refused"]
+
+    free.until(lambda: free.face.status().writes > 0)
+    free.plc.thread.run(made.halt())
+    set_value("full", False, "Boolean")
+    free.until(lambda: free.plant.signals[ALARM] == 0.0)
+    set_value("speed", 9.0, "Float")
+    free.until(refused)
+    set_value("full", True, "Boolean")
+    free.until(lambda: free.plant.signals[ALARM] == 1.0)
+    seen = len(free.observed)
+    free.until(lambda: len(free.observed) > seen + 20)
+    assert refused() == [SETPOINT] and free.face.status().refused == 1
+    set_value("speed", 0.25, "Float")
+    free.until(lambda: free.plant.signals["belts/zone1/speed"] == 0.25)

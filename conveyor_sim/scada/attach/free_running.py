@@ -15,7 +15,9 @@ from pathlib import Path
 
 from conveyor_sim.control.scan import ALARMS, AlarmChanges
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.attach.link import Link, LinkError
 from conveyor_sim.scada.attach.links import all_of, link
 from conveyor_sim.scada.attach.tag_map import TagMap, read_tag_map
@@ -50,6 +52,8 @@ class PlcFace:
         self._link: Link | None = None
         self._task: asyncio.Task[None] | None = None
         self._alarms = AlarmChanges()
+        self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self._bad: set[str] = set()  # commands that are out of range
         self._written: Shown | None = None
         self._given = self._refused = 0
         self._lag = 0.0
@@ -73,7 +77,7 @@ class PlcFace:
         await self._leave()
 
     def status(self) -> Status:
-        """Scans that gave commands, and those that were not taken; the lag from a tick to what the PLC made of it."""
+        """Scans that gave commands, and what was not taken; the lag from a tick to what the PLC made of it."""
         lag, self._lag = self._lag, 0.0
         return Status(int(self._link is not None), 0, self._given, self._refused, lag)
 
@@ -119,14 +123,24 @@ class PlcFace:
         self._lag = max(self._lag, time.monotonic() - began)
 
     def _give(self, answer: dict[str, float]) -> None:
+        """What is out of range is given alone, to be refused on record, and once: the rest acts all the same."""
         commands = {name: value for name, value in answer.items() if not name.startswith(ALARMS)}
-        commands |= self._alarms.of({name: value for name, value in answer.items() if name not in commands})
-        if commands:
-            given = Input(PLC, self._writer, "controller", SET, tuple(commands), tuple(commands.values()))
-            refused = bool(self._source.give(given))
-            if refused:
-                self._alarms = AlarmChanges()  # none of them is known to the line
-            self._given, self._refused = self._given + (not refused), self._refused + refused
+        bad = {name for name, value in commands.items() if refusal(self._commands, "command", [name], [value])}
+        for name in sorted(bad - self._bad):
+            self._pass_on({name: commands[name]})
+        self._refused += len(bad - self._bad)
+        self._bad = bad
+        given = {name: value for name, value in commands.items() if name not in bad}
+        given |= self._alarms.of({name: value for name, value in answer.items() if name not in commands})
+        if given and self._pass_on(given):
+            self._given += 1
+        elif given:
+            self._refused += 1
+            self._alarms = AlarmChanges()  # none of them is known to the line
+
+    def _pass_on(self, values: Mapping[str, float]) -> bool:
+        given = Input(PLC, self._writer, "controller", SET, tuple(values), tuple(values.values()))
+        return not self._source.give(given)
 
     async def _reach(self) -> Link:
         link = self._make()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections.abc import Awaitable, Mapping, Sequence
 from contextlib import suppress
@@ -46,6 +47,7 @@ class OpcUaLink:
 
     async def connect(self) -> None:
         """Reach it, and find the type of each variable."""
+        logging.getLogger("asyncua.client").setLevel(logging.CRITICAL)  # it logs what LinkError says
         # By itself it leaves a server that has not answered for a second.
         client = Client(self._url, timeout=PATIENCE, watchdog_intervall=PATIENCE)
         if self._user:
