@@ -20,8 +20,10 @@ from asyncua.crypto import uacrypto
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
+from asyncua.ua.uaprotocol_auto import DataChangeFilter
 
 from conveyor_sim.line.inputs import SET
+from conveyor_sim.scada.opcua.items import Items
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.transport import Connection, channel
@@ -203,7 +205,10 @@ class Session(InternalSession):
         params.RequestedLifetimeCount = min(params.RequestedLifetimeCount or kept, kept)
         most = max(1, params.RequestedLifetimeCount // 3)
         params.RequestedMaxKeepAliveCount = min(params.RequestedMaxKeepAliveCount or most, most)
-        return await super().create_subscription(params, *others, **named)
+        result = await super().create_subscription(params, *others, **named)
+        subscription = self.subscription_service.subscriptions[result.SubscriptionId]
+        subscription.monitored_item_srv = Items(subscription, self.aspace)
+        return result
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
         """As when it was created."""
@@ -217,6 +222,8 @@ class Session(InternalSession):
         asked = params.ItemsToCreate or []
         if len(self._items()) + len(asked) > MOST_ITEMS:
             raise ServiceError(Codes.BadTooManyMonitoredItems)
+        for item in asked:
+            _require_filter(item, item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier)
         self._bound_queues(asked)
         return await super().create_monitored_items(params)
 
@@ -224,6 +231,11 @@ class Session(InternalSession):
         self, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
         """As when they were created."""
+        subscription = self.subscription_service.subscriptions.get(params.SubscriptionId)
+        known = {} if subscription is None else subscription.monitored_item_srv._monitored_items
+        for item in params.ItemsToModify or []:
+            if (old := known.get(item.MonitoredItemId)) is not None:
+                _require_filter(item, isinstance(old.filter, ua.EventFilter))
         self._bound_queues(params.ItemsToModify or [])
         return await super().modify_monitored_items(params)
 
@@ -271,6 +283,13 @@ class Session(InternalSession):
     async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
         """Refused."""
         raise ServiceError(Codes.BadUserAccessDenied)
+
+
+def _require_filter(item: Any, of_events: bool) -> None:
+    """With a filter of another kind an item would be made, and never be told of anything."""
+    given = item.RequestedParameters.Filter
+    if given and not isinstance(given, ua.EventFilter if of_events else DataChangeFilter):
+        raise ServiceError(Codes.BadMonitoredItemFilterUnsupported)
 
 
 def _interval(asked: float) -> float:

@@ -122,6 +122,42 @@ def test_who_keeps_up_misses_no_change(line: Line) -> None:
     assert heard.values == list(range(1, 302))
 
 
+def monitor(line: Line, heard: Heard, name: str, given: Any) -> None:
+    """Subscribe to a variable with a filter."""
+    client = line.open[0]
+    subscription = client.create_subscription(10, heard)
+    way = subscription.aio_obj._subscribe(line.node(name).aio_obj, ua.AttributeIds.Value, mfilter=given, queuesize=100)
+    client.tloop.post(way)
+
+
+def test_a_dead_band_holds_back_what_is_near_what_was_sent_last(line: Line) -> None:
+    """A ramp is seen in steps; a status, and what is no number, at once."""
+    ticks, setpoints, running = Heard(), Heard(), Heard()
+    line.advance()
+    band = ua.DataChangeFilter(ua.DataChangeTrigger.StatusValue, ua.DeadbandType.Absolute, 5.0)
+    for heard, name in ((ticks, "run/tick"), (setpoints, SETPOINT), (running, "belts/zone1/running")):
+        monitor(line, heard, name, band)
+    line.until(lambda: bool(ticks.values and setpoints.values and running.values))
+    line.advance(18)
+    line.until(lambda: ticks.values == [1, 7, 13, 19])
+    for _ in range(2):
+        line.source.show(lost="gone")
+        line.until(lambda: line.read("run/lost") == "gone")
+        line.source.show(lost="")
+        line.until(lambda: line.read("run/lost") == "")
+    before = line.read(SETPOINT)
+    line.until(lambda: setpoints.values == [before, None, before, None, before])
+    line.until(lambda: running.values == [True, None, True, None, True])
+
+
+def test_a_filter_of_another_kind_is_refused_and_ends_nobody(line: Line) -> None:
+    line.client()
+    for wrong in (ua.EventFilter(), ua.AggregateFilter()):
+        with refused(Codes.BadMonitoredItemFilterUnsupported):
+            monitor(line, Heard(), "run/tick", wrong)
+    line.advance(3)
+
+
 def test_who_is_far_behind_gets_what_is_latest(line: Line) -> None:
     """More ticks than wait for the loop: those in between are left out, and counted; the last one never is."""
     heard, before = Heard(), line.server.status().left_out
