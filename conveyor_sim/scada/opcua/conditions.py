@@ -13,10 +13,11 @@ from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
 from conveyor_sim.observe.alarms import AlarmColumns
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.opcua.emitter import Emitter
 from conveyor_sim.scada.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.scada.opcua.nodes import LINE, Nodes, node_id, nothing
-from conveyor_sim.scada.opcua.values import Clock, status_of
+from conveyor_sim.scada.opcua.values import status_of
 from conveyor_sim.scada.source import Shown
 
 MOST_OBJECTS = 4000

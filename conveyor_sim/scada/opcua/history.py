@@ -15,10 +15,11 @@ from asyncua.server.history import HistoryStorageInterface
 
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.opcua.nodes import NEVER, name_of
 from conveyor_sim.scada.opcua.tree import is_shown
-from conveyor_sim.scada.opcua.values import Clock, as_variant
+from conveyor_sim.scada.opcua.values import as_variant
 from conveyor_sim.scada.past import Past
 from conveyor_sim.scada.source import TagSource
 from conveyor_sim.support.printable import printable

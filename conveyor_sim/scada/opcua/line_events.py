@@ -11,9 +11,9 @@ from asyncua import Node, ua
 from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.observe.events import Event
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.opcua.emitter import Emitter
 from conveyor_sim.scada.opcua.nodes import LINE, Nodes, node_id
-from conveyor_sim.scada.opcua.values import Clock
 from conveyor_sim.scada.source import Shown, TagSource
 
 TYPE = "LineEventType"

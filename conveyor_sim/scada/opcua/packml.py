@@ -18,11 +18,12 @@ from asyncua.crypto.permission_rules import User
 from conveyor_sim.line.inputs import MODE
 from conveyor_sim.line.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.scada.opcua.packml_admin import A_MINUTE, Admin
 from conveyor_sim.scada.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.scada.opcua.requests import Codes, Requests
-from conveyor_sim.scada.opcua.values import Clock, status_of
+from conveyor_sim.scada.opcua.values import status_of
 from conveyor_sim.scada.source import Shown, TagSource
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"

@@ -14,8 +14,9 @@ from asyncua.common.copy_node_util import _copy_node
 from conveyor_sim.line.alarms.alarm import WAITING, AlarmState
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.observe.alarms import AlarmColumns
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.opcua.nodes import NEVER, node_id
-from conveyor_sim.scada.opcua.values import Clock, unit_of
+from conveyor_sim.scada.opcua.values import unit_of
 from conveyor_sim.scada.source import Shown
 
 NAME = "Admin"

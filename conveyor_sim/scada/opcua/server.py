@@ -14,6 +14,7 @@ from typing import Any
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.face import HERE, FaceError, Stamps, Status, require_free
 from conveyor_sim.scada.opcua.certificates import default_folder, identity
 from conveyor_sim.scada.opcua.conditions import AlarmStates
@@ -28,7 +29,6 @@ from conveyor_sim.scada.opcua.session import SafeServer
 from conveyor_sim.scada.opcua.transport import BoundedServer, channel
 from conveyor_sim.scada.opcua.tree import add_line
 from conveyor_sim.scada.opcua.updates import Updates
-from conveyor_sim.scada.opcua.values import Clock
 from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
 from conveyor_sim.scada.source import OPCUA, TagSource
 from conveyor_sim.scada.users import Logins, User

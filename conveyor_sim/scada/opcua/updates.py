@@ -13,10 +13,11 @@ from asyncua import ua
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.observe.read_back import ReadBackColumns
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.scada.opcua.nodes import Nodes
 from conveyor_sim.scada.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
-from conveyor_sim.scada.opcua.values import Clock, as_variant, status_of
+from conveyor_sim.scada.opcua.values import as_variant, status_of
 from conveyor_sim.scada.source import Shown, TagSource
 
 MOST_BEHIND = 200

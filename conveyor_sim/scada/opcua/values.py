@@ -1,16 +1,14 @@
-"""Values of tags as OPC UA has them: types, units, status codes, time stamps."""
+"""Values of tags as OPC UA has them: types, units, status codes."""
 
 from __future__ import annotations
 
 import math
-from datetime import datetime, timedelta, timezone
 
 from asyncua import ua
 
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.scada.face import Stamps
-from conveyor_sim.scada.source import About, Shown
+from conveyor_sim.scada.source import Shown
 
 _WHOLE = {ua.VariantType.UInt32: (0, 2**32 - 1), ua.VariantType.Int32: (-(2**31), 2**31 - 1)}
 
@@ -60,28 +58,3 @@ def status_of(shown: Shown) -> int:
     if shown.run.state == PAUSED:
         return ua.StatusCodes.UncertainLastUsableValue
     return ua.StatusCodes.Good
-
-
-class Clock:
-    """Dates and times of ticks."""
-
-    def __init__(self, about: About, stamps: Stamps) -> None:
-        """stamps: which of both SourceTimestamps are."""
-        self._start = datetime.fromisoformat(about.start_time.replace("Z", "+00:00")).astimezone(timezone.utc)
-        self._tick = about.tick
-        self.is_simulated = stamps == "simulated"
-
-    def simulated(self, tick: float) -> datetime:
-        """Simulated time 0 is the scene's `start_time`."""
-        try:
-            return self._start + timedelta(seconds=tick * self._tick)
-        except OverflowError:
-            return datetime.max.replace(tzinfo=timezone.utc)
-
-    def stamp(self, tick: float, heard: datetime) -> datetime:
-        """SourceTimestamp of what is of a tick. heard: when the server got to know it."""
-        return self.simulated(tick) if self.is_simulated else heard
-
-    def tick_at(self, date: datetime) -> float:
-        """The tick of a date in simulated time, with a fraction; below 0 for one before the start."""
-        return (date - self._start).total_seconds() / self._tick

@@ -12,8 +12,9 @@ from asyncua import ua
 
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.line.weihenstephan import DATA_POINTS, data_points, names_of
+from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.opcua.nodes import Nodes, node_id
-from conveyor_sim.scada.opcua.values import Clock, status_of
+from conveyor_sim.scada.opcua.values import status_of
 from conveyor_sim.scada.source import Shown, TagSource
 
 NAME = "Weihenstephan"
