@@ -57,6 +57,7 @@ setup(
         "plot": requirements("plot"),
         "accuracy": requirements("accuracy"),
         "scada": requirements("scada"),
+        "mqtt": requirements("mqtt"),
         "foxglove": requirements("foxglove"),
         "studies": requirements("studies"),
         "optimise": [*requirements("studies"), *requirements("optimise")],

@@ -117,7 +117,7 @@ def _tag(belt: str) -> Tag:
 
 def measure(effort: Effort) -> list[Row]:
     """What clients miss and what that costs; then what it costs the ticks."""
-    if missing := [kind.library for kind in KINDS if not kind.installed]:
+    if missing := [kind.libraries[0] for kind in KINDS if not kind.installed]:
         say(f"scada is left out: {', '.join(missing)} not installed")
         return []
     return [*_faces(QUICK_SECONDS if effort.quick else SECONDS), *_ticks(effort)]

@@ -45,7 +45,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "| click numpy rich",
     "live": "bag errors line observe runs simulation support",
     "scada": "bag control errors line live observe runs scene simulation support view | aiohttp asyncua cryptography "
-    "foxglove numpy pymodbus",
+    "foxglove google numpy paho pymodbus",
     "st": "control scada support | lark",
     "studies": "bag control engine errors line model observe plot runs scene simulation statistics st support "
     "version | SALib annotated_types distributed numpy optuna pyarrow pydantic rich scipy",

@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-EXTRAS = ("foxglove", "scada", "st")
+EXTRAS = ("foxglove", "mqtt", "scada", "st")
 """Whose lists in requirements/ those of the tools include."""
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
 TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "what the docs site is built with"}

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from conveyor_sim.ros.node_source import NodeSource
     from conveyor_sim.scada.bag_source import BagSource
     from conveyor_sim.scada.face import Settings, Stamps
+    from conveyor_sim.scada.faces import Kind
     from conveyor_sim.scada.scene_source import SceneSource
     from conveyor_sim.scada.serving import Serving
 
@@ -32,6 +33,8 @@ IN_LOCKSTEP = "in lockstep: the line stands until a client writes run/target_tic
 
 PORT = click.IntRange(0, 65535)
 
+MQTT_ROLES = ("viewer", "operator", "engineer", "controller")
+
 OF_SCENE = ("out", "no_record", "duration", "threads", "outside_tables", "lockstep")
 TAKEN_BY_SCENE = (*OF_SCENE, "real_time_factor")
 OF_BAG = ("loop",)
@@ -42,6 +45,10 @@ DRAWING = ("web", "foxglove")
 OF_FACES = (
     "modbus_role",
     "modbus_map",
+    "mqtt_role",
+    "mqtt_password_file",
+    "mqtt_ca",
+    "mqtt_primary_host",
     "users",
     "anonymous",
     "opcua_certificates",
@@ -53,7 +60,7 @@ _WHERE = {
     **dict.fromkeys(OF_SCENE, "it with a scene only"),
     "loop": "it with a bag only",
     "real_time_factor": "it with a scene or a bag: the node has a parameter of that name",
-    "modbus_role": "none: a recording can't be commanded",
+    **dict.fromkeys(("modbus_role", "mqtt_role"), "none: a recording can't be commanded"),
 }
 
 
@@ -66,6 +73,13 @@ _WHERE = {
 @click.option("--modbus", type=PORT, is_flag=False, flag_value=5020, help="Serve Modbus TCP on this port.")
 @click.option("--modbus-role", type=click.Choice(["controller", "operator"]), help="As what its clients may write.")
 @click.option("--modbus-map", type=click.Path(path_type=Path), help="File that keeps its addresses; it only grows.")
+@click.option(
+    "--mqtt", is_flag=False, flag_value="mqtt://127.0.0.1:1883", metavar="URL", help="Publish by Sparkplug B there."
+)
+@click.option("--mqtt-role", type=click.Choice(MQTT_ROLES), help="As what its hosts may write (default: viewer).")
+@click.option("--mqtt-password-file", type=click.Path(path_type=Path), help="File of the password for the broker.")
+@click.option("--mqtt-ca", type=click.Path(path_type=Path), help="Certificates by which a broker of mqtts:// is known.")
+@click.option("--mqtt-primary-host", default="", metavar="ID", help="Publish only while this host is online.")
 @click.option("--web", type=PORT, is_flag=False, flag_value=8080, help="Serve a page for browsers on this port.")
 @click.option("--foxglove", type=PORT, is_flag=False, flag_value=8765, help="Serve Foxglove on this port.")
 @click.option("--web-certificates", type=click.Path(path_type=Path), help="Folder of its certificate and key.")
@@ -100,25 +114,25 @@ _WHERE = {
 @click.option("--threads", type=click.IntRange(1), help="Of SCENE: threads to step with.")
 @click.option("--outside-tables", is_flag=True, help=OUTSIDE_TABLES)
 def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given: Any) -> None:
-    """Serve a line to SCADA systems, HMIs, PLCs, browsers and Foxglove.
+    """Serve a line to SCADA systems, HMIs, PLCs, MQTT hosts, browsers and Foxglove.
 
     SCENE is simulated in real time, and recorded with all that clients write. BAG is played back. With --node it is the
     line that a running node simulates. Without the option of a face, OPC UA and Modbus are served, each on its
     port. Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.scada.face import Settings, require_free
+        from conveyor_sim.scada.face import Settings
         from conveyor_sim.scada.faces import FACES
         from conveyor_sim.scada.serving import Serving
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
-    chosen = [(kind, port) for kind in FACES if (port := given[kind.name]) is not None]
+    chosen: list[tuple[Kind, Any]] = [(kind, place) for kind in FACES if (place := given[kind.name]) is not None]
     chosen = chosen or [(kind, kind.port) for kind in FACES if kind.by_default and kind.installed]
     for kind, _ in chosen or [(FACES[0], 0)]:
         kind.require()
-    for kind, port in chosen:
-        require_free(kind.name, bind, port)  # not only once everything has been compiled
     settings = Settings(bind, stamps, **{name: given[name] for name in OF_FACES})
+    for kind, place in chosen:
+        kind.require_place(place, settings)  # not only once everything has been compiled
     paused: SceneSource | None = None
     with ExitStack() as stack:
         if (what is None) == (node is None):
@@ -128,7 +142,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
             drawn = any(given[face] is not None for face in DRAWING)
             source: Source = stack.enter_context(_node(node or "", console, drawn))
         elif _is_bag(what):
-            _require_not_given(what, (*OF_SCENE, "modbus_role"))
+            _require_not_given(what, (*OF_SCENE, "modbus_role", "mqtt_role"))
             source = stack.enter_context(_bag(Path(what), console, given["real_time_factor"], given["loop"]))
         else:
             _require_not_given(what, OF_BAG)

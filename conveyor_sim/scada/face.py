@@ -10,6 +10,7 @@ from typing import Literal, Protocol
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.users import Role
 
 HERE = "127.0.0.1"
 """Where faces listen unless they are told otherwise: only this machine reaches it."""
@@ -33,6 +34,14 @@ class Settings:
     """In which Modbus clients write; None: they may not."""
     modbus_map: Path | None = None
     """File that keeps the map of addresses; None: made of the tags, and not kept."""
+    mqtt_role: Role | None = None
+    """In which hosts command by MQTT; None, viewer: they may not."""
+    mqtt_password_file: Path | None = None
+    """File of the password for the broker; None: an environment variable."""
+    mqtt_ca: Path | None = None
+    """File of the certificates by which the broker is known; None: those that this machine trusts."""
+    mqtt_primary_host: str = ""
+    """Id of the host application without which nothing is sent; empty: none."""
     users: Path | None = None
     """File of those who may do more than read by OPC UA and on the page; None: nobody may."""
     anonymous: bool = True
@@ -62,6 +71,8 @@ class Status:
     of the source to its being shown, whichever took longer; 0 without any."""
     left_out: int = 0
     """Ticks so far that it never showed, being too far behind: their changes are missed by whoever follows all."""
+    state: str = ""
+    """Of a client of a broker: how it is with the broker, in words that stand in place of its clients."""
 
 
 class Face(Protocol):

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
+from typing import Any
 
-from conveyor_sim.scada.face import HERE, Face, FaceError, Settings
-from conveyor_sim.scada.source import MODBUS, OPCUA, WEB, TagSource
+from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.face import HERE, Face, FaceError, Settings, require_free
+from conveyor_sim.scada.source import MODBUS, MQTT, OPCUA, WEB, TagSource
 
 
 @dataclass(frozen=True)
@@ -15,29 +17,51 @@ class Kind:
     """One protocol."""
 
     name: str
-    """Of the option of `serve`, which takes a port."""
+    """Of the option of `serve`, which takes a port; of MQTT the URL of a broker."""
     port: int
     """By default; its usual one may be for root only."""
-    library: str
+    libraries: tuple[str, ...]
     """Without which it can't be."""
-    make: Callable[[TagSource, int, Settings], Face]
-    """A face on a port, not started. Raises ConveyorError."""
+    make: Callable[[TagSource, Any, Settings], Face]
+    """A face on what its option takes, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
     """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
     by_default: bool = True
     """Whether it is served where none is named."""
     extra: str = "scada"
-    """Of this package, that brings the library."""
+    """Of this package, that brings the libraries."""
+    whoever: str = ""
+    """Who can do that, where it is not those who reach its port."""
 
     @property
     def installed(self) -> bool:
-        """Whether its library is here."""
-        return find_spec(self.library) is not None
+        """Whether its libraries are here."""
+        return not self._missing
+
+    @property
+    def _missing(self) -> list[str]:
+        return [name for name in self.libraries if not _is_here(name)]
 
     def require(self) -> None:
         """Raises FaceError if it can't be here."""
-        if not self.installed:
-            raise FaceError(f"{self.name}: {self.library} is not installed: pip install 'conveyor_sim[{self.extra}]'")
+        if missing := self._missing:
+            raise FaceError(f"{self.name}: {missing[0]} is not installed: pip install 'conveyor_sim[{self.extra}]'")
+
+    def require_place(self, place: Any, settings: Settings) -> None:
+        """Raises FaceError if it can't be on what its option says: before anything has been compiled for it."""
+        if self.name == MQTT:
+            from conveyor_sim.scada.mqtt.broker import broker_of
+
+            broker_of(place, settings).require_reachable()
+        else:
+            require_free(self.name, settings.host, place)
+
+
+def _is_here(library: str) -> bool:
+    try:
+        return find_spec(library) is not None
+    except ModuleNotFoundError:  # the package that it is in
+        return False
 
 
 def _modbus(source: TagSource, port: int, settings: Settings) -> Face:
@@ -69,6 +93,24 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
         host=settings.host,
         port=port,
     )
+
+
+def _mqtt(source: TagSource, url: str, settings: Settings) -> Face:
+    from conveyor_sim.scada.mqtt.broker import broker_of
+    from conveyor_sim.scada.mqtt.edge_node import EdgeNode
+
+    return EdgeNode(source, broker_of(url, settings), _mqtt_writes(settings), settings.stamps)
+
+
+def _mqtt_writes(settings: Settings) -> WriterKind | None:
+    role = settings.mqtt_role
+    return None if role is None or role == "viewer" else role
+
+
+def _mqtt_exposes(settings: Settings) -> str:
+    if _mqtt_writes(settings) is None:
+        return "read all, and write nothing"
+    return f"read all, and write as {settings.mqtt_role}, for commands by Sparkplug say nothing of who gave them"
 
 
 def _web(source: TagSource, port: int, settings: Settings) -> Face:
@@ -105,8 +147,18 @@ def _users_can(settings: Settings) -> str:
 
 
 FACES: tuple[Kind, ...] = (
-    Kind(OPCUA, 4840, "asyncua", _opcua, _users_can),
-    Kind(MODBUS, 5020, "pymodbus", _modbus, _modbus_exposes),
-    Kind(WEB, 8080, "aiohttp", _web, _users_can, by_default=False),
-    Kind("foxglove", 8765, "foxglove", _foxglove, lambda _: "read all", by_default=False, extra="foxglove"),
+    Kind(OPCUA, 4840, ("asyncua",), _opcua, _users_can),
+    Kind(MODBUS, 5020, ("pymodbus",), _modbus, _modbus_exposes),
+    Kind(
+        MQTT,
+        1883,
+        ("paho", "google.protobuf"),
+        _mqtt,
+        _mqtt_exposes,
+        by_default=False,
+        extra="mqtt",
+        whoever="whoever the broker lets in",
+    ),
+    Kind(WEB, 8080, ("aiohttp",), _web, _users_can, by_default=False),
+    Kind("foxglove", 8765, ("foxglove",), _foxglove, lambda _: "read all", by_default=False, extra="foxglove"),
 )

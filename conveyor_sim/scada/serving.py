@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 from conveyor_sim.scada.face import HERE, Face, Settings, Status
 from conveyor_sim.scada.faces import Kind
@@ -14,8 +15,8 @@ from conveyor_sim.scada.source import TagSource
 class Serving(AbstractContextManager["Serving"]):
     """Serves from the start to close()."""
 
-    def __init__(self, source: TagSource, chosen: Sequence[tuple[Kind, int]], settings: Settings) -> None:
-        """chosen: protocols and their ports, 0 for any that is free.
+    def __init__(self, source: TagSource, chosen: Sequence[tuple[Kind, Any]], settings: Settings) -> None:
+        """chosen: protocols and their ports, 0 for any that is free; of MQTT the URL of the broker.
 
         Raises ConveyorError, in one sentence, if one of them can't be served; then none is.
         """
@@ -24,9 +25,9 @@ class Serving(AbstractContextManager["Serving"]):
         self._faces: list[Face] = []
         self._thread = ServerThread()
         try:
-            for kind, port in chosen:
+            for kind, place in chosen:
                 kind.require()
-                face = kind.make(source, port, settings)
+                face = kind.make(source, place, settings)
                 self._thread.run(face.start())
                 self._faces.append(face)
         except BaseException:
@@ -43,7 +44,7 @@ class Serving(AbstractContextManager["Serving"]):
         """A sentence for each: where clients find it, and what they can do there."""
         whoever = "clients" if self._settings.host == HERE else "whoever reaches this machine there"
         pairs = zip(self._kinds, self._faces, strict=True)
-        return [f"{face.address}: {whoever} can {kind.exposes(self._settings)}" for kind, face in pairs]
+        return [f"{face.address}: {kind.whoever or whoever} can {kind.exposes(self._settings)}" for kind, face in pairs]
 
     def progress(self) -> str:
         """How the line and its faces are, in one line."""
@@ -83,7 +84,7 @@ class Serving(AbstractContextManager["Serving"]):
 def _told(name: str, status: Status) -> str:
     subscriptions = f", {_many(status.subscriptions, 'subscription')}" if status.subscriptions else ""
     left_out = f", {_many(status.left_out, 'tick')} left out" if status.left_out else ""
-    clients = f"{_many(status.clients, 'client')}{subscriptions}"
+    clients = status.state or f"{_many(status.clients, 'client')}{subscriptions}"
     return f"{name}: {clients}, {_writes(status)}, {status.latency * 1e3:.1f} ms{left_out}"
 
 

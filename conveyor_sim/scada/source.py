@@ -24,13 +24,16 @@ MODBUS = "modbus"
 OPCUA = "opcua"
 """Source of inputs that come by OPC UA."""
 
+MQTT = "mqtt"
+"""Source of inputs that come by MQTT."""
+
 WEB = "web"
 """Source of inputs that come by the page."""
 
 PLC = "plc"
 """Source of what a PLC commands whose client the line is."""
 
-FACES = (MODBUS, OPCUA, WEB, PLC)
+FACES = (MODBUS, OPCUA, MQTT, WEB, PLC)
 """Sources of inputs that SCADA clients give."""
 
 MOST_WAITING = 1000

@@ -177,4 +177,4 @@ def of_plc(
         return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say, observe)
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
-    return Kind(PLC, 0, library, make, lambda _: "command it")
+    return Kind(PLC, 0, (library,), make, lambda _: "command it")

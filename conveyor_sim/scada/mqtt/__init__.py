@@ -1,0 +1,1 @@
+"""A line as an edge node of MQTT Sparkplug B."""
