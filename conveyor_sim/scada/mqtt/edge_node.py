@@ -24,7 +24,7 @@ from conveyor_sim.scada.mqtt.commands import SILENCE, Commands
 from conveyor_sim.scada.mqtt.hosts import PrimaryHost
 from conveyor_sim.scada.mqtt.line_metrics import LineMetrics
 from conveyor_sim.scada.mqtt.link import MOST_BYTES, NEWEST, OLDEST, Link, LinkError, Message, TooNewError
-from conveyor_sim.scada.mqtt.session import Names, Session, death
+from conveyor_sim.scada.mqtt.session import BETWEEN, Names, Session, death
 from conveyor_sim.scada.source import Shown, TagSource
 
 MOST_BEHIND = 200
@@ -212,7 +212,10 @@ class EdgeNode:
             self._longest = max(self._longest, (datetime.now(timezone.utc) - heard).total_seconds())
             await asyncio.sleep(0)
         if not link.full:
+            session.catch_up()
             session.tell(self._source.shown)
+        if session.behind:
+            self._loop.call_later(BETWEEN, self._wake.set)
         return 0
 
     def _take(self, message: Message) -> int:

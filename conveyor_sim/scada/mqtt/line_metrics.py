@@ -74,6 +74,7 @@ class LineMetrics:
         shown = [tag for tag in about.tags if tag.role in (*SIGNALS, *COMMANDS)]
         run = [count(TICK, "run", "Ticks since the start."), seconds(TIME, "run", "Simulated time.")]
         self._tags = [*run, *shown]
+        self._clocks = {TICK, TIME, *(tag.name for tag in shown if tag.role == "counter" and tag.unit == "s")}
         self._sent: dict[str, _Reading] = {}
 
     def birth(self, shown: Shown, heard: datetime) -> Any:
@@ -86,13 +87,22 @@ class LineMetrics:
             self._sent[tag.name] = reading
         return payload
 
-    def changes(self, shown: Shown, heard: datetime) -> Any:
-        """Those that have changed, as a payload."""
+    def changes(self, shown: Shown, heard: datetime, passing: bool = True) -> Any:
+        """Those that have changed, as a payload.
+
+        passing: whether to say so if that is but how time passes, on a clock or in a state; with others it is always
+        said.
+        """
         payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
+        changed: list[tuple[Tag, _Reading]] = []
         for tag, reading in self._readings(shown):
             if reading != self._sent.get(tag.name):
-                self._add(payload, tag, reading, stamp)
-                self._sent[tag.name] = reading
+                changed.append((tag, reading))
+        if not passing and all(tag.name in self._clocks for tag, _ in changed):
+            return payload
+        for tag, reading in changed:
+            self._add(payload, tag, reading, stamp)
+            self._sent[tag.name] = reading
         return payload
 
     def _readings(self, shown: Shown) -> Iterator[tuple[Tag, _Reading]]:

@@ -18,7 +18,7 @@ DEVICE = "line"
 """The device of each edge node: commands act, values change and the connection is lost for the line as a whole."""
 
 BETWEEN = 0.1
-"""s of wall time between two messages of the edge node itself, at least."""
+"""s of wall time, at least, between two messages of the edge node itself, and to one that says but how time passes."""
 
 _NUMBERS = 256
 
@@ -55,6 +55,8 @@ class Session:
         self._node: dict[str, tuple[int, float | str]] = {}
         self._node_at = 0.0  # s of wall time
         self._alive = False
+        self._line_at = 0.0  # s of wall time, of the last data of the line
+        self._put_off: tuple[Shown, datetime] | None = None
         self.born_at: float | None = None
         """s of wall time of the last births; None: there were none yet."""
 
@@ -72,7 +74,7 @@ class Session:
         self._send("NBIRTH", payload)
         self._last, self._alive = shown, is_there(shown)
         if self._alive:
-            self._send("DBIRTH", self._line.birth(shown, heard))
+            self._bear_line(shown, heard)
 
     def bring(self, shown: Shown, heard: datetime) -> None:
         """What a line shows: what has changed, or its death, or that it is there again. After `bear`."""
@@ -81,14 +83,29 @@ class Session:
         there = is_there(shown)
         if there and (back or not self._alive):
             # Where time has stepped back, what has stayed the same would be of the future.
-            self._send("DBIRTH", self._line.birth(shown, heard))
+            self._bear_line(shown, heard)
         elif self._alive and not shown.lost:
-            changed = self._line.changes(shown, heard)
-            if changed.metrics:
-                self._send("DDATA", changed)
+            self._say(shown, heard, passing=not there or time.monotonic() >= self._line_at + BETWEEN)
         if self._alive and not there:
             self._send("DDEATH", Payload())
         self._alive = there
+
+    @property
+    def behind(self) -> bool:
+        """Whether time has passed that was not said."""
+        return self._alive and self._put_off is not None
+
+    def catch_up(self) -> None:
+        """Say how time has passed, where that was put off for long enough."""
+        if self.behind and self._put_off is not None and time.monotonic() >= self._line_at + BETWEEN:
+            self._say(*self._put_off, passing=True)
+
+    def _say(self, shown: Shown, heard: datetime, passing: bool) -> None:
+        changed = self._line.changes(shown, heard, passing)
+        self._put_off = None if changed.metrics or passing else (shown, heard)
+        if changed.metrics:
+            self._line_at = time.monotonic()
+            self._send("DDATA", changed)
 
     def tell(self, shown: Shown) -> None:
         """What has changed of the edge node itself, unless it was told just now. After `bear`."""
@@ -101,6 +118,10 @@ class Session:
                 add_metric(payload, name, kind, value, stamp)
         self._node, self._node_at = metrics, now
         self._send("NDATA", payload)
+
+    def _bear_line(self, shown: Shown, heard: datetime) -> None:
+        self._put_off, self._line_at = None, time.monotonic()
+        self._send("DBIRTH", self._line.birth(shown, heard))
 
     def _of_node(self, shown: Shown) -> dict[str, tuple[int, float | str]]:
         """Always good: it says what has become of the rest."""

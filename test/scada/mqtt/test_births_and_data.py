@@ -16,6 +16,7 @@ from conveyor_sim.line.inputs import FORCE, Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, RUNNING, RunState
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.scada.mqtt import edge_node
+from conveyor_sim.scada.mqtt.session import BETWEEN
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from test.scada.mqtt.kit import BOOLEAN, DOUBLE, SCENE, SETPOINT, SPEED, properties_of, value_of
@@ -55,12 +56,33 @@ def test_only_what_changes_is_sent_and_all_of_it(line: Line) -> None:
         if tag.role in (*SIGNALS, *COMMANDS):
             assert line.host.values[tag.name] == line.source.shown.values[tag.name], tag.name
     data = line.host.heard[2:]
-    assert len(data) > 256 and {heard.payload.seq for heard in data} == set(range(256))  # it goes round
     before: dict[str, object] = {name: value_of(metric) for name, metric in line.host.heard[1].metrics.items()}
     for heard in data:
         for name, metric in heard.metrics.items():
             assert value_of(metric) != before[name], name
             before[name] = value_of(metric)
+
+
+def test_numbers_go_round(line: Line) -> None:
+    """The host holds each against the one before."""
+    for count in range(300):
+        line.source.show(forced=frozenset() if count % 2 else frozenset({SPEED}))
+        if count % 50 == 0:
+            line.until(lambda: len(line.host.heard) >= count, "what was said")  # noqa: B023
+    line.until(lambda: len(line.host.heard) >= 302, "all")
+    assert {heard.payload.seq for heard in line.host.heard} == set(range(256))
+
+
+def test_how_time_passes_is_said_with_what_changes_or_now_and_then(line: Line) -> None:
+    for _ in range(10):
+        line.advance(5)
+    told = [heard for heard in line.host.heard if heard.kind == "DDATA"]
+    clocks = {"run/tick", "run/time", "machines/packer/starved_time", "machines/filler/blocked_time"}
+    passing = [heard for heard in told if set(heard.metrics) <= clocks]
+    stamps = [heard.payload.timestamp for heard in told]
+    assert passing and told[-1].value("run/tick") == 50 and len(told) < 50
+    for before, heard in zip(stamps, told[1:], strict=False):
+        assert heard not in passing or heard.payload.timestamp - before >= 1e3 * BETWEEN - 2  # ms, of two clocks
 
 
 def test_times_are_those_of_the_scene_on_request(serve: Callable[..., Line]) -> None:
