@@ -189,7 +189,7 @@ def test_what_a_tester_does_is_shown(page: Any, live: Live) -> None:
     page.click("[aria-label='Force photo_eyes/exit/blocked on']")
     row, chip = page.locator("#panel_watch li"), page.locator("[aria-label^='Remove photo_eyes/exit/blocked ']")
     soon(page, lambda: "forced" in row.inner_text() and "\non\n" in row.inner_text(), "the force")
-    soon(page, lambda: "photo_eyes/exit/blocked, forced" in chip.inner_text(), "the force, of what the trends show")
+    soon(page, lambda: ", forced" in chip.inner_text(), "the force, of what the trends show")
     page.click("[aria-label='End the force on photo_eyes/exit/blocked']")
     soon(page, lambda: "forced" not in row.inner_text(), "its end")
     soon(page, lambda: "forced" not in chip.inner_text(), "its end, of what the trends show")
