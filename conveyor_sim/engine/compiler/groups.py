@@ -39,7 +39,7 @@ def group(cls: Class) -> Class:
     return kept
 
 
-class _Laid(tuple):
+class _Laid(tuple[Any, ...]):
     """A group in memory, laid out as `_GroupModel.struct` has it: each value in words of 8 bytes."""
 
     _words: Any
