@@ -1,5 +1,8 @@
 """What kernels get beside numba's own passes: groups by address, absent members pruned, parts linked once."""
 
+import copy
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numba
@@ -61,6 +64,46 @@ def test_parts_reach_the_arrays_of_a_group() -> None:
     other = Outer(Inner(np.array([5.0]), 2.0), np.zeros(1))
     assert add_all(other) == 2.0
     assert other.sums.tolist() == [10.0]
+
+
+def test_a_copy_of_a_group_has_arrays_of_its_own() -> None:
+    """Though the group that was copied has been laid out."""
+    outer = Outer(Inner(np.array([1.0, 2.0]), 10.0), np.zeros(2))
+    add_all(outer)
+    for copied in (copy.deepcopy(outer), pickle.loads(pickle.dumps(outer)), outer._replace(sums=outer.sums.copy())):
+        add_all(copied)
+        assert copied.sums.tolist() == [20.0, 40.0]
+    assert outer.sums.tolist() == [10.0, 20.0]
+
+
+def test_a_group_that_many_threads_take_first_at_once_is_laid_out_once() -> None:
+    """Else one of them could have the address of what another has thrown away."""
+    for _ in range(200):
+        outer = Outer(Inner(np.array([1.0]), 1.0), np.zeros(1))
+        with ThreadPoolExecutor(4) as threads:
+            assert len(set(threads.map(lambda _: outer.address, range(4)))) == 1  # noqa: B023
+
+
+def test_arrays_of_any_shape_and_order_are_laid_out() -> None:
+    """Rows, columns, every other one, none."""
+
+    @kernel
+    def corner(outer: Any) -> float:
+        sums = outer.sums
+        return sums[sums.shape[0] - 1, sums.shape[1] - 1] + sums.size
+
+    whole = np.arange(12.0).reshape(3, 4)
+    for array in (whole, whole.T, np.asfortranarray(whole), whole[::2, 1:3]):
+        assert corner(Outer(None, array)) == array[-1, -1] + array.size
+    assert add_all(Outer(Inner(np.zeros(0), 5.0), np.zeros(0))) == 5.0
+
+
+def test_what_can_not_be_laid_out_is_refused() -> None:
+    """A text has no place in a group."""
+    with pytest.raises(
+        TypeError, match=r"member 'text' of a group, expected an array, a group, an int, a float or None"
+    ):
+        _ = Outer(None, "text").address  # type: ignore[attr-defined]
 
 
 def test_a_member_that_is_absent_is_pruned() -> None:

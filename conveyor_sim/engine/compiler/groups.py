@@ -42,26 +42,27 @@ def group(cls: Class) -> Class:
 class _Laid(tuple[Any, ...]):
     """A group in memory, laid out as `_GroupModel.struct` has it: each value in words of 8 bytes."""
 
-    _words: Any
-
     @cached_property
     def group_type(self) -> Any:
         """Its type: that of the members."""
         return Group([typeof(member) for member in self], type(self))
 
-    @cached_property
+    @property
     def address(self) -> int:
-        """Of the layout, which lives as long as the group. Raises TypeError for a member that is none of those."""
-        words: list[int] = []
-        for member in self:
-            words += _words(member)
-        self._words = np.array(words, np.int64)
-        found: int = self._words.ctypes.data
+        """Of the layout, which lives as long as the group. Raises TypeError for a member that can't be laid out."""
+        # Several threads may come here at once: all get the layout of the first.
+        laid = self.__dict__.get("laid") or self.__dict__.setdefault("laid", _laid_out(self))
+        found: int = laid[1]
         return found
 
     def __reduce__(self) -> Any:
-        # A copy has arrays, and an address, of its own.
+        # A copy has arrays, and so a layout, of its own.
         return type(self), tuple(self)
+
+
+def _laid_out(members: Iterable[Any]) -> tuple[Any, int]:
+    words = np.array([word for member in members for word in _words(member)], np.int64)
+    return words, words.ctypes.data
 
 
 def _words(member: Any) -> Sequence[int]:
