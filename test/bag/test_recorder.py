@@ -178,7 +178,7 @@ record(scene, folder.with_name("first"), 2)  # compiled kernels are files too, a
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 try:
-    record(scene, folder, 2000)
+    record(scene, folder, 2000, 50)  # chunks by ticks: on a fast machine the second one in time would be past the limit
 except BagError as error:
     print(error)
 """
