@@ -154,7 +154,8 @@ def test_a_server_that_ends_is_waited_for(browser: Any, bag: Path) -> None:
     page.focus("#plan")
     page.keyboard.press("End")
     page.wait_for_selector("body[data-link=broken]", timeout=60_000)
-    assert page.inner_text("#notice") == "● No answer from the server: trying again"
+    said = "● No answer from the server: trying again"
+    until(lambda: page.inner_text("#notice") == said or page.wait_for_timeout(20), "what is said of it")
     with RecordingServer(bag, port):
         page.wait_for_selector("body[data-link=served]", timeout=60_000)
         settled(page)
