@@ -32,6 +32,7 @@ class Beams(Device):
         )
         self._room: F8 = np.empty((4, 0))
         self._began: F8 | None = None
+        self._ways: Ways | None = None
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
@@ -51,6 +52,10 @@ class Beams(Device):
             start = np.stack((bottles.x, bottles.y, vx, vy))
         self._began = None
         ways = Ways(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
+        # A group is laid out for kernels once, so the same arrays are given in the same one.
+        if self._ways is None or any(a is not b for a, b in zip(self._ways, ways, strict=True)):
+            self._ways = ways
+        ways = self._ways
         while short := block_beams(ways, now.length, self._beams):
             near, spans = self._beams.near, self._beams.spans
             if short == 1:

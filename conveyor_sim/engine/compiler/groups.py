@@ -96,10 +96,13 @@ def fewer(whole: Any, names: frozenset[str]) -> Any:
     """From Python: a group with None in place of some members. `pairs.law`: member `law` of member `pairs`."""
     if whole is None:
         return None
-    mine, inner = _by_member(names)
-    return whole._replace(
-        **dict.fromkeys(mine), **{name: fewer(getattr(whole, name), inside) for name, inside in inner.items()}
-    )
+    # Kept, for each group is laid out once.
+    views = whole.__dict__.setdefault("views", {})
+    if names not in views:
+        mine, inner = _by_member(names)
+        members = {name: fewer(getattr(whole, name), inside) for name, inside in inner.items()}
+        views[names] = whole._replace(**dict.fromkeys(mine), **members)
+    return views[names]
 
 
 @cache
