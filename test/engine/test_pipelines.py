@@ -181,6 +181,7 @@ def test_a_group_without_members_of_members() -> None:
     fewer_members = fewer(outer, frozenset({"inner.values"}))
     assert (fewer_members.inner.values, fewer_members.inner.factor, fewer_members.sums) == (None, 3.0, outer.sums)
     assert typed(fewer_members) == 10.0
+    assert fewer(outer, frozenset({"inner.values"})) is fewer_members, "laid out once, however often it is asked for"
     assert len(typed.signatures) == 1
 
 
