@@ -12,7 +12,9 @@ from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.contact.path import forget_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
+from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.engine.lists.riding import step_all
+from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.engine.threads.workers import BLOCK, workers
 from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
@@ -33,6 +35,11 @@ ALONE = workers(1)[0]
 def callable_part(function: Any) -> Any:
     """A part of kernels as a kernel of its own, to be called from Python."""
     return kernel(function.py_func)
+
+
+def advance(integrator: str, world: World, steps: int, dt: float, phase: int = START) -> int:
+    """Take steps of dt seconds in this thread; return how many were finished."""
+    return ThreadPool(1).advance(1, INTEGRATORS[integrator], world, steps, dt, phase)
 
 
 def evaluate(world: World, dt: float = 1e-5) -> None:

@@ -1,22 +1,20 @@
-"""The World with fewer groups: what takes it is compiled once for all that differ only in the groups left out.
+"""The World with fewer groups, for what Python calls: one kernel does then for all Worlds that differ in the rest.
 
-Numba compiles for the types of a World, that is for the groups that are there. The groups of an integrator are nothing
-to the forces, what forces alone need is nothing to the lists, and who only looks at contacts needs neither.
+The lists need nothing that only forces need, and who only looks at contacts needs neither. What kernels call needs no
+view: it is compiled for what it reads (`compiler/reads.py`).
 """
 
-from typing import Any
-
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.engine.compiler.groups import fewer, without
+from conveyor_sim.engine.compiler.groups import fewer
 from conveyor_sim.engine.contact.laws import DAMPING
 
-NOT_FOR_FORCES = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
+_INTEGRATORS = frozenset({"peaks", "stage", "slopes", "linear", "damage"})
 _FORCES_OF_PAIRS = frozenset(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent", "parts"))
-NOT_FOR_LISTS = NOT_FOR_FORCES | _FORCES_OF_PAIRS | {
+NOT_FOR_LISTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "spin", "load", "path", "implicit", "riding", "curves", "pair_law", "pairs.law", "rail_law", "static_friction",
     "ledger", "moving.actuators", "moving.springs", "settings.atan",
 }  # fmt: skip
-NOT_FOR_CONTACTS = NOT_FOR_FORCES | _FORCES_OF_PAIRS | {
+NOT_FOR_CONTACTS = _INTEGRATORS | _FORCES_OF_PAIRS | {
     "load", "path", "implicit", "riding", "neighbourhood", "probe", "slots", "pairs.reach", "pairs.radius_i",
     "pair_law", "grid", "railed", "moving.actuators", "belts", "surface", "footing", "ring", "static_friction",
     "ledger",
@@ -45,10 +43,3 @@ def energy_of(world: World) -> World:
 def _fewer(world: World, names: frozenset[str]) -> World:
     fewer_groups: World = fewer(world, names)
     return fewer_groups
-
-
-for_forces: Any = without(NOT_FOR_FORCES)
-"""The World for all in `forces.py`; for kernels."""
-
-for_lists: Any = without(NOT_FOR_LISTS)
-"""The same as `lists_of`, for kernels."""

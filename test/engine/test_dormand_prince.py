@@ -27,10 +27,9 @@ from scenes import (
     stiffness_for,
 )
 from scipy.integrate import solve_ivp
-from worlds import ALONE, FAR, evaluate, state_of
+from worlds import FAR, advance, evaluate, state_of
 
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
@@ -214,7 +213,7 @@ def impact(state: State, allowed: float, entry: float = 0.3, steps: int = 20) ->
     world.peaks.force[:], world.peaks.impulse[:] = 0.0, 0.0
     world.neighbourhood.stale[0] = 1
     state.make_lists()
-    assert INTEGRATORS["dormand_prince"](world, ALONE, 2 * steps, dt, START) == 2 * steps
+    assert advance("dormand_prince", world, 2 * steps, dt) == 2 * steps
     assert world.bottles.x[1] - world.bottles.x[0] > 2.0 * RADIUS
     return world
 

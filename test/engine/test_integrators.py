@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scenes import MASS, RADIUS, bottle, contact, order, scene, simulation
-from worlds import ALONE, FAR, state_of
+from worlds import FAR, advance, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
 from conveyor_sim.errors import SimulationError
@@ -49,7 +49,7 @@ def test_order_within_a_lasting_damped_contact(integrator: str, expected: float)
     for n in numbers:
         state = squeezed(integrator)
         state.world.spin.omega[:] = 0.0
-        INTEGRATORS[integrator](state.world, ALONE, n, end / n, START)
+        advance(integrator, state.world, n, end / n)
         bottles = state.world.bottles
         x, rate = closed_form(end)
         overlap = 2.0 * RADIUS - (bottles.x[1] - bottles.x[0])
@@ -65,7 +65,7 @@ def test_error_within_a_lasting_damped_contact_falls_with_that_allowed() -> None
     for error in allowed:
         state = squeezed("dormand_prince", error=error)
         state.world.spin.omega[:] = 0.0
-        assert INTEGRATORS["dormand_prince"](state.world, ALONE, 1, end, START) == 1
+        assert advance("dormand_prince", state.world, 1, end) == 1
         bottles = state.world.bottles
         errors.append(abs(bottles.vx[0] - bottles.vx[1] - closed_form(end)[1]))
     assert -order(allowed, errors) == pytest.approx(1.25, abs=0.15)
@@ -80,7 +80,7 @@ def test_one_step_in_free_flight(integrator: str) -> None:
     bottles.x[1], bottles.vx[1], bottles.vy[1] = 5.0, 0.25, -0.5
     state.world.neighbourhood.stale[0] = 1
     state.make_lists()
-    assert INTEGRATORS[integrator](state.world, ALONE, 1, 0.5, START) == 1
+    assert advance(integrator, state.world, 1, 0.5) == 1
     assert (bottles.x[1], bottles.y[1]) == (5.125, -0.25)
     assert spin.theta[1] == 1.5
     assert not bottles.x[2:].any()
@@ -93,11 +93,11 @@ def test_resuming_within_a_tick_leaves_no_trace(integrator: str) -> None:
     accuracy = {"error": 1e-12} if integrator == "dormand_prince" else {}
     whole, parts = squeezed(integrator, 1.0, **accuracy), squeezed(integrator, 1.0, **accuracy)
     steps, dt = 40, 1e-4
-    assert INTEGRATORS[integrator](whole.world, ALONE, steps, dt, START) == steps
+    assert advance(integrator, whole.world, steps, dt) == steps
     done, phase, calls = 0, START, 0
     while done < steps:
         parts.world.neighbourhood.stale[0] = 1
-        done += INTEGRATORS[integrator](parts.world, ALONE, steps - done, dt, phase)
+        done += advance(integrator, parts.world, steps - done, dt, phase)
         parts.make_lists()
         phase = RESUME
         calls += 1
@@ -120,7 +120,7 @@ def test_a_bottle_at_rest_comes_to_rest(integrator: str) -> None:
     bottles.vx[1] = 1e-101
     state.world.neighbourhood.stale[0] = 1
     state.make_lists()
-    INTEGRATORS[integrator](state.world, ALONE, 1, 1e-3, START)
+    advance(integrator, state.world, 1, 1e-3)
     assert bottles.vx[1] == 0.0
 
 

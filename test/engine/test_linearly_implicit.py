@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, every_law, polyline, scene, simulation
-from worlds import ALONE, FAR, state_of
+from worlds import FAR, advance, state_of
 
-from conveyor_sim.engine.integrators import START
-from conveyor_sim.engine.integrators.linearly_implicit import advance
 from conveyor_sim.simulation import Simulation
 
 G, MU = 9.81, 0.4
@@ -35,7 +33,7 @@ def test_a_spring_in_contact_keeps_its_energy() -> None:
     quarter = 0.5 * math.pi * math.sqrt(0.5 * MASS / stiffness)
     bottles = state.world.bottles
     for _ in range(steps):
-        advance(state.world, ALONE, 1, 0.9 * quarter / steps, START)
+        advance(METHOD, state.world, 1, 0.9 * quarter / steps)
         overlap = 2.0 * RADIUS - (bottles.x[1] - bottles.x[0])
         assert overlap > 0.0
         energy = 0.5 * MASS * float((bottles.vx[:2] ** 2).sum()) + 0.5 * stiffness * overlap**2

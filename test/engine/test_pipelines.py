@@ -1,4 +1,4 @@
-"""What kernels get beside numba's own passes: groups by address, absent members pruned, parts linked once."""
+"""What kernels get beside numba's own passes: groups by address, absent members pruned, parts for what they read."""
 
 import copy
 import pickle
@@ -9,17 +9,20 @@ import numba
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.compiler.groups import fewer, group, without
+from conveyor_sim.engine.compiler.callees import address, call
+from conveyor_sim.engine.compiler.compile import OPTIONS
+from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
+from conveyor_sim.engine.compiler.groups import fewer, group
 from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
 
 
 def kernel(function: Any) -> Any:
-    return numba.njit(error_model="numpy", forceinline=True, _nrt=False, pipeline_class=KernelCompiler)(function)
+    return KernelDispatcher(function, targetoptions=OPTIONS, pipeline_class=KernelCompiler)
 
 
 def part(function: Any) -> Any:
-    options = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-    return numba.njit(error_model="numpy", pipeline_class=PartCompiler, **options)(function)
+    options = {**OPTIONS, "no_cpython_wrapper": True}
+    return KernelDispatcher(function, targetoptions=options, pipeline_class=PartCompiler)
 
 
 @group
@@ -142,47 +145,86 @@ def test_an_absent_member_among_several_taken_at_once_is_pruned() -> None:
 
 
 def test_a_group_without_some_members() -> None:
-    """What is left out is `None` for whatever takes the view."""
-    view = without(["inner"])
-
-    @part
-    def has_inner(outer: Any) -> int:
-        if outer.inner is None:
-            return 0
-        return 1
+    """What is left out is `None` for whatever takes the view, which is made and laid out once."""
 
     @kernel
-    def both(outer: Any) -> Any:
-        return has_inner(outer), has_inner(view(outer)), view(outer).sums[0]
-
-    assert both(Outer(OUTER.inner, np.array([7.0]))) == (1, 0, 7.0)
-
-
-def test_a_group_without_members_of_members() -> None:
-    """From Python and in kernels alike: the same type, so that what takes it is compiled once."""
-    view = without(["inner.values"])
-
-    @part
     def first(outer: Any) -> float:
         if outer.inner.values is None:
-            return outer.inner.factor
+            return outer.inner.factor + outer.sums[0]
         return outer.inner.values[0]
 
-    @kernel
-    def first_of_view(outer: Any) -> Any:
-        return first(outer), first(view(outer)), typed(view(outer))
-
-    @kernel
-    def typed(outer: Any) -> float:
-        return first(outer) + outer.sums[0]
-
     outer = Outer(Inner(np.array([5.0]), 3.0), np.array([7.0]))
-    assert first_of_view(outer) == (5.0, 3.0, 10.0)
-    fewer_members = fewer(outer, frozenset({"inner.values"}))
-    assert (fewer_members.inner.values, fewer_members.inner.factor, fewer_members.sums) == (None, 3.0, outer.sums)
-    assert typed(fewer_members) == 10.0
-    assert fewer(outer, frozenset({"inner.values"})) is fewer_members, "laid out once, however often it is asked for"
-    assert len(typed.signatures) == 1
+    without = fewer(outer, frozenset({"inner.values"}))
+    assert (without.inner.values, without.inner.factor, without.sums) == (None, 3.0, outer.sums)
+    assert (first(outer), first(without)) == (5.0, 10.0)
+    assert fewer(outer, frozenset({"inner.values"})) is without
+    assert fewer(outer, frozenset({"inner"})).inner is None
+
+
+def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_read() -> None:
+    """Through what it calls, and through names of its own; members of other kinds, and members that are not there."""
+
+    @part
+    def size(inner: Any) -> int:
+        return inner.values.size
+
+    @part
+    def both(outer: Any) -> int:
+        inner, others = outer.inner, outer.inner
+        return size(inner) + size(others)
+
+    @part
+    def is_there(outer: Any) -> bool:
+        return outer.sums is not None
+
+    @kernel
+    def found(outer: Any) -> Any:
+        return both(outer), is_there(outer)
+
+    values = np.zeros(2)
+    for sums, factor in ((None, 1.0), (3.0, 1), (np.zeros(2), None), (Inner(None, None), Inner(None, 2.0))):
+        assert found(Outer(Inner(values, factor), sums)) == (4, sums is not None)
+    assert (len(found.signatures), len(both.signatures), len(size.signatures)) == (4, 1, 1)
+    assert len(is_there.signatures) == 4, "of what kind the member is"
+    found(Outer(Inner(np.zeros(3, np.int64), 1.0), None))
+    assert (len(both.signatures), len(size.signatures)) == (2, 2)
+
+
+def test_a_column_is_indexed_as_an_array_is() -> None:
+    """From the end too, by numbers of any width, with what is stored made the column's kind."""
+
+    @kernel
+    def move(outer: Any) -> Any:
+        values, sums = outer.inner.values, outer.sums
+        for i in range(numba.uint8(2)):
+            values[i] += sums[i]
+        values[-1] = sums[sums.size - 1] + 0.9
+        return sums[-2], values[numba.int16(0)]
+
+    for kind in (np.float64, np.int64, np.uint32):
+        values, sums = np.arange(3).astype(kind), np.array([10, 20, 30], np.uint32)
+        assert move(Outer(Inner(values, 0.0), sums)) == (20, 10)
+        assert values.tolist() == [10, 21, 30.9 if kind is np.float64 else 30]
+
+
+def test_a_kernel_calls_another_by_its_address() -> None:
+    """With what it was given itself, not with the copies that it works on."""
+
+    @kernel
+    def swap(outer: Any) -> float:
+        outer.sums[0], outer.sums[1] = outer.sums[1], outer.sums[0]
+        return outer.inner.factor
+
+    @kernel
+    def calls(outer: Any, places: Any) -> Any:
+        before = outer.sums[0]
+        call(places[0], outer, None)
+        return before, outer.sums[0]
+
+    outer = Outer(Inner(np.zeros(1), 1.0), np.array([1.0, 2.0]))
+    places = np.array([address(swap, outer)])
+    assert calls(outer, places) == (1.0, 2.0)
+    assert calls(outer, places) == (2.0, 1.0)
 
 
 def test_a_part_is_linked_whoever_calls_it_first() -> None:

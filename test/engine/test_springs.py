@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 from scenes import arc, bottle, contact, polyline, scene
-from worlds import ALONE, FAR
+from worlds import FAR, advance
 
-from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.model import build_model
 from conveyor_sim.state import State
 
@@ -33,7 +32,7 @@ def pressed() -> State:
 
 
 def run(state: State, steps: int) -> None:
-    assert INTEGRATORS["semi_implicit_euler"](state.world, ALONE, steps, DT, START) == steps
+    assert advance("semi_implicit_euler", state.world, steps, DT) == steps
 
 
 def elongations(state: State) -> dict[tuple[str, int, int], float]:

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, order, scene, segment
-from worlds import ALONE, FAR, state_of
+from worlds import FAR, advance, state_of
 
-from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.model import build_model
 from conveyor_sim.state import State
 from conveyor_sim.timestep.methods import METHODS
@@ -46,7 +45,7 @@ def shaking(state: State, integrator: str, dt: float) -> float:
 
     Velocity Verlet shakes in its forces and between its steps, and hardly in its velocities.
     """
-    INTEGRATORS[integrator](state.world, ALONE, STEPS, dt, START)
+    advance(integrator, state.world, STEPS, dt)
     spin, load, bottles = state.world.spin, state.world.load, state.world.bottles
     assert spin is not None
     turned = RADIUS * np.abs(spin.moment * spin.inverse_inertia)
@@ -141,7 +140,7 @@ def test_implicit_friction_never_turns_a_slip_round(integrator: str) -> None:
                 # In one call each: the first step of a call is like no other.
                 state = resting(integrator, [(0.0, 0.0)], MU, "implicit")
                 state.world.bottles.vx[0], state.world.bottles.vy[0] = speed, 0.0
-                INTEGRATORS[integrator](state.world, ALONE, n, dt, START)
+                advance(integrator, state.world, n, dt)
                 slips.append(float(state.world.bottles.vx[0]))
             assert all(0.0 <= after < before for before, after in pairwise(slips))
             assert slips[-1] < (0.1 if steps < 1.0 else 1e-6) * speed
@@ -157,7 +156,7 @@ def test_implicit_friction_is_stable_in_a_packing(integrator: str) -> None:
         bottles, spin = state.world.bottles, state.world.spin
         assert spin is not None
         spin.omega[:7] = 1e-3 * LIMIT / RADIUS * np.random.default_rng(2).uniform(-1.0, 1.0, 7)
-        INTEGRATORS[integrator](state.world, ALONE, n, 100.0 * LIMITS[integrator] / gamma, START)
+        advance(integrator, state.world, n, 100.0 * LIMITS[integrator] / gamma)
         moving = np.column_stack([bottles.vx, bottles.vy, RADIUS * spin.omega])[:7].ravel()
         slips.append(float(moving @ drag @ moving))
     assert all(after < before for before, after in pairwise(slips))
@@ -176,6 +175,6 @@ def test_implicit_friction_has_the_order_of_the_method(integrator: str, expected
     for n in numbers:
         state = resting(integrator, [(0.0, 0.0)], MU, "implicit")
         state.world.bottles.vx[0], state.world.bottles.vy[0] = start * LIMIT, 0.0
-        INTEGRATORS[integrator](state.world, ALONE, n, time / rate / n, START)
+        advance(integrator, state.world, n, time / rate / n)
         errors.append(abs(float(state.world.bottles.vx[0]) / LIMIT - 2.0 * decayed / (1.0 + decayed)))
     assert order(numbers, errors) == pytest.approx(expected, abs=0.25)

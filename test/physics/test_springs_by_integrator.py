@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, order, scene, segment
-from worlds import ALONE
+from worlds import advance
 
-from conveyor_sim.engine.integrators import INTEGRATORS as INTEGRATORS_BY_NAME
-from conveyor_sim.engine.integrators import START
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
@@ -273,7 +271,7 @@ def test_a_tick_begins_with_the_springs_as_they_are(integrator: str) -> None:
     sim = crowd(integrator)
     sim.advance(40)
     springs, world = sim._state.springs(), sim._state.world
-    INTEGRATORS_BY_NAME[integrator](world, ALONE, 0, sim.model.dt, START)
+    advance(integrator, world, 0, sim.model.dt)
     assert sim._state.springs() == springs
 
 

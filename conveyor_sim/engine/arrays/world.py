@@ -94,3 +94,5 @@ class Worker(NamedTuple):
     gathered: Gathered
     found: RailContacts
     history: LoadHistory
+    callees: I8
+    """(2,), addresses of the kernels that step kernels call (`lists/callees.py`)."""

@@ -19,8 +19,10 @@ import llvmlite.binding as llvm
 import numba
 
 from conveyor_sim.engine.compiler.cache_folder import choose_cache_folder
+from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
 from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
+from conveyor_sim.engine.compiler.reads import SOURCE
 from conveyor_sim.engine.compiler.source_hash import source_hash
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -35,9 +37,8 @@ def engine_hash() -> str:
 ENGINE_HASH = engine_hash()
 KERNELS = KernelFolder(*choose_cache_folder(ENGINE_HASH))
 
-# Numba's type stubs know neither SLP_VECTORIZE nor _nrt.
+# Numba's type stubs know no SLP_VECTORIZE.
 _config: Any = numba.config
-_njit: Any = numba.njit
 _typeof: Any = numba.typeof
 
 # These are settings of the process: they act on every numba function that is compiled after this import.
@@ -50,6 +51,13 @@ _config.OPT = type(_config.OPT)(2)
 # gives up, silently, where that takes more than 8 comparisons, about four columns.
 llvm.set_option("conveyor_sim", "-runtime-memory-check-threshold=1000")
 llvm.set_option("conveyor_sim", "-vectorize-memory-check-threshold=1000")
+
+
+OPTIONS = {
+    "nopython": True, "nogil": True, "error_model": "numpy", "forceinline": True, "no_cfunc_wrapper": True,
+    "_nrt": False,
+}  # fmt: skip
+"""Numba's."""
 
 
 def kernel(function: Function) -> Function:
@@ -67,8 +75,15 @@ def entry(function: Any, *arguments: Any) -> Any:
 
     Numba would look at the type of each of a hundred arrays at every call: 20 us against 1.
     """
+    return overload(function, *arguments).entry_point
+
+
+def overload(function: Any, *arguments: Any) -> Any:
+    """What numba has of a kernel for arguments of these types, compiled if need be."""
+    given = tuple(_typeof(argument) for argument in arguments)
     with _rare_garbage_collection():
-        return function.compile(tuple(_typeof(argument) for argument in arguments))
+        function.compile(given)
+    return function.overloads[given]
 
 
 _collector = RLock()
@@ -92,15 +107,11 @@ def part(function: Function) -> Function:
 
 
 def _compiled(function: Function, **options: bool) -> Function:
-    compiled: Any = _njit(
-        nogil=True,
-        error_model="numpy",
-        forceinline=True,
-        no_cfunc_wrapper=True,
-        _nrt=False,
-        pipeline_class=PartCompiler if options["no_cpython_wrapper"] else KernelCompiler,
-        **options,
-    )(function)
+    numbas = {"nopython": True, "nogil": True, "error_model": "numpy", "forceinline": True, "no_cfunc_wrapper": True}
+    pipeline = PartCompiler if options["no_cpython_wrapper"] else KernelCompiler
+    compiled: Any = KernelDispatcher(
+        function, targetoptions={**numbas, "_nrt": False, **options}, pipeline_class=pipeline
+    )
     if not options["no_cpython_wrapper"]:
         compiled._cache = KernelCache(function, options, KERNELS)
     kept: Function = compiled
@@ -112,6 +123,7 @@ def written(source: str, **names: Any) -> Any:
 
     names: what the text uses.
     """
+    names[SOURCE] = source
     exec(source, names)
     return part(names["function"])
 
@@ -129,3 +141,10 @@ def copy(source: Any, target: Any) -> None:
     """Copy a column; an array assignment would allocate in case the two overlap."""
     for index in range(source.size):
         target[index] = source[index]
+
+
+@part
+def fill(column: Any, value: Any) -> None:
+    """Give all entries of a column one value."""
+    for index in range(column.size):
+        column[index] = value

@@ -6,22 +6,37 @@ kernel begins by copying them: LLVM knows then that no array overlaps what it ha
 nothing is left of the copies but the few values that are used.
 
 What is at the address is laid out in Python, once for each group (`address`): the code that numba writes to take 150
-arrays apart at every call was up to half of a kernel.
+arrays apart at every call was up to half of a kernel. A member has the same place whatever it is and whatever else is
+there, so that what looks at a few members is compiled once for all groups that have them alike (`narrowed`).
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache, cached_property
 from typing import Any, TypeVar
 
 import numpy as np
+from llvmlite import ir
 from numba import typeof
 from numba.core import cgutils, types
 from numba.core.datamodel.models import TupleModel
-from numba.core.imputils import lower_getattr_generic
-from numba.extending import NativeValue, intrinsic, register_model, typeof_impl, unbox
+from numba.core.imputils import lower_cast, lower_getattr_generic
+from numba.extending import NativeValue, register_model, typeof_impl, unbox
+from numba.np.numpy_support import from_dtype
+
+from conveyor_sim.engine.compiler.columns import Column
+from conveyor_sim.engine.compiler.reads import ALL, Path
 
 Class = TypeVar("Class", bound=type)
+
+WORDS = 2
+"""Of 8 bytes, for a member: a column takes both (`columns.py`), a number one; others are where the first one says."""
+
+HIDDEN = types.Opaque("hidden")
+"""The type of a member that is not looked at, whether it is there or not."""
+
+OWN = -1
+"""Place of a group's own address, before the members."""
 
 COPIES_GROUPS = "copies_groups"
 """Attribute of a module (llvmlite) whose functions copy the groups that they are given."""
@@ -40,19 +55,19 @@ def group(cls: Class) -> Class:
 
 
 class _Laid(tuple[Any, ...]):
-    """A group in memory, laid out as `_GroupModel.struct` has it: each value in words of 8 bytes."""
+    """A group in memory: its own address, then the members, WORDS words of 8 bytes each."""
 
     @cached_property
     def group_type(self) -> Any:
         """Its type: that of the members."""
-        return Group([typeof(member) for member in self], type(self))
+        return Group([_type_of(member) for member in self], type(self))
 
     @property
     def address(self) -> int:
         """Of the layout, which lives as long as the group. Raises TypeError for a member that can't be laid out."""
         # Several threads may come here at once: all get the layout of the first.
         laid = self.__dict__.get("laid") or self.__dict__.setdefault("laid", _laid_out(self))
-        found: int = laid[1]
+        found: int = laid[-1]
         return found
 
     def __reduce__(self) -> Any:
@@ -60,40 +75,43 @@ class _Laid(tuple[Any, ...]):
         return type(self), tuple(self)
 
 
-def _laid_out(members: Iterable[Any]) -> tuple[Any, int]:
-    words = np.array([word for member in members for word in _words(member)], np.int64)
-    return words, words.ctypes.data
+def _type_of(member: Any) -> Any:
+    return Column(from_dtype(member.dtype)) if _is_column(member) else typeof(member)
+
+
+def _is_column(member: Any) -> bool:
+    return isinstance(member, np.ndarray) and member.ndim == 1 and member.flags.c_contiguous
+
+
+def _laid_out(members: Sequence[Any]) -> tuple[Any, Any, int]:
+    # Nobody owns what a kernel sees of an array (meminfo, parent): the group does.
+    arrays = [
+        np.array([0, 0, one.size, one.itemsize, one.ctypes.data, *one.shape, *one.strides], np.int64)
+        if isinstance(one, np.ndarray) and not _is_column(one)
+        else None
+        for one in members
+    ]
+    pairs = zip(members, arrays, strict=True)
+    found = [_words(member) if array is None else (array.ctypes.data, 0) for member, array in pairs]
+    words = np.array([(0, 0), *found], np.int64)
+    words[0, 0] = words.ctypes.data
+    return arrays, words, words.ctypes.data
 
 
 def _words(member: Any) -> Sequence[int]:
     if member is None:
-        return (0,)
+        return 0, 0
     if isinstance(member, np.ndarray):
-        # Nobody owns what a kernel sees of an array (meminfo, parent): the group does.
-        return (0, 0, member.size, member.itemsize, member.ctypes.data, *member.shape, *member.strides)
+        return member.ctypes.data, member.size
     if isinstance(member, _Laid):
-        return (member.address,)
+        return member.address, 0
     if type(member) in (int, float):
-        return np.array([member], np.int64 if type(member) is int else np.float64).view(np.int64).tolist()
+        return int(np.array(member, np.int64 if type(member) is int else np.float64).view(np.int64)), 0
     raise TypeError(f"member {member!r} of a group, expected an array, a group, an int, a float or None")
 
 
-def without(names: Iterable[str]) -> Any:
-    """For kernels: a function from a group to one of the same class without some of its members (as `fewer` has it)."""
-    absent = frozenset(names)
-
-    @intrinsic
-    def fewer_members(_context: Any, whole: Any) -> Any:
-        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-            return _stored_without(context, builder, whole, arguments[0], absent)
-
-        return _type_without(whole, absent)(whole), code
-
-    return fewer_members
-
-
 def fewer(whole: Any, names: frozenset[str]) -> Any:
-    """From Python: a group with None in place of some members. `pairs.law`: member `law` of member `pairs`."""
+    """A group with None in place of some members. `pairs.law`: member `law` of member `pairs`."""
     if whole is None:
         return None
     # Kept, for each group is laid out once.
@@ -116,29 +134,20 @@ def _by_member(names: frozenset[str]) -> tuple[frozenset[str], dict[str, frozens
     )
 
 
-def _type_without(whole: Any, names: frozenset[str]) -> Any:
-    mine, inner = _by_member(names)
-    members = [
-        types.none if name in mine else _type_without(member, inner[name]) if _has(member, name, inner) else member
-        for name, member in zip(whole.fields, whole.types, strict=True)
-    ]
-    return Group(members, whole.instance_class)
-
-
-def _has(member: Any, name: str, inner: Mapping[str, Any]) -> bool:
-    """Whether a member, if it is there at all, has members that are to be left out."""
-    return name in inner and isinstance(member, Group)
-
-
-def _stored_without(context: Any, builder: Any, whole: Any, value: Any, names: frozenset[str]) -> Any:
-    mine, inner = _by_member(names)
-    members = []
-    for place, (name, member) in enumerate(zip(whole.fields, whole.types, strict=True)):
-        taken = context.get_dummy_value() if name in mine else _member(context, builder, whole, value, place)
-        if _has(member, name, inner):
-            taken = _stored_without(context, builder, member, taken, inner[name])
-        members.append(taken)
-    return _store(context, builder, _type_without(whole, names), members)
+@cache
+def narrowed(whole: Any, paths: frozenset[Path]) -> Any:
+    """The type of an argument with all members hidden that are not read (`reads.py`); the layout is the same."""
+    if not isinstance(whole, Group) or (ALL,) in paths:
+        return whole
+    inner: dict[str, set[Path]] = {}
+    for path in paths:
+        if path:
+            inner.setdefault(path[0], set()).add(path[1:])
+    members = zip(whole.fields, whole.types, strict=True)
+    return Group(
+        [narrowed(member, frozenset(inner[name])) if name in inner else HIDDEN for name, member in members],
+        whole.instance_class,
+    )
 
 
 class Group(types.NamedTuple):
@@ -157,13 +166,7 @@ class Group(types.NamedTuple):
 
 @register_model(Group)
 class _GroupModel(TupleModel):
-    """Wherever numba has a value of a group, it is the address of a struct with its members.
-
-    The address says nothing of the struct: its type would be written out, kilobytes each, wherever a group is named.
-    """
-
-    def struct(self) -> Any:
-        return super().get_value_type()
+    """Wherever numba has a value of a group, it is the address of its layout."""
 
     def get_value_type(self) -> Any:
         return cgutils.voidptr_t
@@ -179,34 +182,49 @@ class _GroupModel(TupleModel):
         return self._copied(builder, value) if getattr(builder.module, COPIES_GROUPS, False) else value
 
     def _copied(self, builder: Any, value: Any) -> Any:
-        copy = cgutils.alloca_once(builder, self.struct())
+        words = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), WORDS * (1 + len(self._models))))
+        copy = builder.bitcast(words, cgutils.voidptr_t)
+        builder.store(original(builder, value), _at(builder, copy, OWN, cgutils.voidptr_t))
         for place, model in enumerate(self._models):
+            if model.fe_type == HIDDEN:
+                continue
             member = self.member(builder, value, place)
             if isinstance(model, _GroupModel):
                 member = model._copied(builder, member)
-            builder.store(member, cgutils.gep_inbounds(builder, copy, 0, place))
-        return builder.bitcast(copy, cgutils.voidptr_t)
+            elif isinstance(model.fe_type, types.Array):
+                member = cgutils.alloca_once_value(builder, member)
+            builder.store(member, _at(builder, copy, place, member.type))
+        return copy
 
     def member(self, builder: Any, value: Any, place: int) -> Any:
         """Code for a member of the group at an address."""
-        struct = builder.bitcast(value, self.struct().as_pointer())
-        return builder.load(cgutils.gep_inbounds(builder, struct, 0, place))
+        model = self._models[place]
+        kind = model.get_value_type()
+        if isinstance(model.fe_type, types.Array):
+            return builder.load(builder.load(_at(builder, value, place, kind.as_pointer())))
+        return builder.load(_at(builder, value, place, kind))
 
 
-def _member(context: Any, builder: Any, group_type: Group, value: Any, place: int) -> Any:
-    return context.data_model_manager[group_type].member(builder, value, place)
+def original(builder: Any, group_address: Any) -> Any:
+    """Code for the address of the layout that a group is a copy of."""
+    return builder.load(_at(builder, group_address, OWN, cgutils.voidptr_t))
 
 
-def _store(context: Any, builder: Any, group_type: Group, members: Sequence[Any]) -> Any:
-    struct = cgutils.alloca_once(builder, context.data_model_manager[group_type].struct())
-    for place, member in enumerate(members):
-        builder.store(member, cgutils.gep_inbounds(builder, struct, 0, place))
-    return builder.bitcast(struct, cgutils.voidptr_t)
+def _at(builder: Any, group_address: Any, place: int, kind: Any) -> Any:
+    """Code for the address of a member, of a type of LLVM's."""
+    offset = ir.IntType(32)(8 * WORDS * (1 + place))
+    return builder.bitcast(builder.gep(group_address, [offset], inbounds=True), kind.as_pointer())
+
+
+@lower_cast(Group, Group)
+def _cast(_context: Any, _builder: Any, _from: Group, _to: Group, value: Any) -> Any:
+    # What is called sees less of it (`narrowed`).
+    return value
 
 
 @lower_getattr_generic(Group)
 def _lower_member(context: Any, builder: Any, group_type: Group, value: Any, name: str) -> Any:
-    return _member(context, builder, group_type, value, group_type.fields.index(name))
+    return context.data_model_manager[group_type].member(builder, value, group_type.fields.index(name))
 
 
 @unbox(Group)

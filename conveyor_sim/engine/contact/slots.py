@@ -11,7 +11,7 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Load
 from conveyor_sim.engine.arrays.contacts import Slots
-from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.compiler.compile import fill, part
 
 WIDTH = 6
 """Neighbours of equal bottles in a hexagonal packing."""
@@ -25,7 +25,7 @@ def fill_slots(pairs: Any, slots: Any) -> int:
     if slots is None:
         return 0
     capacity, used = pairs.i.size, pairs.used[0]
-    slots.filled[:] = 0
+    fill(slots.filled, 0)
     for p in range(used):
         slots.filled[pairs.i[p]] += 1
         slots.filled[pairs.j[p]] += 1
@@ -34,8 +34,8 @@ def fill_slots(pairs: Any, slots: Any) -> int:
         slots.more_start[i] = min(total, slots.more_entry.size)
         total += max(0, int(slots.filled[i]) - WIDTH)
     slots.more_start[slots.filled.size] = min(total, slots.more_entry.size)
-    slots.entry[:] = 2 * capacity
-    slots.filled[:] = 0
+    fill(slots.entry, 2 * capacity)
+    fill(slots.filled, 0)
     # By (i, j): what a bottle has as the second of a pair, its lower partners, comes before what it has as the first.
     for p in range(used):
         _enter(slots, pairs.j[p], capacity + p)

@@ -46,7 +46,6 @@ from conveyor_sim.engine.integrators.runge_kutta import (
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
 from conveyor_sim.engine.threads.workers import BLOCK, share, wait_for_all
-from conveyor_sim.engine.world_views import for_forces
 
 STAGES = 7
 LAST = STAGES - 1
@@ -94,19 +93,18 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     finished: the state is not finite then.
     """
     bottles, allowed = world.bottles, max(world.settings.error, LEAST)
-    line = for_forces(world)
     slopes: Any = world.slopes
     begin, stop = share(worker, bottles.x.size)
     stage, h, left, tried = 0, dt, dt, 0
     if phase == RESUME:
         stage, h, left, tried = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2], int(slopes.progress[3])
     taken = 0
-    pack_all(line, worker)
+    pack_all(world, worker)
     while taken < steps:
-        pair_phase(line, worker, h, 0.0)
+        pair_phase(world, worker, h, 0.0)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, worker, h, 0.0, first, end)
+            bottle_forces(world, worker, h, 0.0, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             if stage == 0:
@@ -128,7 +126,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
                 note_damage(world, worker, h)
                 left -= h
-                probe_rebuilt(line, worker)
+                probe_rebuilt(world, worker)
                 if left == 0.0:
                     left = dt
                     taken += 1
@@ -145,8 +143,8 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             if stage == LAST:
                 come_to_rest(bottles, world.spin, first, end)
             pack(bottles, first, end)
-            note_moved(line, worker, first, end)
-        if not lists_hold(line, worker):
+            note_moved(world, worker, first, end)
+        if not lists_hold(world, worker):
             if worker.rank == 0:
                 slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = stage, h, left, tried
             return taken

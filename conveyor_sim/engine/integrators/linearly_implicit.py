@@ -41,7 +41,6 @@ from conveyor_sim.engine.observers.ledger import book, note_powers
 from conveyor_sim.engine.support.base import add_base_friction, add_straddling_friction
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.threads.workers import BLOCK, MOVED, UNIT, raise_flag, share, wait_for_all
-from conveyor_sim.engine.world_views import for_forces
 
 PASSES = 10
 """Of a step longer than a contact, at most; what is left of the impulses then is kept, so that momentum is."""
@@ -54,7 +53,6 @@ ENOUGH = 1e-4
 def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
-    line = for_forces(world)
     linear: Any = world.linear
     begin, stop = share(worker, bottles.x.size)
     for step in range(steps):
@@ -94,9 +92,9 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             ):
                 raise_flag(worker, MOVED)
         _book_solution(world, linear, world.ledger, worker, dt, theta)
-        if not lists_hold(line, worker):
+        if not lists_hold(world, worker):
             return step + 1
-        probe_rebuilt(line, worker)
+        probe_rebuilt(world, worker)
     return steps
 
 
@@ -250,12 +248,11 @@ def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt
             bottles.vy[i] -= change.y[i]
         _look_ahead(world, theta * dt, theta, first, end)
         _set_velocities(bottles, world.spin, linear, 1.0 - theta, True, first, end)
-    line = for_forces(world)
-    pack_all(line, worker)
-    pair_phase(line, worker, dt, 0.0)
+    pack_all(world, worker)
+    pair_phase(world, worker, dt, 0.0)
     for first in range(begin, stop, BLOCK):
         end = min(first + BLOCK, stop)
-        bottle_forces(line, worker, dt, 0.0, first, end)
+        bottle_forces(world, worker, dt, 0.0, first, end)
         _set_velocities(bottles, world.spin, linear, 0.5, False, first, end)
         note_powers(bottles, world.spin, world.load, ledger, 0.0, 0, first, end)
         book(ledger, 0, dt, first, end)

@@ -10,12 +10,11 @@ from numba import uint64
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.lists.callees import call_probe, call_rebuild
 from conveyor_sim.engine.lists.neighbours import fill_laws
-from conveyor_sim.engine.lists.rebuild import moved_too_far, rebuild
+from conveyor_sim.engine.lists.rebuild import moved_too_far
 from conveyor_sim.engine.lists.riding import wake_all
-from conveyor_sim.engine.observers.guard_probe import probe_overlaps
 from conveyor_sim.engine.threads.workers import MOVED, flag_raised, lower_flag, raise_flag, wait_for_all
-from conveyor_sim.engine.world_views import for_lists
 
 TINY = 1e-100
 """m/s or rad/s. A resting bottle's speed decays to denormal numbers, which slow the arithmetic: below this it is 0."""
@@ -68,7 +67,7 @@ def lists_hold(world: World, worker: Worker) -> bool:
         wait_for_all(worker)
         if worker.rank == 0:
             lower_flag(worker, MOVED)
-            rebuild(for_lists(world))
+            call_rebuild(world, worker)
             fill_laws(world.pairs, world.pair_law, world.bottles)
             world.probe.due[0] = 1
         wait_for_all(worker)
@@ -82,6 +81,6 @@ def probe_rebuilt(world: World, worker: Worker) -> None:
     if world.probe.due[0] != 0:
         wait_for_all(worker)
         if worker.rank == 0:
-            probe_overlaps(for_lists(world), worker.found)
+            call_probe(world, worker)
             world.probe.due[0] = 0
         wait_for_all(worker)

@@ -38,7 +38,6 @@ from conveyor_sim.engine.integrators.runge_kutta import (
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
 from conveyor_sim.engine.threads.workers import BLOCK, share
-from conveyor_sim.engine.world_views import for_forces
 
 STAGES = 4
 TIMES = np.array([0.0, 0.5, 0.5, 1.0, 1.0])
@@ -58,23 +57,22 @@ WAYS = ways_of(WEIGHTS)
 def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take `steps` steps of dt seconds; return how many were finished (see the package's docstring)."""
     bottles = world.bottles
-    line = for_forces(world)
     slopes: Any = world.slopes
     begin, stop = share(worker, bottles.x.size)
     stage = int(slopes.progress[0]) if phase == RESUME else 0
     taken = 0
     if phase == START:
-        forget_path(line.path, line.moving, worker)
-    pack_all(line, worker)
+        forget_path(world.path, world.moving, worker)
+    pack_all(world, worker)
     while True:
         if stage == 0 and taken < steps:
             note_damage(world, worker, dt)
         # Springs are as long as a stage's way draws them, and are cut and kept where a step ends.
         kept = dt if stage == 0 else 0.0
-        pair_phase(line, worker, dt, kept)
+        pair_phase(world, worker, dt, kept)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, worker, dt, kept, first, end)
+            bottle_forces(world, worker, dt, kept, first, end)
             if stage == 0:
                 note_peaks(world.load, world.peaks, first, end)
                 if taken == steps:
@@ -90,16 +88,16 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
                 book_stages(world.ledger, WEIGHTS, dt, first, end)
             pack(bottles, first, end)
-            note_moved(line, worker, first, end)
+            note_moved(world, worker, first, end)
         if taken == steps:
             return steps
         stage += 1
         if stage == STAGES:
             stage = 0
             taken += 1
-        if not lists_hold(line, worker):
+        if not lists_hold(world, worker):
             if worker.rank == 0:
                 slopes.progress[0] = stage
             return taken
         if stage == 0:
-            probe_rebuilt(line, worker)
+            probe_rebuilt(world, worker)

@@ -27,24 +27,22 @@ from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
 from conveyor_sim.engine.support.static_friction import carry_anchors
 from conveyor_sim.engine.threads.workers import BLOCK, share
-from conveyor_sim.engine.world_views import for_forces
 
 
 @kernel
 def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> int:
     """Take up to `steps` steps of dt seconds; return how many were taken (see the package's docstring)."""
     bottles = world.bottles
-    line = for_forces(world)
     begin, stop = share(worker, bottles.x.size)
-    place_rails(line.moving, worker, dt)
+    place_rails(world.moving, worker, dt)
     step_all(world.riding, bottles, worker)
-    pack_all(line, worker)
+    pack_all(world, worker)
     for step in range(steps):
         note_damage(world, worker, dt)
-        pair_phase(line, worker, dt, dt)
+        pair_phase(world, worker, dt, dt)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, worker, dt, dt, first, end)
+            bottle_forces(world, worker, dt, dt, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
             begin_look(bottles, world.spin, world.riding, first, end)
             for run in range(stepped_runs(world.riding, first)):
@@ -53,14 +51,14 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 _turn(world.spin, dt, left, right)
                 accumulate_peaks(world.load, world.peaks, dt, left, right)
             ride(bottles, world.spin, world.riding, dt, first, end)
-            end_look(line, None, first, end)
+            end_look(world, None, first, end)
             carry_anchors(world.footing, world.static_friction, dt, first, end)
-            note_moved(line, worker, first, end)
-        hold = lists_hold(line, worker)
-        pass_step(line.moving, line.ledger, worker, dt, False)
+            note_moved(world, worker, first, end)
+        hold = lists_hold(world, worker)
+        pass_step(world.moving, world.ledger, worker, dt, False)
         if not hold:
             return step + 1
-        probe_rebuilt(line, worker)
+        probe_rebuilt(world, worker)
     return steps
 
 

@@ -30,7 +30,6 @@ from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
 from conveyor_sim.engine.support.static_friction import carry_anchors
 from conveyor_sim.engine.threads.workers import BLOCK, share
-from conveyor_sim.engine.world_views import for_forces
 
 
 @kernel
@@ -39,42 +38,41 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
 
     A step ends and the next one begins in one pass over the bottles. A call that is broken off has moved them.
     """
-    line = for_forces(world)
     stage: Any = world.stage
     damage = _is_there(world.damage)
     begin, stop = share(worker, world.bottles.x.size)
-    place_rails(line.moving, worker, dt)
+    place_rails(world.moving, worker, dt)
     # Commands and supply come in between ticks: the last forces are of another line. What is found first ends no step.
     fresh = phase == START
     if fresh:
-        forget_path(line.path, line.moving, worker)
+        forget_path(world.path, world.moving, worker)
     step_all(world.riding, world.bottles, worker)
-    pack_all(line, worker)
+    pack_all(world, worker)
     done = 0
     while True:
         drawn = 0.0 if fresh else dt
         done += not fresh
         # One place alone has the forces: they would be compiled again for each.
-        pair_phase(line, worker, dt, drawn)
+        pair_phase(world, worker, dt, drawn)
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            bottle_forces(line, worker, dt, drawn, first, end)
+            bottle_forces(world, worker, dt, drawn, first, end)
             if not fresh:
                 _end_step(world, stage, dt, first, end)
-                end_look(line, stage, first, end)
+                end_look(world, stage, first, end)
             if done < steps and not damage:
-                _begin_step(world, line, stage, worker, dt, first, end)
+                _begin_step(world, stage, worker, dt, first, end)
         if done == steps:
             return steps
         if damage:
             note_damage(world, worker, dt)
             for first in range(begin, stop, BLOCK):
-                _begin_step(world, line, stage, worker, dt, first, min(first + BLOCK, stop))
-        hold = lists_hold(line, worker)
-        pass_step(line.moving, line.ledger, worker, dt, True)
+                _begin_step(world, stage, worker, dt, first, min(first + BLOCK, stop))
+        hold = lists_hold(world, worker)
+        pass_step(world.moving, world.ledger, worker, dt, True)
         if not hold:
             return done
-        probe_rebuilt(line, worker)
+        probe_rebuilt(world, worker)
         fresh = False
 
 
@@ -84,7 +82,7 @@ def _is_there(group: Any) -> bool:
 
 
 @part
-def _begin_step(world: World, line: World, stage: Stage, worker: Worker, dt: float, first: int, end: int) -> None:
+def _begin_step(world: World, stage: Stage, worker: Worker, dt: float, first: int, end: int) -> None:
     """Move bottles first to end, and give them the velocities at which the forces at the end of the step are taken."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
     book_kick(bottles, spin, load, world.ledger, half, first, end)
@@ -96,7 +94,7 @@ def _begin_step(world: World, line: World, stage: Stage, worker: Worker, dt: flo
         note_path(world.path, stage, dt, left, right)
     ride(bottles, spin, world.riding, dt, first, end)
     carry_anchors(world.footing, world.static_friction, dt, first, end)
-    note_moved(line, worker, first, end)
+    note_moved(world, worker, first, end)
 
 
 @part

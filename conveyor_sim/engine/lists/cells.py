@@ -4,7 +4,7 @@ import math
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import Neighbourhood
-from conveyor_sim.engine.compiler.compile import part
+from conveyor_sim.engine.compiler.compile import fill, part
 
 
 @part
@@ -17,7 +17,7 @@ def bucket_of(cx: int, cy: int, buckets: int) -> int:
 def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
     """Counting sort of the occupied slots by hashed cell."""
     buckets = hood.bucket.size - 1
-    hood.bucket[:] = 0
+    fill(hood.bucket, 0)
     for i in range(bottles.x.size):
         if bottles.id[i] >= 0:
             hood.cell[i, 0] = math.floor(bottles.x[i] / cell)

@@ -24,7 +24,6 @@ from conveyor_sim.engine.support.base import add_base_friction, add_straddling_f
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.support.static_friction import add_static_friction
 from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, wait_for_all
-from conveyor_sim.engine.world_views import for_forces
 
 
 @part
@@ -33,7 +32,7 @@ def note_damage(world: World, worker: Worker, dt: float) -> None:
 
     Every worker calls it; on return all have read what they need.
     """
-    _note(for_forces(world), world.damage, worker, dt)
+    _note(world, world.damage, worker, dt)
 
 
 @part

@@ -36,7 +36,7 @@ def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
     return bad, fastest, square, weight, energy
 
 
-@part
+@kernel
 def probe_overlaps(world: World, found: RailContacts) -> None:
     """Note the deepest overlaps in `world.probe`; the lists must hold."""
     _probe_pairs(world.bottles, world.pairs, world.probe)

@@ -9,6 +9,7 @@ from typing import Any
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import entry
 from conveyor_sim.engine.integrators import Advance
+from conveyor_sim.engine.lists.callees import find_callees
 from conveyor_sim.engine.threads.workers import workers
 
 Task = tuple[Advance, World, Worker, int, float, int]
@@ -32,6 +33,8 @@ class ThreadPool:
     def advance(self, size: int, function: Advance, world: World, steps: int, dt: float, phase: int) -> int:
         """Run an integrator on `size` threads; return the steps that it took. Raises ValueError beyond `most`."""
         group = self.group(size)
+        if not group[0].callees[0]:
+            find_callees(world, group[0])
         function = self._compiled(function, world, group[0], steps, dt, phase)
         others = self._workers(size - 1)
         try:

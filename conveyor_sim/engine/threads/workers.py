@@ -37,8 +37,10 @@ SPINS = 2000
 
 def workers(size: int) -> tuple[Worker, ...]:
     """Return `size` workers of one group."""
-    sync = np.zeros(SYNC_SIZE, np.int64)
-    return tuple(Worker(rank, size, sync, _gathered(), _rail_contacts(), empty_history()) for rank in range(size))
+    sync, callees = np.zeros(SYNC_SIZE, np.int64), np.zeros(2, np.int64)
+    return tuple(
+        Worker(rank, size, sync, _gathered(), _rail_contacts(), empty_history(), callees) for rank in range(size)
+    )
 
 
 def _gathered() -> Gathered:
@@ -120,8 +122,7 @@ _sched_yield = numba.types.ExternalFunction("sched_yield", numba.types.int32())
 
 
 def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
-    data = context.make_array(array_type)(context, builder, array).data
-    return builder.gep(data, [index])
+    return builder.gep(builder.extract_value(array, 0), [index])
 
 
 def _load_atomic(typing: Any, array: Any, index: Any) -> Any:

@@ -1,0 +1,114 @@
+"""What a function reads of the groups that it is given, itself and through what it calls: a part is compiled for that.
+
+A part that takes a World would else be compiled again for every set of effects, though it looks at two of them. What is
+in doubt counts as read. Were a member missed, the part could not take it, and numba would say so as it compiles.
+"""
+
+import ast
+import inspect
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+Path = tuple[str, ...]
+"""Names of members, from a group inwards; ALL at the end: all that is there."""
+
+ALL = "*"
+WHOLE = frozenset({(ALL,)})
+
+
+def reads(function: Any) -> list[frozenset[Path]]:
+    """By argument: `("bottles",)` where it asks whether that member is there, `("bottles", ALL)` where it takes it."""
+    source = function.__globals__.get(SOURCE)
+    tree = _functions(source or inspect.getsourcefile(function), source is not None)
+    return _Reading(function, tree[function.__name__, function.__code__.co_firstlineno]).found
+
+
+SOURCE = "__written__"
+"""Name among the globals of a function that has no file: its text."""
+
+
+@cache
+def _functions(source: str, is_text: bool) -> Mapping[tuple[str, int], ast.FunctionDef]:
+    """Those of a file, or of a text, by name and first line."""
+    if not is_text:
+        with open(source, encoding="utf-8") as file:
+            source = file.read()
+    found = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
+    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in found}
+
+
+class _Reading:
+    def __init__(self, function: Any, node: ast.FunctionDef) -> None:
+        self._names = function.__globals__
+        self._cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+        arguments = [argument.arg for argument in node.args.args]
+        self._places: dict[str, set[Path]] = {name: {(name,)} for name in arguments}
+        self._read: set[Path] = set()
+        before = -1
+        # A loop may use what its end assigns.
+        while before < (before := len(self._read) + sum(map(len, self._places.values()))):
+            for statement in node.body:
+                self._statement(statement)
+        self.found = [frozenset(path[1:] for path in self._read if path[0] == name) for name in arguments]
+
+    def _statement(self, node: ast.stmt) -> None:
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                self._assign(target, node.value)
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            self._assign(node.target, node.value)
+        else:
+            for child in ast.iter_child_nodes(node):
+                if isinstance(child, ast.stmt):
+                    self._statement(child)
+                else:
+                    self._whole(child)
+
+    def _assign(self, target: ast.expr, value: ast.expr) -> None:
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            for one, its in zip(target.elts, value.elts, strict=True):
+                self._assign(one, its)
+        elif isinstance(target, ast.Name):
+            self._places.setdefault(target.id, set()).update(self._places_of(value))
+        else:
+            self._whole(value)
+            self._whole(target)
+
+    def _whole(self, node: ast.AST) -> None:
+        """All of what an expression has is read."""
+        self._read |= {(*path, ALL) for path in self._places_of(node)}
+
+    def _places_of(self, node: ast.AST) -> set[Path]:
+        """Which members of which arguments an expression may stand for; what it reads to get there is noted."""
+        if isinstance(node, ast.Name):
+            return self._places.get(node.id, set())
+        if isinstance(node, ast.Attribute):
+            found = {(*path, node.attr) for path in self._places_of(node.value)}
+            self._read |= found
+            return found
+        if isinstance(node, ast.IfExp):
+            self._whole(node.test)
+            return self._places_of(node.body) | self._places_of(node.orelse)
+        if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Is | ast.IsNot):
+            self._places_of(node.left)
+        elif isinstance(node, ast.Call):
+            self._call(node)
+        else:
+            for child in ast.iter_child_nodes(node):
+                self._whole(child)
+        return set()
+
+    def _call(self, node: ast.Call) -> None:
+        called = self._named(node.func.id) if isinstance(node.func, ast.Name) else None
+        inner = getattr(called, "reads", None) if not node.keywords else None
+        for keyword in node.keywords:
+            self._whole(keyword.value)
+        for place, argument in enumerate(node.args):
+            found = self._places_of(argument)
+            ends = WHOLE if inner is None else inner[place]
+            self._read |= {(*path, *end) for path in found for end in ends}
+
+    def _named(self, name: str) -> Any:
+        """What a name stands for outside of the function."""
+        return self._cells[name].cell_contents if name in self._cells else self._names.get(name)
