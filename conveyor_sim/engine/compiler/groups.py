@@ -182,18 +182,18 @@ class _GroupModel(TupleModel):
         return self._copied(builder, value) if getattr(builder.module, COPIES_GROUPS, False) else value
 
     def _copied(self, builder: Any, value: Any) -> Any:
-        words = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), WORDS * (1 + len(self._models))))
-        copy = builder.bitcast(words, cgutils.voidptr_t)
-        builder.store(original(builder, value), _at(builder, copy, OWN, cgutils.voidptr_t))
+        words = WORDS * (1 + len(self._models))
+        copy = builder.bitcast(cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), words)), cgutils.voidptr_t)
+        cgutils.raw_memcpy(builder, copy, value, ir.IntType(64)(words), 8)
         for place, model in enumerate(self._models):
-            if model.fe_type == HIDDEN:
-                continue
-            member = self.member(builder, value, place)
+            # What is at an address is copied too.
             if isinstance(model, _GroupModel):
-                member = model._copied(builder, member)
+                inner = model._copied(builder, self.member(builder, value, place))
             elif isinstance(model.fe_type, types.Array):
-                member = cgutils.alloca_once_value(builder, member)
-            builder.store(member, _at(builder, copy, place, member.type))
+                inner = cgutils.alloca_once_value(builder, self.member(builder, value, place))
+            else:
+                continue
+            builder.store(inner, _at(builder, copy, place, inner.type))
         return copy
 
     def member(self, builder: Any, value: Any, place: int) -> Any:
