@@ -207,6 +207,15 @@ def test_a_column_is_indexed_as_an_array_is() -> None:
         assert values.tolist() == [10, 21, 30.9 if kind is np.float64 else 30]
 
 
+def test_what_is_only_to_be_read_is_not_written() -> None:
+    """As numba has it for arrays."""
+    sums = np.zeros(3)
+    sums.flags.writeable = False
+    with pytest.raises(numba.TypingError):
+        add_all(Outer(Inner(np.ones(3), 1.0), sums))
+    assert add_all(Outer(Inner(sums, 1.0), np.zeros(3))) == 1.0
+
+
 def test_a_kernel_calls_another_by_its_address() -> None:
     """With what it was given itself, not with the copies that it works on."""
 

@@ -80,7 +80,8 @@ def _type_of(member: Any) -> Any:
 
 
 def _is_column(member: Any) -> bool:
-    return isinstance(member, np.ndarray) and member.ndim == 1 and member.flags.c_contiguous
+    # Numba refuses to write to an array that is only to be read.
+    return isinstance(member, np.ndarray) and member.ndim == 1 and member.flags.c_contiguous and member.flags.writeable
 
 
 def _laid_out(members: Sequence[Any]) -> tuple[Any, Any, int]:
