@@ -9,7 +9,7 @@ import numba
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.compiler.callees import address, call
+from conveyor_sim.engine.compiler.call_by_address import address, call
 from conveyor_sim.engine.compiler.compile import OPTIONS
 from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.groups import fewer, group

@@ -95,4 +95,4 @@ class Worker(NamedTuple):
     found: RailContacts
     history: LoadHistory
     callees: I8
-    """(2,), addresses of the kernels that step kernels call (`lists/callees.py`)."""
+    """(2,), addresses of the kernels that step kernels call (`integrators/callees.py`)."""

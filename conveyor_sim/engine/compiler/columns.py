@@ -1,8 +1,7 @@
 """Columns of groups as numba sees them: where the values are, and how many.
 
 Numba describes an array by seven values, and takes an index apart for every way in which arrays can be indexed. What a
-kernel does with a column is `column[i]` and `column.size`: two values say all that takes, and the code for it is a
-fifth of numba's.
+kernel does with a column is `column[i]` and `column.size`. Two values are enough for that, and much less code.
 """
 
 import operator
@@ -76,7 +75,7 @@ def _set(context: Any, builder: Any, called: Any, given: Any) -> Any:
 
 
 def place(builder: Any, column: Any, index: Any, signed: bool) -> Any:
-    """Code for the address of an entry; a negative index counts from the end, as with arrays."""
+    """LLVM code for the address of an entry. A negative index counts from the end, as with arrays."""
     word = ir.IntType(64)
     index = (builder.sext if signed else builder.zext)(index, word) if index.type.width < word.width else index
     if signed:

@@ -57,7 +57,7 @@ OPTIONS = {
     "nopython": True, "nogil": True, "error_model": "numpy", "forceinline": True, "no_cfunc_wrapper": True,
     "_nrt": False,
 }  # fmt: skip
-"""Numba's."""
+"""What numba is asked for, of kernels and parts alike."""
 
 
 def kernel(function: Function) -> Function:
@@ -79,7 +79,7 @@ def entry(function: Any, *arguments: Any) -> Any:
 
 
 def overload(function: Any, *arguments: Any) -> Any:
-    """What numba has of a kernel for arguments of these types, compiled if need be."""
+    """Numba's CompileResult of a kernel for arguments of these types; compiles it if need be."""
     given = tuple(_typeof(argument) for argument in arguments)
     with _rare_garbage_collection():
         function.compile(given)
@@ -107,11 +107,8 @@ def part(function: Function) -> Function:
 
 
 def _compiled(function: Function, **options: bool) -> Function:
-    numbas = {"nopython": True, "nogil": True, "error_model": "numpy", "forceinline": True, "no_cfunc_wrapper": True}
     pipeline = PartCompiler if options["no_cpython_wrapper"] else KernelCompiler
-    compiled: Any = KernelDispatcher(
-        function, targetoptions={**numbas, "_nrt": False, **options}, pipeline_class=pipeline
-    )
+    compiled: Any = KernelDispatcher(function, targetoptions={**OPTIONS, **options}, pipeline_class=pipeline)
     if not options["no_cpython_wrapper"]:
         compiled._cache = KernelCache(function, options, KERNELS)
     kept: Function = compiled

@@ -1,4 +1,4 @@
-"""A kernel or part as numba calls it from others: with less than what they have, if less is read of it."""
+"""A kernel or part as other kernels call it: compiled for those members of their groups that it reads."""
 
 from functools import cached_property
 from typing import Any
@@ -10,15 +10,15 @@ from conveyor_sim.engine.compiler.reads import Path, reads
 
 
 class KernelDispatcher(CPUDispatcher):
-    """Numba's, but that what calls it compiles it for what it reads alone."""
+    """Numba's dispatcher. A call from a kernel compiles it for what it reads of the arguments (`reads.py`)."""
 
     @cached_property
     def reads(self) -> list[frozenset[Path]]:
-        """By argument, what it reads of it (`reads.py`)."""
+        """What it reads, by argument."""
         return reads(self.py_func)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """For numba, as it finds out what a call of this returns."""
+        """What numba asks for when it finds the types of a call: here it is compiled."""
         compiler: Any = vars(self)["_compiler"]
         _, given = compiler.fold_argument_types(args, kws)
         read = zip(given, self.reads, strict=True)

@@ -30,7 +30,7 @@ from conveyor_sim.engine.compiler.reads import ALL, Path
 Class = TypeVar("Class", bound=type)
 
 WORDS = 2
-"""Of 8 bytes, for a member: a column takes both (`columns.py`), a number one; others are where the first one says."""
+"""Words of 8 bytes for a member. A column takes both (`columns.py`), a number the first; others are at its address."""
 
 HIDDEN = types.Opaque("hidden")
 """The type of a member that is not looked at, whether it is there or not."""

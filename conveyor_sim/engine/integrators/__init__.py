@@ -2,7 +2,8 @@
 
 ``phase`` is START for the first call in a tick. A call may return with ``neighbourhood.stale`` set: a neighbour list
 did not fit. The caller then grows and rebuilds it and calls again with RESUME for the rest; the bits are those of an
-uninterrupted tick. Every worker of a group calls it alike (`workers.py`).
+uninterrupted tick. Every worker of a group calls it alike (`workers.py`). Workers are those of a ThreadPool: it gives
+them the addresses of the kernels that an integrator calls (`callees.py`), and without these the process crashes.
 """
 
 from collections.abc import Callable

@@ -10,7 +10,7 @@ from numba import uint64
 from conveyor_sim.engine.arrays.bodies import Bottles, Load
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
-from conveyor_sim.engine.lists.callees import call_probe, call_rebuild
+from conveyor_sim.engine.integrators.callees import call_probe, call_rebuild
 from conveyor_sim.engine.lists.neighbours import fill_laws
 from conveyor_sim.engine.lists.rebuild import moved_too_far
 from conveyor_sim.engine.lists.riding import wake_all

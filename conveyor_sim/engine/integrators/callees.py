@@ -1,7 +1,7 @@
-"""What step kernels call but do not hold: it comes seldom, and is the same for all integrators and laws."""
+"""Kernels that the integrators call by their addresses: what comes seldom, and is the same for all laws of contacts."""
 
 from conveyor_sim.engine.arrays.world import Worker, World
-from conveyor_sim.engine.compiler.callees import address, call
+from conveyor_sim.engine.compiler.call_by_address import address, call
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.observers.guard_probe import probe_overlaps
@@ -12,7 +12,10 @@ REBUILD, PROBE = 0, 1
 
 
 def find_callees(world: World, worker: Worker) -> None:
-    """Write the addresses for a World of these types to `worker.callees`, which the workers of a group share."""
+    """Write the addresses for Worlds of this one's types to `worker.callees`, which the workers of a group share.
+
+    Compiles the kernels if need be.
+    """
     lists = lists_of(world)
     worker.callees[REBUILD] = address(rebuild, lists)
     worker.callees[PROBE] = address(probe_overlaps, lists, worker.found)
@@ -20,11 +23,11 @@ def find_callees(world: World, worker: Worker) -> None:
 
 @part
 def call_rebuild(world: World, worker: Worker) -> None:
-    """`rebuild`."""
+    """Make the lists anew: `rebuild`."""
     call(worker.callees[REBUILD], world, None)
 
 
 @part
 def call_probe(world: World, worker: Worker) -> None:
-    """`probe_overlaps`."""
+    """Look at the overlaps: `probe_overlaps`."""
     call(worker.callees[PROBE], world, worker.found)

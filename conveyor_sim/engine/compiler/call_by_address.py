@@ -1,6 +1,7 @@
-"""Kernels that a kernel calls by their addresses: compiled once, where an inlined part is compiled with each caller.
+"""A kernel that calls another by the address of its machine code.
 
-That is for what is called seldom: a call costs little, but LLVM knows nothing of what it does.
+A part is compiled again in every kernel that calls it. A kernel called by its address is compiled once. That suits what
+is called seldom: LLVM knows nothing of what it does, and must take values out of memory again after the call.
 """
 
 from typing import Any
@@ -19,7 +20,7 @@ RESULT_WORDS = 8
 
 
 def address(function: Any, *arguments: Any) -> int:
-    """Of the machine code of a kernel for arguments of these types, compiled if need be."""
+    """The address of a kernel's machine code for arguments of these types; compiles it if need be."""
     compiled = overload(function, *arguments)
     found: int = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return found
@@ -42,6 +43,10 @@ def _call(_context: Any, place: Any, first: Any, second: Any) -> Any:
 
 
 call: Any = intrinsic(_call)
-"""In a kernel: call(address, group, group or None) calls a kernel that raises nothing; its result is dropped."""
+"""In a kernel: call(address, group, group or None) calls a kernel that raises nothing; its result is dropped.
 
+The address must be of a kernel for groups of these types: nothing checks it.
+"""
+
+# For `reads.py`: of the groups it takes no more than their addresses.
 call.reads = [WHOLE, frozenset(), frozenset()]
