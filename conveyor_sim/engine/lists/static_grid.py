@@ -35,15 +35,19 @@ def build_static_grid(
     columns, rows = int(width / size) + 1, int(height / size) + 1
 
     def fill(group: NDArray[np.float64], order: range) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-        cells: list[list[int]] = [[] for _ in range(columns * rows)]
-        for item in order:
-            low_x, low_y, high_x, high_y = group[item]
-            for row in range(int((low_y - y) / size), min(int((high_y - y) / size), rows - 1) + 1):
-                for column in range(int((low_x - x) / size), min(int((high_x - x) / size), columns - 1) + 1):
-                    cells[row * columns + column].append(item)
+        """The items in each cell, one cell after the other, and where each cell's begin."""
+        first = ((group[:, :2] - (x, y)) / size).astype(np.int64)
+        last = np.minimum(((group[:, 2:] - (x, y)) / size).astype(np.int64), (columns - 1, rows - 1))
+        blocks = [
+            np.arange(first[item, 1], last[item, 1] + 1)[:, None] * columns
+            + np.arange(first[item, 0], last[item, 0] + 1)
+            for item in order
+        ]
+        cells = np.concatenate([np.zeros(0, np.int64), *(block.ravel() for block in blocks)])
+        items = np.repeat(np.array(order, dtype=np.uint32), [block.size for block in blocks])
         start = np.zeros(columns * rows + 1, dtype=np.uint32)
-        start[1:] = np.cumsum([len(entry) for entry in cells])
-        return start, np.array([item for entry in cells for item in entry], dtype=np.uint32)
+        start[1:] = np.cumsum(np.bincount(cells, minlength=columns * rows))
+        return start, items[np.argsort(cells, kind="stable")]
 
     count = len(segments)
     segment_start, segment = fill(rails[:count], range(count))
