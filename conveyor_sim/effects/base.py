@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection
 
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, tightest
 from conveyor_sim.laws.coefficients import base_friction
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.schema import Scene
@@ -91,7 +91,7 @@ def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
     if terms.laws.base_friction is None or terms.method.second_order:
         return []
     braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
-    return [Share("braking by the base", 1.0, 2.0 * MEETING * impact_speed(terms.scene) / braking, 1.0)]
+    return [Share("braking by the base", 1.0, 2.0 * MEETING * terms.impact_speed / braking, 1.0)]
 
 
 def _implicit_point(terms: Terms) -> bool:

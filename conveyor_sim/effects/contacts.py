@@ -10,7 +10,6 @@ from conveyor_sim.effects.terms import (
     Terms,
     deepest,
     frequency,
-    impact_speed,
     meetings,
     most_bottles,
     overlap_at,
@@ -93,7 +92,7 @@ def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
     if law is not hertz.HERTZ:
         return 0.0, ""
     pressed = overlap_at(meeting, terms, contact_load(terms).force)
-    tangent = law.stiffest(k, max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed), None)
+    tangent = law.stiffest(k, max(deepest(meeting, terms, terms.impact_speed)[0], pressed), None)
     return tangent, f"dN/d delta = {tangent:.3g} N/m"
 
 
@@ -111,7 +110,7 @@ def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[
     def shares(meeting: Meeting, terms: Terms) -> list[Share]:
         if stiffness(meeting, terms)[0] == 0.0:
             return []
-        return [terms.method.between_steps(frequency(meeting, terms, impact_speed(terms.scene)))]
+        return [terms.method.between_steps(frequency(meeting, terms, terms.impact_speed))]
 
     return shares
 

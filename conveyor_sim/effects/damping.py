@@ -5,7 +5,7 @@ from typing import Any
 
 from conveyor_sim.effects.contacts import contacts_in_use
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, impact_speed, meetings, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, meetings, tightest
 from conveyor_sim.engine.contact.laws import DAMPING, DampingLaw
 from conveyor_sim.laws.damping import damping_law
 from conveyor_sim.scene.schema import Scene
@@ -31,7 +31,7 @@ def _dashpot(law: DampingLaw, meeting: Meeting, terms: Terms) -> float:
     coefficient = meeting.coefficient(law)
     if coefficient == 0.0:
         return 0.0
-    depth, elastic = deepest(meeting, terms, impact_speed(terms.scene))
+    depth, elastic = deepest(meeting, terms, terms.impact_speed)
     return law.force(coefficient, elastic, depth, 1.0)
 
 
@@ -45,7 +45,7 @@ def _bounds(law: DampingLaw) -> Callable[[Terms], list[Bound]]:
             if c > 0.0:
                 said = f"m_r / (2 {law.rate}) at c = {c:g} kg/s"
                 if law.exponent > 0.0:
-                    speed = impact_speed(terms.scene)
+                    speed = terms.impact_speed
                     said = f"m_r / (2 {law.rate}), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
                 found.append(drag_bound(terms, damping_bound(c, meeting.reduced_mass), said))
         return tightest(law.label, found, stability=True)
@@ -60,7 +60,7 @@ def _shares(law: DampingLaw) -> Callable[[Meeting, Terms], list[Share]]:
             return []
         rate = c / meeting.reduced_mass
         if law.exponent > 0.0:
-            return [method.growing(law.exponent, rate, frequency(meeting, terms, impact_speed(terms.scene)))]
+            return [method.growing(law.exponent, rate, frequency(meeting, terms, terms.impact_speed))]
         # How fast the force falls behind its jump is known where the spring is linear from there on.
         return method.first_touch(rate, meeting.value(meeting.law.stiffness) / c)
 

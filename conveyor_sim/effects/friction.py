@@ -12,7 +12,6 @@ from conveyor_sim.effects.terms import (
     deepest,
     drag_bound,
     frequency,
-    impact_speed,
     meetings,
     overlap_at,
     tightest,
@@ -54,7 +53,7 @@ def _kick(terms: Terms, dt: float) -> list[Term]:
     """
     if "implicit_friction" in terms.on or terms.method.slip == 0.0:
         return []
-    speed = impact_speed(terms.scene)
+    speed = terms.impact_speed
     kicks = []
     for meeting in meetings(terms):
         mu = _curve_friction(meeting)
@@ -111,7 +110,7 @@ def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
     """N/m, of the tangential spring; Mindlin's at the deepest overlap of an impact or a queue."""
     if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
         pressed = overlap_at(meeting, terms, contact_load(terms).force)
-        return mindlin * math.sqrt(max(deepest(meeting, terms, impact_speed(terms.scene))[0], pressed))
+        return mindlin * math.sqrt(max(deepest(meeting, terms, terms.impact_speed)[0], pressed))
     return meeting.value(meeting.law.tangential_stiffness)
 
 

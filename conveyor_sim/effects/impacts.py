@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from conveyor_sim.effects.declaration import Effect
-from conveyor_sim.effects.terms import Meeting, Terms, deepest, duration, impact_speed, meetings, overlap_at
+from conveyor_sim.effects.terms import Meeting, Terms, deepest, duration, meetings, overlap_at
 from conveyor_sim.timestep.bounds import Bound
 from conveyor_sim.timestep.prediction import Impact
 
@@ -12,7 +12,7 @@ from conveyor_sim.timestep.prediction import Impact
 def impacts(terms: Terms, effects: Sequence[Effect]) -> tuple[Impact, ...]:
     """One for every pair of types that can touch, and every type and rail material."""
     adding = [effect.shares for effect in effects if effect.shares is not None and effect.name in terms.on]
-    speed = impact_speed(terms.scene)
+    speed = terms.impact_speed
     return tuple(
         Impact(
             what=meeting.what,

@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 from conveyor_sim.effects.base import MEETING
 from conveyor_sim.effects.declaration import Cause, Effect
-from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, impact_speed, tightest
+from conveyor_sim.effects.terms import Meeting, Terms, drag_bound, tightest
 from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.laws.coefficients import base_springs
 from conveyor_sim.scene.schema import Scene
@@ -45,7 +45,7 @@ def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
     if table is None or terms.method.second_order:
         return []
     braking = float(table.friction.max()) * terms.scene.gravity
-    return [Share("braking by the base's spring", 1.0, 2.0 * MEETING * impact_speed(terms.scene) / braking, 1.0)]
+    return [Share("braking by the base's spring", 1.0, 2.0 * MEETING * terms.impact_speed / braking, 1.0)]
 
 
 STATIC_FRICTION = Effect(

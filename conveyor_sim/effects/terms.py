@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,11 @@ class Terms:
     def types(self) -> list[BottleType]:
         """The bottle types, T of them, in the scene's order."""
         return list(self.scene.bottle_types.values())
+
+    @cached_property
+    def impact_speed(self) -> float:
+        """Of the hardest impact expected, m/s."""
+        return impact_speed(self.scene)
 
     @property
     def method(self) -> Method:
@@ -95,8 +101,8 @@ class Meeting:
 
 def meetings(terms: Terms) -> Iterator[Meeting]:
     """Every pair of types that can touch, then every type and rail material; types that no bottle has are left out."""
-    types = terms.types
-    present = [index for index, name in enumerate(terms.scene.bottle_types) if name in supply(terms.scene)]
+    types, supplied = terms.types, supply(terms.scene)
+    present = [index for index, name in enumerate(terms.scene.bottle_types) if name in supplied]
     if terms.laws.pair is not None:
         for a in present:
             for b in present:

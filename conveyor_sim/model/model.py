@@ -3,6 +3,7 @@
 import math
 import platform
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 
 import llvmlite.binding as llvm
@@ -184,6 +185,7 @@ def build_model(scene: Scene) -> Model:
     )
 
 
+@cache
 def versions_here() -> tuple[str, ...]:
     """ "package=version" of what can change a bit, beside the engine (`ENGINE_HASH`)."""
     packages = (f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy"))
@@ -214,6 +216,7 @@ def _largest(radii: F8 | None) -> float:
     return 0.0 if radii is None else float(radii.max())
 
 
+@cache
 def _machine() -> str:
     """CPU architecture and the features that change compiled code."""
     features = llvm.get_host_cpu_features()
