@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -70,9 +71,9 @@ class Environment:
         log = self.path / "pip.log"
         self.state_file.unlink(missing_ok=True)
         try:
-            command(
-                [self.python, "-m", "pip", "--disable-pip-version-check", "install", "--prefer-binary", *what], why, log
-            )
+            # Bytecode is left to the first import: most of what comes is never imported.
+            options = ["--disable-pip-version-check", "install", "--prefer-binary", "--no-compile"]
+            command([self.python, "-m", "pip", *options, *what], why, log)
         except SetUpError:
             # pip itself gave up, and undid what it had begun.
             if self.state:
@@ -194,19 +195,24 @@ def set_up(distro: str, tools: str) -> None:
             "installing ROS 2 and Python packages",
         )
         environment.write_state(packages=packages)
-    if environment.state.get("messages") != messages:
-        say("conveyor_msgs from msg_defs/: half a minute ...")
-        environment.forget("messages")
-        environment.build_messages()
-        environment.write_state(messages=messages)
     if environment.state.get("index") != needed["index"]:
         environment.forget("index")
         environment.register()
         environment.write_state(index=needed["index"])
-    if tools and environment.state.get(tools) != needed[tools]:
-        say(f"{TOOLS[tools]} ...")
-        environment.pip_install(["-r", requirements / f"{tools}.txt"], f"installing {TOOLS[tools]}")
-        environment.write_state(**{tools: needed[tools]})
+    # The compiler and pip wait for different things.
+    with ThreadPoolExecutor(1) as beside:
+        built = None
+        if environment.state.get("messages") != messages:
+            say("conveyor_msgs from msg_defs/: about a minute ...")
+            environment.forget("messages")
+            built = beside.submit(environment.build_messages)
+        if tools and environment.state.get(tools) != needed[tools]:
+            say(f"{TOOLS[tools]} ...")
+            environment.pip_install(["-r", requirements / f"{tools}.txt"], f"installing {TOOLS[tools]}")
+            environment.write_state(**{tools: needed[tools]})
+        if built:
+            built.result()
+            environment.write_state(messages=messages)
     say(f"done in {time.monotonic() - start:.0f} s")
 
 
