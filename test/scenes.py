@@ -29,6 +29,8 @@ RADIUS = 0.065
 MASS = 0.2
 NO_FLOOR: dict[str, Any] = {"floor": "none"}
 PEAKS: dict[str, Any] = {"effects": {"peaks": "on"}}
+COMMON: dict[str, Any] = dict.fromkeys(["peaks", "rotation", "unequal_radii", "energy_ledger"], "on")
+"""Effects of all hard cases; see `with_bends`."""
 NO_OUTPUTS = dict.fromkeys(Scene.TOPICS, 0)
 
 
@@ -110,6 +112,21 @@ def every_law(
         },
         "effects": {"peaks": "on", "rotation": "on", "unequal_radii": "on"},
     }  # fmt: skip
+
+
+def with_bends(fields: dict[str, Any]) -> dict[str, Any]:
+    """Fields of a scene, and out of everybody's way an arc of steel and a curved belt of chain that stands.
+
+    A scene with straight rails and belts, friction and normal damping has the compiled kernels of the hard cases so, if
+    its effects are COMMON: tests that must have many effects, or may, share them. A step takes some seconds to compile.
+    """
+    bend = {"kind": "curved", "centre": [9.0, 9.0], "inner_radius": 0.1, "width": 0.1, "start_angle": 0.0, "span": 1.0,
+            "material": "chain", "speed": 0.0}  # fmt: skip
+    return {
+        **fields,
+        "belts": {**fields["belts"], "spare": bend},
+        "rails": {**fields["rails"], "spare": arc((9.0, 8.0), 0.1, 0.0, 1.0)},
+    }
 
 
 def segment(start: tuple[float, float], end: tuple[float, float]) -> dict[str, Any]:

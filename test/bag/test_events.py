@@ -33,7 +33,8 @@ GIVEN = {
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int, tuple[Event, ...], int]]]:
     """A recording with limits, commands and alarms; and what happened, by tick, with the events so far."""
     folder = tmp_path_factory.mktemp("events") / "bag"
-    sim = Simulation(load_scene(SMALL_LINE, {"limits": {"impact_speed": 0.2}}))
+    # A ledger for the kernels of test_replay.py.
+    sim = Simulation(load_scene(SMALL_LINE, {"limits": {"impact_speed": 0.2}, "effects": {"energy_ledger": "on"}}))
     seen = []
     with Recorder(folder) as recorder:
         outputs = Outputs(sim, [recorder], run_id="run")

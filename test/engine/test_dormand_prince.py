@@ -18,6 +18,7 @@ from scenes import (
     belt,
     bottle,
     contact,
+    every_law,
     kind,
     order,
     phases,
@@ -56,6 +57,7 @@ OTHERS: list[dict[str, Any]] = [
     {"table": [[1e-3, 1.0], [2e-3, 4.0]]},
     {"hertz_stiffness": 1e5, "damping": {"law": "normal", "restitution": 0.5}},
     {"stiffness": 1e3, "damping": {"law": "onset", "restitution": 0.5, "speed": SPEED}, "friction": 0.1},
+    {"hertz_stiffness": 1e5, "damping": {"law": "viscoelastic", "restitution": 0.5, "speed": SPEED}},
 ]
 """Of materials that never meet: with them it is the set of effects of `every_law`, that is of its kernels."""
 _ROOT = math.sqrt(1.0 - ZETA**2)
@@ -133,7 +135,7 @@ def oblique() -> tuple[Scene, list[Gap]]:
     given = scene(
         tick=0.025,
         accuracy={"integrator": "dormand_prince", "per_tick": 100, "error": 1e-12},
-        contacts=[contact(5000.0, damping=("paper", 8.0), friction=0.2)],
+        **every_law([contact(5000.0, damping=("paper", 8.0), friction=0.2)]),
         bottles=[bottle(0.0, 0.0, 0.8, 0.1, spin=4.0), bottle(0.127, 0.04, -0.4, 0.0, spin=-1.0)],
         **NO_FLOOR,
     )

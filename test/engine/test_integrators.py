@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, bottle, contact, order, scene, simulation
+from scenes import MASS, RADIUS, bottle, contact, every_law, order, scene, simulation
 from worlds import FAR, advance, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
@@ -17,12 +17,12 @@ DEPTH = 0.01
 
 def squeezed(integrator: str, speed: float = 0.0, **accuracy: float) -> State:
     """Two bottles pressed into each other, with the paper's damping; they spin alike, so their rims slip."""
-    fields = {"contacts": [contact(K, damping=("paper", C))], "floor": "none", "lever_arm": "radius"}
     given = scene(
         accuracy={"integrator": integrator, **accuracy},
-        effects={"peaks": "on"},
+        **every_law([contact(K, damping=("paper", C))]),
         bottles=[bottle(FAR, FAR), bottle(-FAR, FAR)],
-        **fields,
+        floor="none",
+        lever_arm="radius",
     )
     apart = 2.0 * RADIUS - DEPTH
     return state_of(given, [(0.0, 0.0), (apart, 0.0)], [(speed / 2, 0.0), (-speed / 2, 0.0)], [3.0, 3.0])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, every_law, polyline, scene, simulation
+from scenes import COMMON, MASS, RADIUS, base, belt, bottle, contact, every_law, polyline, scene, simulation, with_bends
 from worlds import FAR, advance, state_of
 
 from conveyor_sim.simulation import Simulation
@@ -16,8 +16,6 @@ from conveyor_sim.simulation import Simulation
 G, MU = 9.81, 0.4
 METHOD = "linearly_implicit"
 LAWS: dict[str, Any] = {"damping": ("normal", 0.1), "friction": 0.1}
-EFFECTS = {"peaks": "on", "unequal_radii": "on"}
-"""With them the kernels are those of test_checkpoint.py's queue; `every_law` has those of test_prediction.py."""
 
 
 def test_a_spring_in_contact_keeps_its_energy() -> None:
@@ -56,18 +54,19 @@ def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
         "pattern": "hexagonal",
     }
     walls = [(0.0, -side), (length, -side), (length, height + side), (0.0, height + side)]
-    return simulation(
-        tick=dt,
-        duration=1000 * dt,
-        gravity=G,
-        accuracy={"integrator": METHOD, "per_tick": 1},
-        contacts=[contact(stiffness, **LAWS), contact(2.0 * stiffness, "steel", **LAWS)],
-        effects=EFFECTS,
-        base=base(MU),
-        belts={"belt": belt(0.25, (-1.0, -1.0), 5.0, 5.0)},
-        rails={"walls": polyline(walls)},
-        bottles=[{"grid": grid}],
-    )
+    given = {
+        "tick": dt,
+        "duration": 1000 * dt,
+        "gravity": G,
+        "accuracy": {"integrator": METHOD, "per_tick": 1},
+        "contacts": [contact(stiffness, **LAWS), contact(2.0 * stiffness, "steel", **LAWS)],
+        "effects": COMMON,
+        "base": base(MU),
+        "belts": {"belt": belt(0.25, (-1.0, -1.0), 5.0, 5.0)},
+        "rails": {"walls": polyline(walls)},
+        "bottles": [{"grid": grid}],
+    }
+    return simulation(**with_bends(given))
 
 
 @pytest.mark.parametrize("ratio", [5.0, 20.0])
@@ -93,18 +92,19 @@ def test_base_friction_does_not_chatter_at_ten_times_its_explicit_limit() -> Non
     """A bottle set down on a belt is taken along: its slip falls to rest and never turns round."""
     limit = 0.01 / (MU * G)
     tick = round(10.0 * limit, 6)
-    sim = simulation(
-        tick=tick,
-        duration=1000 * tick,
-        gravity=G,
-        accuracy={"integrator": METHOD, "per_tick": 1},
-        contacts=[contact(1e5, **LAWS), contact(2e5, "steel", **LAWS)],
-        effects=EFFECTS,
-        base=base(MU),
-        belts={"belt": belt(0.5, (-1.0, -1.0), 5.0, 5.0)},
-        rails={"far": polyline([(0.0, 3.0), (1.0, 3.0)])},
-        bottles=[bottle(0.0, 0.0), bottle(0.0, 1.0)],
-    )
+    given = {
+        "tick": tick,
+        "duration": 1000 * tick,
+        "gravity": G,
+        "accuracy": {"integrator": METHOD, "per_tick": 1},
+        "contacts": [contact(1e5, **LAWS), contact(2e5, "steel", **LAWS)],
+        "effects": COMMON,
+        "base": base(MU),
+        "belts": {"belt": belt(0.5, (-1.0, -1.0), 5.0, 5.0)},
+        "rails": {"far": polyline([(0.0, 3.0), (1.0, 3.0)])},
+        "bottles": [bottle(0.0, 0.0), bottle(0.0, 1.0)],
+    }
+    sim = simulation(**with_bends(given))
     slips = []
     for _ in range(60):
         sim.advance()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import base, belt, contact, kind, polyline, scene
+from scenes import COMMON, base, belt, contact, kind, polyline, scene, with_bends
 
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.engine.threads.workers import BLOCK
@@ -35,21 +35,21 @@ def crowd(**fields: Any) -> Scene:
                       "pitch": PITCH}}
             for name, first in (("bottle", 0), ("slim", ROWS // 2))
         ],
-        "accuracy": {"per_tick": 100},
-        "effects": {"peaks": "on"},
+        "accuracy": {"per_tick": 50},
+        "effects": COMMON,
     }  # fmt: skip
-    return scene(**{**given, **fields})
+    return scene(**with_bends({**given, **fields}))
 
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "as it is": {},
-    "velocity Verlet": {"accuracy": {"per_tick": 100, "integrator": "velocity_verlet"}},
-    "Dormand and Prince": {"accuracy": {"per_tick": 50, "integrator": "dormand_prince", "error": 1e-3}},
-    "linearly implicit": {"accuracy": {"per_tick": 20, "integrator": "linearly_implicit"}},
+    "velocity Verlet": {"accuracy": {"per_tick": 50, "integrator": "velocity_verlet"}},
+    "Dormand and Prince": {"accuracy": {"per_tick": 25, "integrator": "dormand_prince", "error": 1e-3}},
+    "linearly implicit": {"accuracy": {"per_tick": 10, "integrator": "linearly_implicit"}},
     "implicit friction": {"friction_solver": "implicit"},
     "static friction": {
         "base": [{**base(0.4)[0], "tangential": {"stiffness": 2000.0, "damping": 20.0}}],
-        "accuracy": {"per_tick": 100, "integrator": "velocity_verlet"},
+        "accuracy": {"per_tick": 50, "integrator": "velocity_verlet"},
     },
     "springs and rings": {
         "bottle_types": {"bottle": kind(base_radius=0.04), "slim": kind(0.06, 0.15, base_radius=0.03)},

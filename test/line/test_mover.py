@@ -13,11 +13,11 @@ STROKE, TOP, ACCELERATION = 0.3, 0.5, 2.0
 
 
 def alone(*bottles: dict[str, Any], **more: Any) -> Simulation:
-    """A pusher, and a gate that is open at the start, far away."""
+    """A pusher, and a gate that is open at the start, far away; and a bottle out of the way, to share kernels."""
     steel = {"material": "steel", "max_speed": TOP, "acceleration": ACCELERATION}
     pusher = {"from": [0.0, -0.2], "to": [0.0, 0.2], "direction": 0.0, "stroke": STROKE, **steel}
     gate = {"kind": "swing", "from": [9.0, 5.0], "to": [9.5, 5.0], "angle": "-90 deg", "open": True, **steel}
-    return plant(*bottles, pushers={"p": pusher}, gates={"g": gate}, diverters={}, **more)
+    return plant(*bottles, bottle(20.0, 21.0), pushers={"p": pusher}, gates={"g": gate}, diverters={}, **more)
 
 
 def seen(sim: Simulation, name: str) -> tuple[float, ...]:

@@ -6,7 +6,22 @@ from typing import Any
 import numpy as np
 import pytest
 from physics.test_tangential_spring import PULL, SPRING, STIFFNESS, leaning
-from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, line, scene, segment, simulation
+from scenes import (
+    COMMON,
+    MASS,
+    RADIUS,
+    arc,
+    base,
+    belt,
+    bottle,
+    contact,
+    kind,
+    line,
+    scene,
+    segment,
+    simulation,
+    with_bends,
+)
 
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.model import build_model
@@ -34,23 +49,23 @@ def ledger_of(sim: Simulation) -> Ledger:
     return ledger
 
 
-def pressed(steps: int, integrator: str, **fields: Any) -> Simulation:
+def pressed(steps: int, integrator: str, **effects: str) -> Simulation:
     """Two bottles, one behind the other, that a belt presses against a stop from the first tick on: no force jumps.
 
-    With the effects of test_checkpoint.py's queue, and so its kernels; no contact slips.
+    No contact slips.
     """
     laws: dict[str, Any] = {"damping": ("normal", 10.0), "friction": 0.2}
-    fields["effects"] = {"peaks": "on", "unequal_radii": "on", **fields.get("effects", {})}
-    return simulation(
-        tick=0.01,
-        accuracy={"per_tick": steps, "integrator": integrator},
-        contacts=[contact(5e3, **laws), contact(5e3, "steel", **laws)],
-        base=base(0.4),
-        belts={"belt": belt(0.5)},
-        rails={"stop": segment((0.0, -1.0), (0.0, 1.0))},
-        bottles=[bottle(-RADIUS - 2.0 * RADIUS * i, 0.0) for i in range(2)],
-        **fields,
-    )
+    given = {
+        "tick": 0.01,
+        "accuracy": {"per_tick": steps, "integrator": integrator},
+        "contacts": [contact(5e3, **laws), contact(5e3, "steel", **laws)],
+        "base": base(0.4),
+        "belts": {"belt": belt(0.5)},
+        "rails": {"stop": segment((0.0, -1.0), (0.0, 1.0))},
+        "bottles": [bottle(-RADIUS - 2.0 * RADIUS * i, 0.0) for i in range(2)],
+        "effects": {**COMMON, **effects},
+    }
+    return simulation(**with_bends(given))
 
 
 @pytest.mark.parametrize("integrator", ORDERS)
@@ -58,21 +73,21 @@ def test_the_residual_falls_as_the_integrators_error_does(integrator: str) -> No
     order, steps = ORDERS[integrator]
     residuals = []
     for per_tick in (steps, 2 * steps):
-        sim = pressed(per_tick, integrator, **ON)
+        sim = pressed(per_tick, integrator)
         sim.advance(3)
         ledger = ledger_of(sim)
         residuals.append(abs(ledger.residual))
         assert ledger.damping > 1e-3 * ledger.base_friction
         assert ledger.elastic > 1e-3 * ledger.base_friction
         # The belt outruns both, so pulls with mu m g all the time.
-        assert ledger.belt_work == pytest.approx([2.0 * 0.4 * MASS * 9.81 * 0.5 * sim.time, 0.0], rel=1e-9)
+        assert ledger.belt_work == pytest.approx([2.0 * 0.4 * MASS * 9.81 * 0.5 * sim.time, 0.0, 0.0], rel=1e-9)
     assert residuals[0] < 1e-4 * ledger.turnover
     assert math.log2(residuals[0] / residuals[1]) == pytest.approx(order, abs=0.3)
 
 
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "linearly_implicit"])
 def test_to_keep_the_ledger_changes_no_bit(integrator: str) -> None:
-    kept, plain = pressed(50, integrator, **ON), pressed(50, integrator)
+    kept, plain = pressed(50, integrator), pressed(50, integrator, energy_ledger="off")
     for sim in (kept, plain):
         sim.advance(20)
     assert plain.ledger() is None
@@ -144,7 +159,11 @@ def test_damping_takes_what_a_dashpot_takes() -> None:
 def test_friction_takes_its_impulse_times_the_mean_slip() -> None:
     """Glass slides along steel, mu = 0.1: slip falls in proportion to the impulse, so that of both ends counts."""
     v_t, v_n = 1.0, 0.2
-    sim = apart(bottle(50.0, RADIUS + 1e-5, v_t, -v_n), rails={"wall": segment((49.0, 0.0), (52.0, 0.0))})
+    # One more, at rest: a bottle alone would have kernels of its own.
+    first, other = bottle(50.0, RADIUS + 1e-5, v_t, -v_n), bottle(60.0, 0.0)
+    sim = apart(
+        first, other, rails={"wall": segment((49.0, 0.0), (52.0, 0.0)), "bend": arc((60.0, 2.0), 1.0, 0.0, 1.0)}
+    )
     sim.advance(4)
     state, ledger = sim.bottles(), ledger_of(sim)
     impulse = MASS * (v_t - state.vx[0])
@@ -158,7 +177,7 @@ def test_friction_takes_its_impulse_times_the_mean_slip() -> None:
 def test_a_bottle_set_down_takes_twice_what_it_gets() -> None:
     """The belt does m v^2, of which m v^2 / 2 goes into motion and as much into friction."""
     v = 0.6
-    sim = apart(bottle(-0.9, 2.0))
+    sim = apart(bottle(-0.9, 2.0), bottle(50.0, 0.0))
     sim.advance(40)
     ledger = ledger_of(sim)
     energy = 0.5 * MASS * v**2

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, segment, simulation
+from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, segment, simulation
 
 from conveyor_sim.simulation import Simulation
 
@@ -23,7 +23,10 @@ BELT_SPEED = 40.0
 
 
 def leaning(against: str, share: float, effects: Any = None, **tangential: Any) -> Simulation:
-    """Bottle 0 with tan phi = share * mu; bottle 1, far off, goes with the belt and has the lists made anew."""
+    """Bottle 0 with tan phi = share * mu; bottle 1, far off, goes with the belt and has the lists made anew.
+
+    They are next to impossible to turn: without rotation no other test would have the same kernels.
+    """
     phi = math.atan(share * MU)
     normal = -0.5 * math.pi if against == "rail" else -0.75 * math.pi
     kept = {"damping": ("normal", 100.0), "friction": MU, **tangential}
@@ -49,7 +52,8 @@ def leaning(against: str, share: float, effects: Any = None, **tangential: Any) 
         accuracy={"per_tick": 200},
         gravity=G,
         slip_limit=SLIP_LIMIT,
-        effects={"rotation": "off", **(effects or {})},
+        effects=effects or {},
+        bottle_types={"bottle": kind(inertia=1e9)},
         contacts=contacts,
         base=base(MU_BASE),
         belts={"belt": belt(BELT_SPEED, corner, 200.0, 200.0, angle=normal + phi, speed_limits=[-50, 50])},

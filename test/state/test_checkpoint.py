@@ -20,7 +20,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import NO_FLOOR, RADIUS, base, belt, bottle, contact, every_law, kind, line, polyline, scene
+from scenes import (
+    COMMON,
+    NO_FLOOR,
+    RADIUS,
+    base,
+    belt,
+    bottle,
+    contact,
+    every_law,
+    kind,
+    line,
+    polyline,
+    scene,
+    with_bends,
+)
 
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.engine.arrays.world import World
@@ -81,9 +95,9 @@ def queue(**fields: Any) -> Scene:
         },
         "bottles": [{"grid": {"type": "slim", "origin": [-0.2, -0.06], "rows": 2, "columns": 4, "pitch": 0.121}}],
         "accuracy": {"per_tick": 50},
-        "effects": {"peaks": "on"},
+        "effects": COMMON,
     }  # fmt: skip
-    return scene(**{**given, **fields})
+    return scene(**with_bends({**given, **fields}))
 
 
 def command(sim: Simulation) -> None:
@@ -321,7 +335,7 @@ def test_the_order_of_belts_matters(saved: Path) -> None:
     text = json.loads(one.source_text)
     text["belts"] = dict(reversed(text["belts"].items()))
     told = refusal(saved, scene(**text))
-    assert told.startswith("saved from a scene with belts: feeder, end, side, which is side, end, feeder in the scene")
+    assert told.startswith("saved from a scene with belts: feeder, end, side, spare, which is spare, side, end, feeder")
 
 
 def test_another_format_is_refused(saved: Path, tmp_path: Path) -> None:
@@ -405,13 +419,13 @@ def test_a_header_with_odd_fields_is_refused(saved: Path, tmp_path: Path, change
         (("tick",), 10.0, "tick is not of its type"),
         (("tick",), 10**12, "tick 1000000000000, which no message can say"),
         (("next_id",), 3, "array bottles.id holds"),
-        (("line", "speeds"), [0.6], "line.speeds has the shape (1,), expected (3,)"),
+        (("line", "speeds"), [0.6], "line.speeds has the shape (1,), expected (4,)"),
         (("line", "speeds"), [math.nan] * 3, "line.speeds[0] is not finite"),
         (("line", "bad"), ["one"], "line.bad[0] is not of its type"),
         (("line", "pending"), [["plc", "plc", "test", "set", ["a"]]], "line.pending[0][5] is missing"),
         (("line", "read_back", "values"), ["a"], "line.read_back.values[0] is not of its type"),
-        (("line", "read_back", "writers"), [], "line.read_back has other commands than the 3 of the scene"),
-        (("line", "read_back", "since"), [0, 11, 0], "line.read_back.since is not from 0 to 10"),
+        (("line", "read_back", "writers"), [], "line.read_back has other commands than the 4 of the scene"),
+        (("line", "read_back", "since"), [0, 11, 0, 0], "line.read_back.since is not from 0 to 10"),
         (("line", "devices", "belts/feeder", "watchdog"), None, "watchdog has other entries than timeout_ticks"),
         (("line", "devices", "infeeds/packed", "due"), math.inf, "packed.due is not finite"),
         (("line", "devices", "infeeds/packed", "fed"), "two", "packed.fed is not of its type"),
