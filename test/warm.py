@@ -19,6 +19,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import types
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -45,6 +46,10 @@ IMPORTED = (
     "conveyor_sim.scada.scene_source",
     "conveyor_sim.scada.serving",
     "conveyor_sim.scada.web.server",
+    "conveyor_sim.studies.runs",
+    "dask.__main__",
+    "distributed.cli.dask_scheduler",
+    "distributed.cli.dask_worker",
 )
 
 
@@ -178,7 +183,8 @@ def _become(request: Mapping[str, Any]) -> None:
     if option == "-m":
         runpy.run_module(what, run_name="__main__", alter_sys=True)
     else:
-        exec(compile(what, "<string>", "exec"), {"__name__": "__main__"})
+        main = sys.modules["__main__"] = types.ModuleType("__main__")
+        exec(compile(what, "<string>", "exec"), main.__dict__)
 
 
 if __name__ == "__main__":
