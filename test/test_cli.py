@@ -123,13 +123,13 @@ def test_run_without_a_recording(command: Command, tmp_path: Path) -> None:
 
 
 def test_record_is_another_name_of_out(command: Command, tmp_path: Path) -> None:
-    result = command("run", SMALL_LINE, "--record", "bag", "--duration", "0.1")
+    result = command("run", SMALL_LINE, "--record", "bag", "--duration", "0.1", "--no-pictures")
     assert result.exit_code == 0, result.output
     assert (tmp_path / "bag" / "bag_0.mcap").exists()
 
 
 def test_recover_and_replay_a_bag_that_was_cut(command: Command, tmp_path: Path) -> None:
-    command("run", SMALL_LINE, "--out", "bag", "--duration", "0.6")
+    command("run", SMALL_LINE, "--out", "bag", "--duration", "0.6", "--no-pictures")
     assert "nothing to do" in command("recover", "bag").output
     replayed = command("replay", "bag")
     assert replayed.exit_code == 0, replayed.output
@@ -183,7 +183,7 @@ def test_what_is_no_number_is_in_no_range(command: Command, arguments: tuple[str
 
 
 def test_plot_draws_into_a_folder(command: Command, tmp_path: Path) -> None:
-    command("run", SMALL_LINE, "--out", "bag", "--duration", "0.4")
+    command("run", SMALL_LINE, "--out", "bag", "--duration", "0.4", "--no-pictures")
     result = command("plot", "bag", "--out", "drawn", "--time", "0.2", "--bottle", "0")
     assert result.exit_code == 0, result.output
     assert (tmp_path / "drawn" / "velocity_bottle_0.png").exists()

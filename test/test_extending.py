@@ -69,7 +69,8 @@ def change(file: Path, hunks: str) -> None:
 def apply(blocks: list[Block], folder: Path) -> None:
     """A copy of the package in a folder, with all blocks of a section but the last."""
     for name in COPIED:
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        # With what Python has compiled of files that stay as they are, but not what it is just writing.
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("*.pyc.*"))
     for block in blocks:
         if block.title != TRY:
             apply_block(block, folder)

@@ -16,10 +16,15 @@ class Child(Process):
         self, name: str, parameters: Mapping[str, object], environment: Mapping[str, str], log_folder: Path
     ) -> None:
         """Runs `conveyor_sim.ros.<name>` with ROS parameters; its output goes to `<log_folder>/<name>.log`."""
-        command = [sys.executable, "-m", f"conveyor_sim.ros.{name}", "--ros-args"]
-        for parameter, value in parameters.items():
-            command += ["-p", f"{parameter}:={_yaml(value)}"]
-        super().__init__(name, command, environment, log_folder)
+        super().__init__(name, [sys.executable, *arguments_of(name, parameters)], environment, log_folder)
+
+
+def arguments_of(name: str, parameters: Mapping[str, object]) -> list[str]:
+    """With which Python runs a node of this package."""
+    arguments = ["-m", f"conveyor_sim.ros.{name}", "--ros-args"]
+    for parameter, value in parameters.items():
+        arguments += ["-p", f"{parameter}:={_yaml(value)}"]
+    return arguments
 
 
 def _yaml(value: object) -> str:

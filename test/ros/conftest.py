@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from ros.line_client import LineClient, until
+from ros.warm_child import WarmChild
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.typestore import default_distro
@@ -47,7 +48,7 @@ def start_node(client: LineClient, tmp_path_factory: pytest.TempPathFactory) -> 
         until(lambda: not client.node.count_services("lockstep"), "the end of the node before")
         given = {"scene": SMALL_LINE, "start_paused": True, "real_time_factor": 0.0, **parameters}
         logs = tmp_path_factory.mktemp("logs")
-        child = Child("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs)
+        child = WarmChild("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs)
         children.append(child)
         while child.exit_code is None and client.compiling():
             time.sleep(0.05)

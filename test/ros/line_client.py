@@ -30,7 +30,7 @@ def until(condition: Callable[[], Any], what: str) -> Any:
     end = time.monotonic() + PATIENCE
     while not (value := condition()):
         assert time.monotonic() < end, f"in vain: {what}"
-        time.sleep(0.002)
+        time.sleep(0.01)
     return value
 
 

@@ -37,8 +37,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def shared_node(start_node: Callable[..., Child], folder: Path) -> Child:
-    """One node for many tests, with ticks enough for all."""
-    return start_node(duration=1000.0, checkpoint_folder=folder)
+    """One node for many tests, with ticks enough for all, and other threads than the first test's own."""
+    return start_node(duration=1000.0, checkpoint_folder=folder, threads=2)
 
 
 def save(client: LineClient, path: Path | str) -> Any:
@@ -63,11 +63,15 @@ def scans(client: LineClient, first: int, last: int) -> list[int]:
 
 
 def test_what_was_saved_goes_on_to_the_same_bits(
-    start_node: Callable[..., Child], client: LineClient, tmp_path: Path
+    start_node: Callable[..., Child],
+    client: LineClient,
+    folder: Path,
+    tmp_path: Path,
+    request: pytest.FixtureRequest,
 ) -> None:
     """In the same node, in another one with other threads, and without ROS; each run has a recording of its own."""
-    file = tmp_path / "checkpoint"
-    node = start_node(record=tmp_path / "bag", threads=1, checkpoint_folder=tmp_path)
+    file = folder / "checkpoint"
+    node = start_node(record=tmp_path / "bag", threads=1, checkpoint_folder=folder)
     scans(client, 10, 150)
     with client.listen(Line, "line") as lines:
         began = lines.first()
@@ -84,10 +88,9 @@ def test_what_was_saved_goes_on_to_the_same_bits(
     assert client.state() == PAUSED
     assert scans(client, 160, 250) == hashes
     node.stop()
-    node = start_node(threads=2, checkpoint_folder=tmp_path)
+    request.getfixturevalue("shared_node")
     assert load(client, file).success
     assert scans(client, 160, 250) == hashes
-    node.stop()
     sim = Simulation.load(file, scene=load_scene(SMALL_LINE))
     assert (sim.tick, sim.time) == (150, 1.5)
     report = replay(tmp_path / "bag")
@@ -179,28 +182,44 @@ def test_a_load_breaks_off_what_is_under_way(line: LineClient, folder: Path) -> 
     line.step(1)
 
 
-def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(
-    start_node: Callable[..., Child], shared_node: Child, client: LineClient, tmp_path: Path
-) -> None:
-    """A pipe that nobody writes to, a device without end, a header without its fields, arrays cut short, NaN."""
-    shared_node.stop()
-    node = start_node(duration=1000.0, checkpoint_folder=tmp_path)
-    client.step(20)
-    assert save(client, "good").success
-    with np.load(tmp_path / "good") as file:
+def test_a_file_is_read_while_the_simulation_goes_on(line: LineClient, folder: Path) -> None:
+    """A step that is asked for later is answered before the file is read; a second file is not read beside it."""
+    line.step(1)
+    with (folder / "large").open("wb") as stream:
+        stream.write(b"PK\x03\x04")
+        stream.seek(480_000_000)
+        stream.write(b"sha256:" + b"0" * 64)
+    answer = line.client(srv.LoadCheckpoint, "load_checkpoint").call_async(srv.LoadCheckpoint.Request(path="large"))
+    refused = load(line, "large")
+    line.step(1)
+    assert not answer.done()
+    assert (refused.message, refused.tick) == ("another checkpoint is being loaded, expected its answer first", 1)
+    response = until(answer.result, "the answer")
+    assert "its checksum does not fit" in response.message
+    assert response.tick == 2
+
+
+def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(line: LineClient, shared_node: Child, folder: Path) -> None:
+    """A pipe that nobody writes to, a device without end, a header without its fields, arrays cut short, NaN.
+
+    The last test of the shared node.
+    """
+    line.step(20)
+    assert save(line, "good").success
+    with np.load(folder / "good") as file:
         arrays = dict(file)
     header = json.loads(arrays.pop("header").tobytes())
     x = arrays["bottles.x"]
 
     def written(name: str, header: dict[str, Any], **changes: Any) -> str:
-        (tmp_path / name).write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
+        (folder / name).write_bytes(sealed(json.dumps(header), {**arrays, **changes}))
         return name
 
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "device").symlink_to("/dev/zero")
+    os.mkfifo(folder / "pipe")
+    (folder / "device").symlink_to("/dev/zero")
     wrong = [
         ("pipe", "is a named pipe, not a regular file"),
-        ("device", f"leads out of the folder {tmp_path}"),
+        ("device", f"leads out of the folder {folder}"),
         (
             written("no versions", {name: header[name] for name in header if name != "versions"}),
             "header.versions is missing",
@@ -210,42 +229,21 @@ def test_what_is_no_checkpoint_neither_stops_nor_ends_a_run(
         (written("not finite", header, **{"bottles.x": np.full_like(x, np.nan)}), "array bottles.x is not finite"),
         ("a\nforged line", "path: 'a\\nforged line' given, expected at most 1000 characters that can be printed"),
     ]
-    client.call(Trigger, "resume")
+    line.call(Trigger, "resume")
     ticks = [0]
     for path, reason in wrong:
-        response = load(client, path)
+        response = load(line, path)
         assert not response.success
         assert reason in response.message
         assert "\n" not in response.message
         ticks.append(response.tick)
-        until(lambda: client.lockstep(0).tick > ticks[-1], "time to pass")
+        until(lambda: line.lockstep(0).tick > ticks[-1], "time to pass")
     assert ticks == sorted(ticks)
-    assert client.state() == PLAYING
-    assert load(client, "good").tick == 20
-    node.stop()
-    assert node.exit_code == 0
-    assert "Traceback" not in node.log.read_text()
-
-
-def test_a_file_is_read_while_the_simulation_goes_on(
-    start_node: Callable[..., Child], client: LineClient, tmp_path: Path
-) -> None:
-    """A step that is asked for later is answered before the file is read; a second file is not read beside it."""
-    node = start_node(checkpoint_folder=tmp_path)
-    client.step(1)
-    with (tmp_path / "large").open("wb") as stream:
-        stream.write(b"PK\x03\x04")
-        stream.seek(480_000_000)
-        stream.write(b"sha256:" + b"0" * 64)
-    answer = client.client(srv.LoadCheckpoint, "load_checkpoint").call_async(srv.LoadCheckpoint.Request(path="large"))
-    refused = load(client, "large")
-    client.step(1)
-    assert not answer.done()
-    assert (refused.message, refused.tick) == ("another checkpoint is being loaded, expected its answer first", 1)
-    response = until(answer.result, "the answer")
-    assert "its checksum does not fit" in response.message
-    assert response.tick == 2
-    node.stop()
+    assert line.state() == PLAYING
+    assert load(line, "good").tick == 20
+    shared_node.stop()
+    assert shared_node.exit_code == 0
+    assert "Traceback" not in shared_node.log.read_text()
 
 
 def test_both_services_keep_to_their_folder(
@@ -275,9 +273,8 @@ def test_both_services_keep_to_their_folder(
 
 
 def test_a_checkpoint_of_the_end_has_no_way_on_but_a_longer_run(
-    start_node: Callable[..., Child], shared_node: Child, client: LineClient, tmp_path: Path
+    start_node: Callable[..., Child], client: LineClient, tmp_path: Path
 ) -> None:
-    shared_node.stop()
     node = start_node(record=tmp_path / "bag", duration=0.2, checkpoint_folder=tmp_path)
     client.step(20)
     assert save(client, tmp_path / "checkpoint").success

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from ros.conftest import SMALL_LINE
 from ros.recording import record
+from warm import run
 
 from conveyor_sim.bag.recover import recover
 from conveyor_sim.ros.context import UNPROTECTED
 
 SIM_NODE = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", "-p", f"scene:={SMALL_LINE}"]
-CONVEYOR_SIM = str(Path(sys.executable).with_name("conveyor-sim"))
+CONVEYOR_SIM = ["-c", "from conveyor_sim.cli import main; main()"]
 ENFORCE = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
 MISSING = {**ENFORCE, "ROS_SECURITY_KEYSTORE": "/no/such"}
 NO_FOLDER = (
@@ -33,14 +32,7 @@ def refused(arguments: list[str], environment: Mapping[str, str]) -> str:
 
 def said(arguments: list[str], environment: Mapping[str, str]) -> str:
     """All that a program says until it ends with exit code 1."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        env={**os.environ, **ALONE, **environment},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = run(arguments, env={**os.environ, **ALONE, **environment})
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stdout + done.stderr
     return done.stderr
@@ -97,4 +89,4 @@ def test_of_a_controller() -> None:
 
 def test_of_a_playback(tmp_path: Path) -> None:
     record(tmp_path / "bag")
-    assert NO_FOLDER in refused([CONVEYOR_SIM, "replay", str(tmp_path / "bag"), "--publish"], MISSING)
+    assert NO_FOLDER in refused([*CONVEYOR_SIM, "replay", str(tmp_path / "bag"), "--publish"], MISSING)

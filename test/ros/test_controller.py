@@ -12,6 +12,7 @@ from conveyor_msgs.msg import CommandOutcome, Signals, Variables
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, halted, until
+from ros.warm_child import WarmChild
 from rosbags.highlevel import AnyReader
 from std_srvs.srv import Trigger
 
@@ -35,7 +36,7 @@ def start_controller(domain: int, tmp_path: Path) -> Iterator[StartController]:
     def start(**parameters: object) -> Child:
         given = {"controller": f"{FILE}:make", "parameters": f"{{high: {HIGH}}}", "scan_ticks": SCAN, **parameters}
         environment = {**os.environ, "ROS_LOG_DIR": str(tmp_path / "ros")}
-        children.append(Child("controller_node", given, environment, tmp_path))
+        children.append(WarmChild("controller_node", given, environment, tmp_path))
         return children[-1]
 
     yield start

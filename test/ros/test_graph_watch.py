@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
+from ros.recording import record
+from ros.warm_child import WarmProcess
 from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.ros.child import Child
@@ -28,9 +29,9 @@ NOT_ALONE = "not alone in this ROS domain"
 @contextmanager
 def sim_node(folder: Path, name: str, *ros_arguments: str) -> Iterator[Process]:
     """A node on the small line, paused."""
-    command = [sys.executable, "-m", "conveyor_sim.ros.sim_node", "--ros-args", *ros_arguments]
-    command += ["-p", f"scene:={SMALL_LINE}", "-p", "start_paused:=true"]
-    process = Process(name, command, {**os.environ, "ROS_LOG_DIR": str(folder / "ros")}, folder)
+    arguments = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", *ros_arguments]
+    arguments += ["-p", f"scene:={SMALL_LINE}", "-p", "start_paused:=true"]
+    process = WarmProcess(name, arguments, {**os.environ, "ROS_LOG_DIR": str(folder / "ros")}, folder)
     try:
         yield process
     finally:
@@ -121,13 +122,11 @@ def test_a_recording_played_beside_a_simulation_is_told_by_both(
     start_node: Callable[..., Child], client: LineClient, tmp_path: Path
 ) -> None:
     bag = tmp_path / "bag"
-    recorder = start_node(duration=0.2, start_paused=False, record=bag)
-    until(lambda: "end of the run" in recorder.log.read_text(), "a recording")
-    recorder.stop()
+    record(bag)
     node = start_node()
     until(lambda: client.node.count_services("/lockstep"), "the node")
-    command = [str(Path(sys.executable).with_name("conveyor-sim")), "replay", str(bag), "--publish", "--paused"]
-    replay = Process("replay", command, os.environ, tmp_path)
+    arguments = ["-c", "from conveyor_sim.cli import main; main()", "replay", str(bag), "--publish", "--paused"]
+    replay = WarmProcess("replay", arguments, os.environ, tmp_path)
     text = f"/clock is published by /{{}} too: {JUMPS}"
     until(lambda: text.format("conveyor_replay") in not_alone(client), "a warning")
     until(lambda: text.format("conveyor_sim") in replay.log.read_text(), "the playback's warning")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -257,14 +256,11 @@ def test_a_request_is_refused_while_running_free_or_without_a_name(
     assert ("the simulation is PLAYING, expected PAUSED" if run_id else "run_id is empty") in response.reason
 
 
-def test_a_node_that_ends_answers_what_it_will_not_carry_out(
-    start_node: Callable[..., Child], shared_node: Child, client: LineClient
-) -> None:
+def test_a_node_that_ends_answers_what_it_will_not_carry_out(line: LineClient, shared_node: Child) -> None:
+    """The last test of the shared node."""
+    answer = line.client(srv.Lockstep, "lockstep").call_async(srv.Lockstep.Request(run_id="plc", target_tick=90_000))
+    until(lambda: line.lockstep(0).tick > 0, "the advance to begin")
     shared_node.stop()
-    node = start_node(duration=1000.0)
-    answer = client.client(srv.Lockstep, "lockstep").call_async(srv.Lockstep.Request(run_id="plc", target_tick=90_000))
-    until(lambda: client.lockstep(0).tick > 0, "the advance to begin")
-    node.stop()
     response = until(answer.result, "the answer")
     assert (response.accepted, response.reason) == (False, "the simulation is shutting down")
-    assert node.exit_code == 0, node.obituary()
+    assert shared_node.exit_code == 0, shared_node.obituary()

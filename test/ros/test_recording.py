@@ -101,12 +101,8 @@ def test_at_the_end_of_the_run_the_bag_is_whole_while_the_node_lives_on(
 def test_a_full_disk_pauses_with_an_error_and_leaves_what_was_written(
     start_node: Callable[..., Child], client: LineClient, tmp_path: Path
 ) -> None:
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, before[1]))  # inherited: no file of the node may be larger
-    try:
-        node = start_node(record=tmp_path / "bag", duration=1000.0)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    node = start_node(record=tmp_path / "bag", duration=1000.0)
+    resource.prlimit(node.pid, resource.RLIMIT_FSIZE, (2**20, 2**20))  # no file of the node may be larger
     client.call(Trigger, "resume")
 
     def failed() -> Any:

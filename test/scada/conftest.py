@@ -14,8 +14,8 @@ def command(tmp_path: Path) -> Iterator[Callable[..., Served]]:
     """Starts `conveyor-sim serve` in a folder of its own; what is left of it is ended."""
     started: list[Served] = []
 
-    def start(*arguments: str, **environment: str) -> Served:
-        started.append(Served(tmp_path, *arguments, **environment))
+    def start(*arguments: str, fresh: bool = False, **environment: str) -> Served:
+        started.append(Served(tmp_path, *arguments, fresh=fresh, **environment))
         return started[-1]
 
     yield start

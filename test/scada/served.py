@@ -8,28 +8,33 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from scada.waiting import PATIENCE, until
+from warm import Warm
 
-COMMAND = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "serve"]
+COMMAND = ["-c", "from conveyor_sim.cli import main; main()", "serve"]
 
 
 class Served:
     """One of them."""
 
-    def __init__(self, folder: Path, *arguments: str, **environment: str) -> None:
-        """In a folder of its own."""
+    def __init__(self, folder: Path, *arguments: str, fresh: bool = False, **environment: str) -> None:
+        """In a folder of its own. fresh: by a Python of its own, as it is where an environment is given."""
         self._log = folder / "log"
+        self._out = TemporaryFile("w+")  # noqa: SIM115  # read at the end
         with self._log.open("w") as log:
-            self.process = subprocess.Popen(
-                [*COMMAND, *arguments],
-                cwd=folder,
-                env={**os.environ, **environment},
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                text=True,
-            )
+            if fresh or environment:  # which may be read while modules are imported
+                self.process = subprocess.Popen(
+                    [sys.executable, *COMMAND, *arguments],
+                    cwd=folder,
+                    env={**os.environ, **environment},
+                    stdin=subprocess.DEVNULL,
+                    stdout=self._out,
+                    stderr=log,
+                )
+            else:
+                self.process = Warm([*COMMAND, *arguments], self._out, log, cwd=folder)
 
     @property
     def told(self) -> str:
@@ -60,4 +65,6 @@ class Served:
     def end(self, number: int = signal.SIGINT) -> str:
         """What it printed, after a signal."""
         self.process.send_signal(number)
-        return self.process.communicate(timeout=PATIENCE)[0]
+        self.process.wait(timeout=PATIENCE)
+        self._out.seek(0)
+        return self._out.read()

@@ -55,6 +55,25 @@ def served() -> Iterator[Served]:
         source.close()
 
 
+@pytest.fixture(scope="module")
+def kept() -> Iterator[SceneSource]:
+    """For tests that need no process of their own."""
+    with SceneSource(Task(zoned(), None, 0, 1.0, 1), lambda sentence: None) as source:
+        source.wait_for_line()
+        yield source
+
+
+@pytest.fixture
+def running(kept: SceneSource) -> SceneSource:
+    """The same, at its beginning."""
+    run = kept.shown.run_id
+    assert kept.control("reset", 0, "a test") == ""
+    until(lambda: kept.shown.run_id != run, "the reset")
+    assert kept.shown.run.state == RUNNING or kept.control("resume", 0, "a test") == ""
+    until(lambda: kept.shown.run.state == RUNNING, "it runs")
+    return kept
+
+
 def setpoint(value: float, writer: str = "me") -> Input:
     return Input("modbus", writer, "controller", SET, (SETPOINT,), (value,))
 
@@ -87,8 +106,8 @@ def test_it_is_shown_as_it_is(served: Served) -> None:
     until(lambda: source.events(0)[0] > 0, "an event")
 
 
-def test_every_tick_of_a_line_in_real_time_can_be_heard_of(served: Served) -> None:
-    source, ticks = served(), list[int]()
+def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneSource) -> None:
+    source, ticks = running, list[int]()
     end = source.listen(lambda: ticks.append(source.shown.tick))
     until(lambda: len(ticks) > 100, "a second of ticks")
     end()
@@ -197,8 +216,8 @@ def test_what_the_guard_stops_is_shown_with_the_reason(served: Served) -> None:
     until(lambda: source.shown.run.state == PAUSED, "the reset")
 
 
-def test_what_waits_while_it_is_paused_is_bounded(served: Served) -> None:
-    source = served()
+def test_what_waits_while_it_is_paused_is_bounded(running: SceneSource) -> None:
+    source = running
     pause(source)
     refused = [source.give(setpoint(0.1 + 0.1 * (number % 2))) for number in range(MOST_WAITING + 100)]
     assert [bool(reason) for reason in refused] == [False] * MOST_WAITING + [True] * 100
@@ -224,8 +243,8 @@ def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Ser
     assert replay(tmp_path / "bag_1").difference is None
 
 
-def test_a_process_that_hangs_is_stale_until_it_goes_on(served: Served) -> None:
-    source = served()
+def test_a_process_that_hangs_is_stale_until_it_goes_on(running: SceneSource) -> None:
+    source = running
     until(lambda: source.shown.tick > 5, "ticks")
     os.kill(source.pid, signal.SIGSTOP)
     try:
@@ -246,7 +265,7 @@ def test_a_scene_that_can_not_be_recorded_is_said(tmp_path: Path) -> None:
     assert source.give(setpoint(0.1)) != ""
 
 
-def test_faults_are_not_for_clients(served: Served) -> None:
-    source = served()
+def test_faults_are_not_for_clients(running: SceneSource) -> None:
+    source, before = running, running.events(0)[0]
     assert source.give(Input("opcua", "Jo", "operator", INJECT, ("machines/filler/stop",), (1.0,))) == ""
-    until(lambda: any(event.kind == "command_refused" for event in source.events(0)[1]), "the refusal")
+    until(lambda: any(event.kind == "command_refused" for event in source.events(before)[1]), "the refusal")

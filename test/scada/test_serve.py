@@ -46,7 +46,7 @@ def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
     command: Callable[..., Served], tmp_path: Path
 ) -> None:
     options = ["--modbus", "0", "--modbus-role", "controller", "--modbus-map", "map.csv", "--web", "0", "--out", "bag"]
-    served = command(SCENE, *options)
+    served = command(SCENE, *options, fresh=True)
     with ModbusTcpClient("127.0.0.1", port=served.port, timeout=60) as client:
         until(lambda: speed_of(client) == 0.5, "the line")
         give(client, 0.25)
@@ -162,7 +162,7 @@ def test_who_ends_it_while_it_compiles_finds_nothing_left(
 )
 def test_what_can_not_be_is_one_sentence(command: Callable[..., Served], arguments: list[str], sentence: str) -> None:
     served = command(*arguments)
-    served.process.communicate(timeout=PATIENCE)
+    served.process.wait(timeout=PATIENCE)
     assert served.process.returncode == 1
     (error,) = [line for line in served.told.splitlines() if line.startswith("Error: ")]
     assert sentence in error
@@ -173,7 +173,7 @@ def test_a_history_of_no_tag_is_one_sentence_and_leaves_nothing(command: Callabl
     """Tags are known once the scene is loaded, and its recording has begun."""
     pytest.importorskip("asyncua", reason="asyncua is not installed: pip install conveyor-sim[scada]")
     served = command(SCENE, "--opcua", "0", "--opcua-history", "belts/*/sped")
-    served.process.communicate(timeout=PATIENCE)
+    served.process.wait(timeout=PATIENCE)
     assert served.process.returncode == 1
     assert "Error: opcua: history of belts/*/sped: fits no tag, expected a pattern such as" in served.told
     assert {path.name for path in tmp_path.iterdir()} == {"log"}
@@ -183,7 +183,7 @@ def test_a_port_that_is_taken_leaves_nothing_behind(command: Callable[..., Serve
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         served = command(SCENE, "--modbus", str(port))
-        served.process.communicate(timeout=PATIENCE)
+        served.process.wait(timeout=PATIENCE)
     assert served.process.returncode == 1
     assert f"Error: modbus: 127.0.0.1:{port} can't be listened on" in served.told
     assert {path.name for path in tmp_path.iterdir()} == {"log"}

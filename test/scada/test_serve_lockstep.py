@@ -95,5 +95,5 @@ def test_what_makes_no_lockstep_is_one_sentence(
     command: Callable[..., Served], arguments: list[str], sentence: str
 ) -> None:
     line = command(SCENE, "--lockstep", *arguments)
-    line.process.communicate(timeout=PATIENCE)
+    line.process.wait(timeout=PATIENCE)
     assert line.process.returncode == 1 and sentence in line.told

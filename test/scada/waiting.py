@@ -14,4 +14,4 @@ def until(condition: Callable[[], Any], what: str) -> None:
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end, f"in vain: {what}"
-        time.sleep(0.005)
+        time.sleep(0.01)

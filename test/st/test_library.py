@@ -43,7 +43,7 @@ def broken(folder: Path, body: str) -> CompiledProgram:
     """One whose scan does something else from the tenth on."""
     text = SHIM.read_text()
     assert text.count(BODY) == 1
-    text = text.replace(BODY, f"{BODY} if (time_ns >= 100000000) {{ {body} }}")
+    text = "#include <threads.h>\n" + text.replace(BODY, f"{BODY} if (time_ns >= 100000000) {{ {body} }}")
     return CompiledProgram(built(folder, "broken", text), TAGS, patience=5.0)
 
 
@@ -112,7 +112,7 @@ def test_its_instance_is_destroyed_at_the_end(tmp_path: Path) -> None:
         ("*(volatile int *)0 = 1;", r"broken\.so: ended by SIGSEGV in scan, expected an answer"),
         ("abort();", r"broken\.so: ended by SIGABRT in scan, expected an answer"),
         ("exit(3);", r"broken\.so: ended with code 3 in scan, expected an answer"),
-        ("for (volatile int i = 0;;) i++;", r"broken\.so: watchdog: scan took more than 5 s"),
+        ("for (;;) thrd_sleep(&(struct timespec){.tv_sec = 1}, 0);", r"broken\.so: watchdog: scan took more than 5 s"),
         ("return 7;", r"broken\.so: the program has stopped, with code 7"),
     ],
 )

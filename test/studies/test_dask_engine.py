@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +14,7 @@ import pytest
 from studies.small import Here, setup_of
 from studies.test_warm_up import FILLING
 from studies.waiting import until
+from warm import Warm
 
 pytest.importorskip("distributed")
 
@@ -44,7 +43,7 @@ class Cluster:
 
     def __init__(self, folder: Path) -> None:
         self._folder, self.port = folder, 0
-        self._processes: dict[int, subprocess.Popen[bytes]] = {}
+        self._processes: dict[int, Warm] = {}
 
     def scheduler(self) -> str:
         """Start one, at the port of the one before; its address."""
@@ -77,11 +76,10 @@ class Cluster:
         for process in self._processes.values():
             process.wait()
 
-    def _start(self, what: str, arguments: list[str]) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", *arguments]
+    def _start(self, what: str, arguments: list[str]) -> Warm:
         log = (self._folder / f"{what}_{len(self._processes)}.log").open("w")
         with log:
-            process = subprocess.Popen(command, stdout=log, stderr=log)
+            process = Warm(["-m", "dask", *arguments], log, log)
         self._processes[process.pid] = process
         return process
 

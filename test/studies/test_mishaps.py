@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from studies.small import setup_of, write_study
 from studies.waiting import PATIENCE, until
+from warm import Warm, run
 
 from conveyor_sim.studies.alone import run_alone
 from conveyor_sim.studies.journal import read_rows
@@ -77,17 +78,17 @@ def test_ctrl_c_ends_it_and_says_how_to_go_on(tmp_path: Path) -> None:
     study = write_study(tmp_path, function="code.py:gated", arguments={"folder": str(tmp_path)}, duration=0.1, seeds=1)
     out = tmp_path / "out"
     code = f"import os; open({str(tmp_path / 'main')!r}, 'w').write(str(os.getpid()))"
-    sweep_it = [sys.executable, "-c", f"{code}; from conveyor_sim.cli import main; main()", "sweep", str(study)]
-    with subprocess.Popen(
-        [*sweep_it, "--out", str(out), "--processes", "2"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            until(lambda: list(out.glob("runs/*.json")), "a finished run")
-            until(lambda: list(tmp_path.glob("running_*")), "a run that waits")
-            process.send_signal(signal.SIGINT)
-            _, said = process.communicate(timeout=PATIENCE)
-        finally:
-            process.kill()
+    sweep_it = ["-c", f"{code}; from conveyor_sim.cli import main; main()", "sweep", str(study)]
+    with (tmp_path / "said").open("w") as log:
+        process = Warm([*sweep_it, "--out", str(out), "--processes", "2"], log, log)
+    try:
+        until(lambda: list(out.glob("runs/*.json")), "a finished run")
+        until(lambda: list(tmp_path.glob("running_*")), "a run that waits")
+        process.send_signal(signal.SIGINT)
+        process.wait(PATIENCE)
+    finally:
+        process.kill()
+    said = (tmp_path / "said").read_text()
     assert process.returncode == 130
     assert f"finished runs are kept in {out}; the same command goes on with them" in said
     assert "Traceback" not in said
@@ -95,7 +96,7 @@ def test_ctrl_c_ends_it_and_says_how_to_go_on(tmp_path: Path) -> None:
     until(lambda: not _is_alive(pid), "the end of the process that ran it")
     (finished,) = read_rows(out)
     (tmp_path / "go").touch()
-    ended = subprocess.run([*sweep_it, "--out", str(out)], capture_output=True, text=True, timeout=PATIENCE)
+    ended = run([*sweep_it, "--out", str(out)], timeout=PATIENCE)
     assert ended.returncode == 0, ended.stderr
     assert f"any run alone: conveyor-sim sweep {study} --set rate=4.0 --seed 1" in ended.stdout
     rows = read_rows(out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,7 +29,11 @@ class OpcUaPlc:
         from asyncua import Server, ua
 
         self._server = server = Server()
-        await server.init()
+        gc.disable()  # to look through its thousands of nodes for garbage takes as long as to make them
+        try:
+            await server.init()
+        finally:
+            gc.enable()
         server.set_endpoint(f"opc.tcp://127.0.0.1:{port}")
         server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
         assert await server.register_namespace("urn:plc") == 2

@@ -8,9 +8,11 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
+import time
 
 MOST = 2  # bottles on the second zone
 SPEED = 0.5  # m/s
+PAUSE = 0.001  # s of wall time between two looks at the tick
 BOTTLES, SETPOINT = "belts/zone2/bottles", "belts/zone1/cmd_speed"
 
 
@@ -41,7 +43,7 @@ def by_modbus(host: str, port: int, scans: int | None) -> None:
             for _ in range(2):  # repeats are harmless
                 assert not client.write_registers(HANDSHAKE, target).isError()
             while now == client.convert_from_registers(client.read_input_registers(HANDSHAKE, count=2).registers, word):
-                pass
+                time.sleep(PAUSE)
             done += 1
 
 
@@ -63,7 +65,7 @@ async def by_opcua(address: str, scans: int | None) -> None:
             await setpoint.write_value(ua.Variant(answer, ua.VariantType.Double))
             await target.write_value(ua.Variant(now + 1, ua.VariantType.Int64))
             while (reached := await tick.read_value()) == now:
-                pass
+                await asyncio.sleep(PAUSE)
             now, done = reached, done + 1
 
 

@@ -62,7 +62,7 @@ def test_a_line_whose_process_dies_is_lost_and_begins_anew(page: Any, live: Live
     os.kill(live.source.pid, signal.SIGKILL)
     soon(page, lambda: clock(page) < 2.0, "it began anew")
     soon(page, lambda: page.get_attribute("body", "data-link") == "live", "it is there")
-    soon(page, lambda: int(page.get_attribute("body", "data-bottles")) > 2, "its bottles")
+    soon(page, lambda: int(page.get_attribute("body", "data-bottles") or 0) > 2, "its bottles")
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:

@@ -275,7 +275,7 @@ def test_a_recording_is_played_on_the_page(open_page: Callable[[str], Any], user
         Serving(source, [(WEB, 0)], Settings(users=users / "users")) as serving,
     ):
         page = open_page(serving.faces[0].address)
-        soon(page, lambda: int(page.get_attribute("body", "data-bottles")) > 3, "its bottles")
+        soon(page, lambda: int(page.get_attribute("body", "data-bottles") or 0) > 3, "its bottles")  # "": none yet
         page.select_option("#colour", "force")
         weak = page.inner_text("#legend")
         assert source.control("seek", 15.0, "test") == ""

@@ -83,7 +83,7 @@ def test_what_can_not_be_is_one_sentence(
     command: Callable[..., Served], broker: Mosquitto, arguments: list[str], sentence: str
 ) -> None:
     served = command(*(argument.format(url=broker.url) for argument in arguments))
-    served.process.communicate(timeout=PATIENCE)
+    served.process.wait(timeout=PATIENCE)
     (error,) = [line for line in served.told.splitlines() if line.startswith("Error: ")]
     assert served.process.returncode == 1 and sentence in error and "Traceback" not in served.told
 
@@ -94,7 +94,7 @@ def test_a_broker_that_is_not_there_is_said_before_anything_is_compiled(
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     served = command(SCENE, "--mqtt", f"mqtt://127.0.0.1:{port}")
-    served.process.communicate(timeout=PATIENCE)
+    served.process.wait(timeout=PATIENCE)
     expected = f"Error: mqtt://127.0.0.1:{port}: can't be reached (Connection refused), expected an MQTT broker"
     assert served.told.splitlines() == [expected] and served.process.returncode == 1
     assert {path.name for path in tmp_path.iterdir()} == {"log"}
