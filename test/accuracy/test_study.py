@@ -34,6 +34,7 @@ tick: 0.005
 contacts: [{between: [glass, glass], stiffness: 20000}]
 bottle_types: {jar: {radius: 0.05, mass: 0.2, material: glass}}
 floor: none
+effects: {unequal_radii: on}  # as in test_horizon.py, for the kernels
 bottles:
   - {type: jar, position: [0, 0], velocity: [0.8, 0]}
   - {type: jar, position: [0.13, 0.01]}
