@@ -124,6 +124,12 @@ class Bag(AbstractContextManager["Bag"]):
         """Log times of the first and the last message."""
         return self._source.span_ns
 
+    @cached_property
+    def next_run_ns(self) -> int | None:
+        """Log time of a second line, which begins another run, after a reset; None if there is none."""
+        lines = [log_time for _, log_time, _ in self.raw({"line"})]
+        return lines[1] if len(lines) > 1 else None
+
     def type_hash(self, topic: str) -> str:
         """RIHS01 hash of a topic's type by the definition that the bag states."""
         return self._source.type_hash(self.types[topic])

@@ -53,9 +53,7 @@ class _Messages:
         """end_ns: where the run was to end; a later message must be of the time that it states."""
         self.topic = topic
         self._end_ns = end_ns
-        # A second line begins another run, after a reset.
-        lines = [log_time for _, log_time, _ in bag.raw({"line"})]
-        end = lines[1] if len(lines) > 1 else None
+        end = bag.next_run_ns
         raw = bag.raw({topic})
         self._source: Iterator[Any] = (self._decode(bag, data) for _, time, data in raw if end is None or time < end)
         self._next = next(self._source, None)

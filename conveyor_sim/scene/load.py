@@ -67,12 +67,12 @@ def parse_scene(
     if problems:
         raise refused(problems, document, name, changes)
     # A recording keeps the text and the overrides: with the tables among them, it needs no file.
-    kept = changes if data is laid_over else {**changes, "contacts": data["contacts"]}
-    kept_text = _yaml_text(kept)
+    changes_text = _yaml_text(changes)
+    kept_text = changes_text if data is laid_over else _yaml_text({**changes, "contacts": data["contacts"]})
     if len(kept_text) > LONGEST_TEXT:
         most = in_mb(LONGEST_TEXT)
         raise SceneError(f"{name}: tables and overrides of {in_mb(len(kept_text))} as YAML, expected at most {most}")
-    scene._source = Origin(text, name, _yaml_text(changes), kept_text)
+    scene._source = Origin(text, name, changes_text, kept_text)
     return scene
 
 

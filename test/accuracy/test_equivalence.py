@@ -17,6 +17,7 @@ from conveyor_sim.errors import ConveyorError
 REFERENCE = Setting("semi_implicit_euler", 400)
 CHEAP = Setting("semi_implicit_euler", 50)
 STUDIES = 2000
+NAMES = [str(study) for study in range(STUDIES)]
 TOLERANCE = 0.05
 MEAN = 20.0
 SAMPLING = 3.0 * math.sqrt(ERROR_RATE * (1.0 - ERROR_RATE) / STUDIES)
@@ -25,8 +26,9 @@ SAMPLING = 3.0 * math.sqrt(ERROR_RATE * (1.0 - ERROR_RATE) / STUDIES)
 
 def runs(setting: Setting, values: np.ndarray) -> list[Sample]:
     """Samples from values (runs, observables)."""
-    return [Sample(setting, seed, {str(i): float(x) for i, x in enumerate(row)}, 1.0, "") for seed, row in
-            enumerate(values)]  # fmt: skip
+    return [
+        Sample(setting, seed, dict(zip(NAMES, row, strict=False)), 1.0, "") for seed, row in enumerate(values.tolist())
+    ]
 
 
 def studies(difference: float, spread: float, candidate_spread: float, seed: int) -> list[Comparison]:

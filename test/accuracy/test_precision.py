@@ -37,6 +37,8 @@ def head_on(**fields: Any) -> Scene:
         "duration": 0.1,
         "contacts": [contact(K)],
         "bottles": [bottle(0.0, 0.0, SPEED), bottle(0.13 + SPEED * 0.0313, 0.0)],
+        # As in test_horizon.py, for the kernels.
+        "effects": {"unequal_radii": "on"},
         **NO_FLOOR,
     }
     return scene(**{**parts, **fields})

@@ -17,6 +17,7 @@ from click.testing import CliRunner
 
 from conveyor_sim.accuracy.candidates import own_setting, preset_setting
 from conveyor_sim.accuracy.effort import DEFAULT, THOROUGH, Effort
+from conveyor_sim.accuracy.measure import timing
 from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.report.files import read_study
 from conveyor_sim.accuracy.report.interim import MEASURED, PREDICTED, PRELIMINARY, UNFINISHED
@@ -56,7 +57,7 @@ class Made:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+def made(tmp_path_factory: pytest.TempPathFactory, brief_costs: None) -> Made:
     """Its kernels are compiled: a child that loads them is interrupted in what it does, not in compiling."""
     it, answers = session(SCENE)
     folder = tmp_path_factory.mktemp("made")
@@ -135,7 +136,8 @@ def interrupted(folder: Path, ready: Callable[[str], bool]) -> tuple[int, list[s
     file = folder / "three.yaml"
     file.write_text(SCENE)
     answers = folder / "answers.txt"
-    code = "from conveyor_sim.cli import main; main()"
+    brief = f"from conveyor_sim.accuracy.measure import timing; timing.CHUNK = {timing.CHUNK}"
+    code = f"{brief}; from conveyor_sim.cli import main; main()"
     command = [sys.executable, "-c", code, "accuracy", str(file), "--out", str(folder / "out"), "--thorough"]
     with (
         open(answers, "w") as out,

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.accuracy.effort import Effort
+from conveyor_sim.accuracy.measure import timing
 from conveyor_sim.accuracy.measure.sample_file import SAMPLES
 from conveyor_sim.accuracy.measured import MEASURED, first_settings
 from conveyor_sim.accuracy.report.files import read_study
@@ -24,6 +25,8 @@ from conveyor_sim.accuracy.study import FIRST_RUNS, affordable, run_study, study
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import load_scene
 
+pytestmark = pytest.mark.usefixtures("brief_costs")
+
 SCENE = """\
 name: three
 duration: 0.3
@@ -31,6 +34,7 @@ tick: 0.005
 contacts: [{between: [glass, glass], stiffness: 20000}]
 bottle_types: {jar: {radius: 0.05, mass: 0.2, material: glass}}
 floor: none
+effects: {unequal_radii: on}  # as in test_horizon.py, for the kernels
 bottles:
   - {type: jar, position: [0, 0], velocity: [0.8, 0]}
   - {type: jar, position: [0.13, 0.01]}
@@ -53,8 +57,9 @@ def silent(_what: str, _counted: str) -> AbstractContextManager[Silent]:
     return nullcontext(Silent())
 
 
-def main(file: str, folder: str) -> None:
-    """What the child of the test below does."""
+def main(file: str, folder: str, chunk: float) -> None:
+    """What the child of the test below does, with costs measured as briefly as in its parent."""
+    timing.CHUNK = chunk
     run_study(load_scene(file), Path(folder), 0.01, ONE_RUN, silent)
 
 
@@ -64,12 +69,12 @@ def without_times(study: Study) -> Study:
 
 
 @pytest.fixture(scope="module")
-def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def interrupted(tmp_path_factory: pytest.TempPathFactory, brief_costs: None) -> Path:
     """The folder of a study whose process was killed in the middle of its long runs, and beside it its scene."""
     root = tmp_path_factory.mktemp("study")
     (root / "scene.yaml").write_text(SCENE)
     folder = root / "killed"
-    code = f"import test_study; test_study.main({str(root / 'scene.yaml')!r}, {str(folder)!r})"
+    code = f"import test_study; test_study.main({str(root / 'scene.yaml')!r}, {str(folder)!r}, {timing.CHUNK})"
     child = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parent)
     while child.poll() is None and not (folder / SAMPLES).exists():
         time.sleep(0.05)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from fuzz.inputs import Input, Table, commands_of, faults_of
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
-from conveyor_sim.errors import SceneError
-from conveyor_sim.scene import parse_scene
+from conveyor_sim.scene import Scene
+from conveyor_sim.scene.checks import problems_of
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,10 @@ def commands(draw: st.DrawFn, scene: dict[str, Any], ticks: int) -> list[Command
 
 def _tables(scene: dict[str, Any]) -> tuple[Table, Table]:
     try:
-        parsed = parse_scene(json.dumps({**scene, "effects": {}}))
-    except SceneError:
+        checked = Scene.model_validate({**scene, "effects": {}})
+    except ValidationError:
         return {}, {}
-    return commands_of(parsed), faults_of(parsed)
+    return ({}, {}) if problems_of(checked) else (commands_of(checked), faults_of(checked))
 
 
 def _tick(command: Command) -> int:
