@@ -1,37 +1,29 @@
 """Processes of this package that cost no imports: each is forked from one that has made them already.
 
-To import the package is more than half of what a short process costs. These are children of the process that asks,
-with arguments, environment, folder, files and an end of their own, as if it had started Python for them. Only what is
-read while modules are imported, such as NUMBA_CACHE_DIR, is that of the process that was there before: start those that
-need another one with `subprocess`.
+To import the package is more than half of what a short process costs. Only what is read while modules are imported,
+such as NUMBA_CACHE_DIR, is that of the process that was there before: start those that need another with `subprocess`.
 """
 
 from __future__ import annotations
 
-import ctypes
-import importlib
-import json
+import atexit
+import multiprocessing
 import os
 import runpy
-import select
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
-import types
+import threading
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from functools import cache
+from multiprocessing.reduction import DupFd
 from pathlib import Path
 from typing import IO, Any
 
-from conveyor_sim.support.garbage import collected_later
-
-LARGEST = 2**17  # bytes of a request
-SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER
+FORKED = multiprocessing.get_context("forkserver")
 # Nothing of ROS: threads start while it is imported, and what is forked from a process with threads does not end well.
-IMPORTED = (
+# What is not installed is left out, and its tests are skipped.
+FORKED.set_forkserver_preload([
     "conveyor_sim.cli",
     "conveyor_sim.bag.replay",
     "conveyor_sim.control.load",
@@ -46,11 +38,7 @@ IMPORTED = (
     "conveyor_sim.scada.scene_source",
     "conveyor_sim.scada.serving",
     "conveyor_sim.scada.web.server",
-    "conveyor_sim.studies.runs",
-    "dask.__main__",
-    "distributed.cli.dask_scheduler",
-    "distributed.cli.dask_worker",
-)
+])  # fmt: skip
 
 
 class Warm:
@@ -65,37 +53,32 @@ class Warm:
         env: Mapping[str, str] | None = None,
     ) -> None:
         """`python <arguments>`, which begin with -m or -c; it reads nothing, and has a session of its own."""
-        self.returncode: int | None = None
-        request = {"arguments": [*arguments], "cwd": str(cwd or Path.cwd()), "env": {**(env or os.environ)}}
-        self.pid = _ask(json.dumps(request).encode(), [stdout.fileno(), stderr.fileno()])
-        self._end = os.pidfd_open(self.pid)
+        given = [*arguments], stdout, stderr, cwd or Path.cwd(), {**(env or os.environ)}
+        self._process = FORKED.Process(target=_Become(*given))
+        self._process.start()
+        self.pid: int = self._process.pid or 0
 
-    def __del__(self) -> None:
-        with suppress(AttributeError):
-            os.close(self._end)
+    @property
+    def returncode(self) -> int | None:
+        return self._process.exitcode
 
     def poll(self) -> int | None:
         """Its exit code; None while it runs."""
-        return self._wait(0.0)
+        return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
         """Its exit code. Raises subprocess.TimeoutExpired."""
-        code = self._wait(timeout)
-        if code is None:
+        self._process.join(timeout)
+        if self.returncode is None:
             raise subprocess.TimeoutExpired(str(self.pid), timeout or 0.0)
-        return code
+        return self.returncode
 
     def send_signal(self, number: int) -> None:
-        if self.poll() is None:
+        if self.returncode is None:
             os.kill(self.pid, number)
 
     def kill(self) -> None:
-        self.send_signal(signal.SIGKILL)
-
-    def _wait(self, timeout: float | None) -> int | None:
-        if self.returncode is None and select.select([self._end], [], [], timeout)[0]:
-            self.returncode = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
-        return self.returncode
+        self._process.kill()
 
 
 def run(arguments: Sequence[str], env: Mapping[str, str] | None = None, timeout: float = 120.0) -> Any:
@@ -111,87 +94,41 @@ def run(arguments: Sequence[str], env: Mapping[str, str] | None = None, timeout:
         return subprocess.CompletedProcess(arguments, code, out.read(), errors.read())
 
 
-def _ask(request: bytes, files: list[int]) -> int:
-    """Have one forked; its process id."""
-    control = _first()
-    prctl = ctypes.CDLL(None).prctl
-    prctl(SUBREAPER, 1, 0, 0, 0)  # whose parent ends meanwhile becomes a child of this process
-    try:
-        socket.send_fds(control, [request], files)
-        pid, _ = control.recv(20), control.recv(20)
-    finally:
-        prctl(SUBREAPER, 0, 0, 0, 0)
-    return int(pid)
+class _Become:
+    """What such a process does."""
+
+    def __init__(self, arguments: list[str], out: IO[Any], errors: IO[Any], cwd: Path, env: dict[str, str]) -> None:
+        self._given = arguments, cwd, env
+        self._files = out, errors
+
+    def __getstate__(self) -> Any:
+        return self._given, [DupFd(file.fileno()) for file in self._files]
+
+    def __setstate__(self, state: Any) -> None:
+        self._given, self._files = state
+
+    def __call__(self) -> None:
+        option, what, *arguments = self._given[0]
+        os.setsid()
+        for number, file in enumerate(self._files, start=1):
+            os.dup2(file.detach(), number)
+        threading.Thread(target=_end_with_parent, daemon=True).start()
+        os.chdir(self._given[1])
+        os.environ.clear()
+        os.environ.update(self._given[2])
+        sys.path[0] = ""
+        sys.argv[:] = [option, *arguments]
+        try:
+            if option == "-m":
+                runpy.run_module(what, run_name="__main__", alter_sys=True)
+            else:
+                exec(compile(what, "<string>", "exec"), {"__name__": "__main__"})
+        finally:
+            atexit._run_exitfuncs()
 
 
-@cache
-def _first() -> socket.socket:
-    """The process from which they are forked; it ends with this one, and interrupts what still runs then."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with theirs:
-        subprocess.Popen(
-            [sys.executable, __file__, str(theirs.fileno())],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # which it would start at once
-            pass_fds=[theirs.fileno()],
-            start_new_session=True,
-        )
-    return ours
-
-
-def _fork_on_request(control: socket.socket) -> dict[str, Any] | None:
-    """In each process that is forked, what it was asked for; in this one None, when nobody can ask any more."""
-    running: list[int] = []
-    while True:
-        request, files, _, _ = socket.recv_fds(control, LARGEST, 2)
-        if not request:
-            for process in running:
-                with suppress(ProcessLookupError):
-                    signal.pidfd_send_signal(process, signal.SIGINT)
-            return None
-        read, write = os.pipe()
-        between = os.fork()
-        if not between:
-            if os.fork():
-                os._exit(0)
-            os.setsid()
-            os.write(write, str(os.getpid()).encode())
-            for number, file in enumerate(files, start=1):
-                os.dup2(file, number)
-            for file in (*files, *running, read, write):
-                os.close(file)
-            control.close()
-            return dict(json.loads(request))
-        pid = int(os.read(read, 20))
-        running.append(os.pidfd_open(pid))
-        os.waitpid(between, 0)
-        for file in (*files, read, write):
-            os.close(file)
-        control.send(str(pid).encode())
-        control.send(b"has another parent")
-
-
-def _become(request: Mapping[str, Any]) -> None:
-    """What was asked for. It ends this process as it would end any Python, with all that it raises."""
-    os.chdir(request["cwd"])
-    os.environ.clear()
-    os.environ.update(request["env"])
-    option, what, *arguments = request["arguments"]
-    sys.path[0] = ""
-    sys.argv[:] = [option, *arguments]
-    if option == "-m":
-        runpy.run_module(what, run_name="__main__", alter_sys=True)
-    else:
-        main = sys.modules["__main__"] = types.ModuleType("__main__")
-        exec(compile(what, "<string>", "exec"), main.__dict__)
-
-
-if __name__ == "__main__":
-    with collected_later():
-        for name in IMPORTED:
-            with suppress(ImportError):  # of what is not installed: its tests are skipped
-                importlib.import_module(name)
-    asked_for = _fork_on_request(socket.socket(fileno=int(sys.argv[1])))
-    if asked_for is not None:
-        _become(asked_for)
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.kill(os.getpid(), signal.SIGINT)
