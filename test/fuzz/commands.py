@@ -6,12 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from fuzz.checked import checked
 from fuzz.inputs import Input, Table, commands_of, faults_of
 from hypothesis import strategies as st
-from pydantic import ValidationError
-
-from conveyor_sim.scene import Scene
-from conveyor_sim.scene.checks import problems_of
 
 
 @dataclass(frozen=True)
@@ -33,11 +30,8 @@ def commands(draw: st.DrawFn, scene: dict[str, Any], ticks: int) -> list[Command
 
 
 def _tables(scene: dict[str, Any]) -> tuple[Table, Table]:
-    try:
-        checked = Scene.model_validate({**scene, "effects": {}})
-    except ValidationError:
-        return {}, {}
-    return ({}, {}) if problems_of(checked) else (commands_of(checked), faults_of(checked))
+    known = checked(scene)
+    return ({}, {}) if known is None else (commands_of(known), faults_of(known))
 
 
 def _tick(command: Command) -> int:

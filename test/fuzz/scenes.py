@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
 import numpy as np
+from fuzz.checked import checked
 from fuzz.devices import drives, machines, movers, sensors
 from fuzz.draws import Data, between, fractions, scaled, signed
 from fuzz.families import Family
 from hypothesis import strategies as st
 
-from conveyor_sim.errors import SceneError
-from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.geometry import rail_shapes
 from conveyor_sim.scene.moving import moving_shapes
 
@@ -286,13 +284,10 @@ class _Clear:
 
     def __init__(self, data: Data, frame: _Frame) -> None:
         self._taken: list[tuple[float, float, float]] = []
-        try:
-            scene = parse_scene(json.dumps({**data, "effects": {}}))
-        except SceneError:
-            self._pieces = []
-        else:
+        scene, rails = checked(data), []
+        if scene is not None:
             rails = [*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))]
-            self._pieces = [piece for rail in rails for piece in rail.pieces]
+        self._pieces = [piece for rail in rails for piece in rail.pieces]
 
     def of_rails(self, points: Any, radius: float) -> bool:
         """Whether bottles of a radius (m) at points touch no rail."""

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from fuzz.device_invariants import DeviceWatch
 from fuzz.play import check_sentence
 from fuzz.violation import Violation
@@ -28,6 +29,8 @@ from conveyor_sim.line.inputs import WRITER_KINDS, CommandOutcome, Input
 from conveyor_sim.line.packml import COMMAND_TEXTS, MODE_STATES, Command, State
 from conveyor_sim.line.stop_reason import BY_HAND, COMMANDED, WORKING
 from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.observe.counters import CounterColumns
+from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.simulation import Simulation
 
@@ -250,10 +253,13 @@ def _state(sim: Simulation) -> str:
     image, line = sim.line.signals(), sim.line
     read = image.values.tobytes().hex(), image.truth.tobytes().hex()
     alarms = [(alarm.id, alarm.state, alarm.shelved) for alarm in line.alarms]
-    counters = repr(line.counters())
-    return repr(
-        (sim.state_hash(), read, alarms, counters, line.read_back.columns(), line.modes.modes, line.modes.owner)
-    )
+    counters, read_back = _exact(line.counters()), _exact(line.read_back.columns())
+    return repr((sim.state_hash(), read, alarms, counters, read_back, line.modes.modes, line.modes.owner))
+
+
+def _exact(columns: CounterColumns | ReadBackColumns) -> list[Any]:
+    """All columns with every digit, and none left out: NumPy's own words of an array are short, and slow to make."""
+    return [value.tolist() if isinstance(value, np.ndarray) else value for value in vars(columns).values()]
 
 
 class Watch:
