@@ -121,7 +121,9 @@ class LineClient:
 
     def compiling(self) -> str:
         """What keeps the run from starting, "" once it has started."""
-        response = self.call(srv.GetSimulationState, "get_simulation_state")
+        client = self.client(srv.GetSimulationState, "get_simulation_state")
+        # A node that has not yet found the client whose question it hears loses the answer; ROS has it so.
+        response = until(lambda: client.call(srv.GetSimulationState.Request(), timeout_sec=5.0), "an answer")
         return "" if response.state.state != SimulationState.STATE_STOPPED else str(response.result.error_message)
 
     def lockstep(self, target: int, run_id: str = "test", **fields: Any) -> Any:

@@ -14,6 +14,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "print('began', flush=True); import sys; from conveyor_sim.cli import main; sys.exit(main())"
 """As the console script has it."""
+READING = f"""
+import os, signal, click
+read = click.Command.parse_args
+click.Command.parse_args = lambda *given: (os.kill(os.getpid(), signal.SIGINT), read(*given))[1]
+{MAIN}
+"""
 FUZZ = "print('began', flush=True); import runpy; runpy.run_module('fuzz', run_name='__main__')"
 
 SWALLOWED = """
@@ -73,6 +79,11 @@ def test_a_command_ends_with_one_line(arguments: list[str], after: float) -> Non
     assert "Error: /proc/no_such_folder" in said or (status, said.splitlines()[-1]) == (130, "interrupted")
     assert "Traceback" not in said
     assert "Aborted" not in said
+
+
+def test_a_command_that_is_reading_its_arguments_ends_with_one_line() -> None:
+    done = subprocess.run([sys.executable, "-c", READING, "check", "glass_line"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "began\n", "interrupted\n")
 
 
 def test_a_run_whose_pictures_are_being_drawn_ends_with_one_line_and_nothing_half_written(tmp_path: Path) -> None:
