@@ -127,19 +127,24 @@ class Host:
         self._client = Client(CallbackAPIVersion.VERSION2)
         self._client.on_message = self._on_message
         self._client.on_connect = lambda client, *_: client.subscribe(f"spBv1.0/{group}/+/{node}/#", 1)
-        self._subscribed = False
+        self.subscribed = False
         self._client.on_subscribe = self._on_subscribe
+        self._client.on_disconnect = self._on_disconnect
         self._client.reconnect_delay_set(1, 1)
         self._client.connect("127.0.0.1", port)
         self._client.loop_start()
-        until(lambda: self._subscribed, "a subscription")
+        until(lambda: self.subscribed, "a subscription")
 
     def close(self) -> None:
         self._client.disconnect()
         self._client.loop_stop()
 
     def _on_subscribe(self, *_: Any) -> None:
-        self._subscribed = True
+        self.subscribed = True
+
+    def _on_disconnect(self, *_: Any) -> None:
+        self.subscribed = False
+        self._next = None  # what was said meanwhile is not known
 
     def _on_message(self, client: Client, userdata: Any, message: MQTTMessage) -> None:
         if message.topic.split("/")[2] in ("NCMD", "DCMD"):

@@ -205,7 +205,9 @@ def test_everything_comes_back_when_the_broker_does(line: Line) -> None:
         line.simulation.advance()
         line.source.after_tick()
     line.broker.start()
-    line.until(lambda: line.host.last("NBIRTH").value("bdSeq") >= 1, "births")
+    line.until(lambda: line.host.subscribed and line.node.status().state == "connected", "both")
+    line.host.rebirth()  # as a host does that was away: the line may have been there first
+    line.until(lambda: line.host.last("NBIRTH").value("bdSeq") >= 1 and line.host.alive["line"], "births")
     line.advance()
     assert line.host.values[SETPOINT] == line.source.shown.values[SETPOINT]
     assert line.node.status().state == "connected"
