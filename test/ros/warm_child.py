@@ -12,7 +12,7 @@ from conveyor_sim.support.child_process import Process
 
 
 class WarmProcess(Process):
-    """Python with arguments. It has no lifeline: what it was forked from watches over it."""
+    """Python with arguments. It needs no lifeline: it interrupts itself when the process of the tests ends."""
 
     def __init__(self, name: str, arguments: Sequence[str], environment: Mapping[str, str], log_folder: Path) -> None:
         self.name = name
