@@ -90,7 +90,8 @@ def test_run_draws_nothing_where_that_is_asked_for(command: Command, tmp_path: P
 
 
 def test_run_with_nothing_to_draw_is_a_good_run(command: Command, tmp_path: Path) -> None:
-    (tmp_path / "quiet.yaml").write_text(SMALL_LINE.read_text().replace("{bottles: 50,", "{bottles: 0,"))
+    text = SMALL_LINE.read_text().replace("{bottles: 50,", "{bottles: 0,")
+    (tmp_path / "quiet.yaml").write_text(text + "effects: {peaks: on}\n")  # the kernels of the others
     result = command("run", "quiet.yaml", "--out", "bag", "--duration", "0.1")
     assert result.exit_code == 0, result.output
     assert "no pictures: " in result.output
