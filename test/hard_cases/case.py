@@ -87,9 +87,14 @@ class Case:
         return self.short if short and self.short is not None else self.duration
 
     def scene(
-        self, integrator: str = "leapfrog", preset: str = "standard", variant: str = "", short: bool = True
+        self,
+        integrator: str = "leapfrog",
+        preset: str = "standard",
+        variant: str = "",
+        short: bool = True,
+        ledger: bool = True,
     ) -> Scene:
-        """The scene as it is run. Raises SceneError where it is refused."""
+        """The scene as it is run, with a ledger or as it is without. Raises SceneError where it is refused."""
         variant = variant or self.variants[0]
         given = dict(self.given)
         tick = given.get("tick", 0.01)
@@ -99,13 +104,11 @@ class Case:
         common: dict[str, Any] = {
             "duration": self.seconds(short),
             "accuracy": accuracy,
-            "outputs": {**dict.fromkeys(Scene.TOPICS, 0), "ledger": 1.0 / tick},
+            "outputs": {**dict.fromkeys(Scene.TOPICS, 0), "ledger": ledger / tick},
             "effects": {"peaks": "on"},
         }
         if "file" in given:
-            # Without a ledger, which no row of a file looks at, it has the kernels of the scene as it is shipped.
-            quiet = {**common["outputs"], "ledger": 0}
-            whole = {**common, "outputs": quiet, "accuracy": {**accuracy, "per_tick": None, "dt": None}}
+            whole = {**common, "accuracy": {**accuracy, "per_tick": None, "dt": None}}
             return load_scene(ROOT / given["file"], whole)
         fields = {"name": self.name, **common, **given, "accuracy": accuracy}
         fields["effects"] = {**common["effects"], "rotation": "on", "unequal_radii": "on", **given.get("effects", {})}
