@@ -35,15 +35,7 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture(scope="module")
-def period() -> float | None:
-    """Of a node's diagnostics, s; None: as it is. A module that waits for them again and again has a short one."""
-    return None
-
-
-@pytest.fixture(scope="module")
-def start_node(
-    client: LineClient, period: float | None, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Callable[..., Child]]:
+def start_node(client: LineClient, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Child]]:
     """Starts `sim_node` with ROS parameters: unless they say else on the small line, paused, as fast as possible.
 
     Returns when its run has started, however long its kernels take to compile. One at a time: the one before must have
@@ -56,7 +48,7 @@ def start_node(
         until(lambda: not client.node.count_services("lockstep"), "the end of the node before")
         given = {"scene": SMALL_LINE, "start_paused": True, "real_time_factor": 0.0, **parameters}
         logs = tmp_path_factory.mktemp("logs")
-        child = WarmChild("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs, period)
+        child = WarmChild("sim_node", given, {**os.environ, "ROS_LOG_DIR": str(logs / "ros")}, logs)
         children.append(child)
         while child.exit_code is None and client.compiling():
             time.sleep(0.05)

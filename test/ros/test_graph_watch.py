@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
@@ -15,7 +14,7 @@ from rclpy.parameter import Parameter
 from ros.conftest import SMALL_LINE
 from ros.line_client import LineClient, until
 from ros.recording import record
-from ros.warm_child import WarmProcess, telling
+from ros.warm_child import WarmProcess
 from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.ros.child import Child
@@ -27,20 +26,12 @@ JUMPS = "time jumps for every node with use_sim_time; remap /clock, or publish_c
 NOT_ALONE = "not alone in this ROS domain"
 
 
-PERIOD = 0.1  # s, of diagnostics
-
-
-@pytest.fixture(scope="module")
-def period() -> float:
-    return PERIOD
-
-
 @contextmanager
 def sim_node(folder: Path, name: str, *ros_arguments: str) -> Iterator[Process]:
     """A node on the small line, paused."""
     arguments = ["-m", "conveyor_sim.ros.sim_node", "--ros-args", *ros_arguments]
     arguments += ["-p", f"scene:={SMALL_LINE}", "-p", "start_paused:=true"]
-    process = WarmProcess(name, telling(PERIOD, arguments), {**os.environ, "ROS_LOG_DIR": str(folder / "ros")}, folder)
+    process = WarmProcess(name, arguments, {**os.environ, "ROS_LOG_DIR": str(folder / "ros")}, folder)
     try:
         yield process
     finally:
