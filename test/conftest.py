@@ -1,5 +1,6 @@
-"""Which tests belong to `-m quick`, the inner loop: about a minute once the kernels are in the cache."""
+"""Which tests belong to `-m quick`, and in which order several processes take the files of tests."""
 
+from hashlib import blake2b
 from pathlib import Path
 
 import pytest
@@ -8,9 +9,26 @@ HERE = Path(__file__).parent
 QUICK = frozenset({"control", "effects", "laws", "model", "scene", "state", "support", "timestep"})
 """Folders. The others start nodes and processes, take whole lines through minutes, or draw."""
 
+LONGEST = (
+    "hard_cases/test_hard_cases.py", "fuzz/test_fuzz.py", "ros/test_floods.py", "engine/test_riding.py",
+    "testing/test_plc_server.py", "state/test_checkpoint.py", "view/test_live.py", "timestep/test_prediction.py",
+    "test_shipped_scenes.py", "bag/test_replay.py", "view/test_page.py", "test_simulation.py",
+)  # fmt: skip
+"""Files that take 35 s and more where three processes share two cores, the longest first."""
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark them."""
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the quick ones; in processes side by side, put files that take long first."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: _turn(item.path))
     for item in items:
         if item.path.is_relative_to(HERE) and item.path.relative_to(HERE).parts[0] in QUICK:
             item.add_marker(pytest.mark.quick)
+
+
+def _turn(file: Path) -> tuple[int, bytes]:
+    """The longest first, for nobody is to be left with one at the end. The others as chance has it: files that lie side
+    by side wait for the same things, or want the same kernels compiled.
+    """
+    name = file.relative_to(HERE).as_posix() if file.is_relative_to(HERE) else file.name
+    return LONGEST.index(name) if name in LONGEST else len(LONGEST), blake2b(name.encode()).digest()

@@ -129,6 +129,27 @@ def with_bends(fields: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+_SPRUNG: dict[str, Any] = {
+    "damping": ("normal", 1.0), "friction": 0.2, "tangential": {"stiffness": 2000.0, "damping": 0.5},
+}  # fmt: skip
+_HEIGHTS = {"contact_height": 0.1, "gravity_height": 0.08}
+SPRINGS_AND_RINGS: dict[str, Any] = {
+    "bottle_types": {
+        "bottle": kind(base_radius=0.04, **_HEIGHTS), "slim": kind(0.06, 0.15, base_radius=0.03, **_HEIGHTS),
+    },
+    "contacts": [contact(5000.0, **_SPRUNG), contact(8000.0, "steel", **_SPRUNG)],
+    "gates": {
+        "spare": {"kind": "slide", "from": [9.0, 7.0], "to": [9.0, 7.2], "direction": "90 deg", "stroke": 0.1,
+                  "max_speed": 1.0, "acceleration": 10.0, "material": "steel"},
+    },
+    "outputs": {**NO_OUTPUTS, "damage": 100},
+}  # fmt: skip
+"""Fields of a scene with COMMON and bends, with what else can be: springs, rings, damage, a gate out of the way.
+
+Tests of many effects share the kernels: with all of them a step takes longest to compile.
+"""
+
+
 def segment(start: tuple[float, float], end: tuple[float, float]) -> dict[str, Any]:
     """A straight rail of steel."""
     return {"kind": "segment", "from": start, "to": end, "material": "steel"}

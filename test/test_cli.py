@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from bag.small_line import SMALL_LINE, record
 from click.testing import CliRunner, Result
+from warm import run
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.cli import main
@@ -90,7 +91,8 @@ def test_run_draws_nothing_where_that_is_asked_for(command: Command, tmp_path: P
 
 
 def test_run_with_nothing_to_draw_is_a_good_run(command: Command, tmp_path: Path) -> None:
-    (tmp_path / "quiet.yaml").write_text(SMALL_LINE.read_text().replace("{bottles: 50,", "{bottles: 0,"))
+    text = SMALL_LINE.read_text().replace("{bottles: 50,", "{bottles: 0,")
+    (tmp_path / "quiet.yaml").write_text(text + "effects: {peaks: on}\n")  # the kernels of the others
     result = command("run", "quiet.yaml", "--out", "bag", "--duration", "0.1")
     assert result.exit_code == 0, result.output
     assert "no pictures: " in result.output
@@ -160,9 +162,7 @@ def test_replay_refuses_options_that_cannot_be(command: Command, arguments: tupl
 
 def test_replay_over_ros_says_what_it_lacks() -> None:
     without_ros = "import sys; sys.modules['rclpy'] = None; from conveyor_sim.cli import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", without_ros, "replay", "bag", "--publish"], capture_output=True, text=True, check=False
-    )
+    done = run(["-c", without_ros, "replay", "bag", "--publish"])
     assert done.returncode == 1
     assert re.search("^Error: replay --publish: .*rclpy.*, expected ROS 2 with rclpy and conveyor_msgs", done.stderr)
     assert "Traceback" not in done.stderr

@@ -81,10 +81,12 @@ class Warm:
         self._process.kill()
 
 
-def run(arguments: Sequence[str], env: Mapping[str, str] | None = None, timeout: float = 120.0) -> Any:
+def run(
+    arguments: Sequence[str], env: Mapping[str, str] | None = None, timeout: float = 120.0, cwd: Path | None = None
+) -> Any:
     """One from its beginning to its end, as `subprocess.run` has it."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
-        process = Warm(arguments, out, errors, env=env)
+        process = Warm(arguments, out, errors, cwd, env)
         try:
             code = process.wait(timeout)
         finally:

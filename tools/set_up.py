@@ -174,11 +174,12 @@ def set_up(distro: str, tools: str) -> None:
     environment = Environment(distro)
     requirements = ROOT / "requirements"
     build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
-    lists = ("run", "plot", "accuracy", "pytest")
+    lists = ("plot", "accuracy", "pytest")
     described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/version.py")
-    packages = key(*build, *(ROOT / name for name in described))
+    ros = key(*build, requirements / "run.txt")
+    packages = key(ros, *(ROOT / name for name in described))
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
-    needed = {"packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
+    needed = {"ros": ros, "packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
     if tools:
         needed[tools] = key(requirements / f"{tools}.txt", *(requirements / f"{name}.txt" for name in EXTRAS))
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
@@ -188,25 +189,32 @@ def set_up(distro: str, tools: str) -> None:
     check_compiler()
     if not environment.state:
         environment.create()
-    if environment.state.get("packages") != packages:
-        say(f"ROS 2 {distro.capitalize()} and Python packages: about 1 GB on disk, one to three minutes ...")
-        environment.pip_install(
-            ["-r", requirements / f"ros-{distro}.txt", "-e", f"{ROOT}[plot,accuracy,test]"],
-            "installing ROS 2 and Python packages",
-        )
-        environment.write_state(packages=packages)
-    if environment.state.get("index") != needed["index"]:
-        environment.forget("index")
-        environment.register()
-        environment.write_state(index=needed["index"])
+
+    def missing(stage: str) -> bool:
+        return environment.state.get(stage) != needed[stage]
+
+    if missing("ros"):
+        say(f"ROS 2 {distro.capitalize()} and what the simulation runs with: about 1 GB on disk, a minute or two ...")
+        # Together: numba allows fewer versions of NumPy than ROS does.
+        wanted = [requirements / f"ros-{distro}.txt", requirements / "run.txt"]
+        environment.pip_install(["-r", wanted[0], "-r", wanted[1]], "installing ROS 2 and Python packages")
+        environment.write_state(ros=ros)
     # The compiler and pip wait for different things.
     with ThreadPoolExecutor(1) as beside:
         built = None
-        if environment.state.get("messages") != messages:
+        if missing("messages"):
             say("conveyor_msgs from msg_defs/: about a minute ...")
             environment.forget("messages")
             built = beside.submit(environment.build_messages)
-        if tools and environment.state.get(tools) != needed[tools]:
+        if missing("packages"):
+            say("this package, and what it draws and tests with ...")
+            environment.pip_install(["-e", f"{ROOT}[plot,accuracy,test]"], "installing this package")
+            environment.write_state(packages=packages)
+        if missing("index"):
+            environment.forget("index")
+            environment.register()
+            environment.write_state(index=needed["index"])
+        if tools and missing(tools):
             say(f"{TOOLS[tools]} ...")
             environment.pip_install(["-r", requirements / f"{tools}.txt"], f"installing {TOOLS[tools]}")
             environment.write_state(**{tools: needed[tools]})

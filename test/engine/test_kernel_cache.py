@@ -44,7 +44,7 @@ def counts(function: Any) -> tuple[int, int]:
 def file(tmp_path: Path) -> Path:
     """The kernel's file."""
     assert counts(compiled(tmp_path)) == (0, 1)
-    (found,) = tmp_path.iterdir()
+    (found,) = tmp_path.glob("*.kernel")
     assert counts(compiled(tmp_path)) == (1, 0)
     return found
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import RADIUS, base, belt, bottle, contact, kind, scene, segment
+from scenes import COMMON, RADIUS, base, belt, bottle, contact, kind, scene, segment, with_bends
 
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.compiler.compile import kernel
@@ -35,7 +35,8 @@ TABLE = {"kind": "curved", "centre": [0.0, 5.0], "inner_radius": 0.5, "width": 2
 def plant(*bottles: dict[str, Any], **more: Any) -> Scene:
     """A belt with the dozen and one behind it; a rail, a gate that is open, a source and a sink out of their way.
 
-    All have one of everything, and all that can be added up in every step, so that few kernels are compiled.
+    All have one of everything, and all that can be added up in every step: as SPRINGS_AND_RINGS, whose kernels they
+    have.
     """
     steel = {"material": "steel", "max_speed": 1.0, "acceleration": 10.0}
     given: dict[str, Any] = {
@@ -62,8 +63,9 @@ def plant(*bottles: dict[str, Any], **more: Any) -> Scene:
         "bottles": [ROW, *bottles],
         "outputs": {"ledger": 100, "damage": 100, "bottles": 50},
         "limits": {"tipping": 0.5},
+        "effects": COMMON,
     }  # fmt: skip
-    return scene(**{**given, **more})
+    return scene(**with_bends({**given, **more}))
 
 
 def stepped(given: Scene, **more: Any) -> Simulation:

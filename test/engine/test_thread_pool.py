@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import COMMON, base, belt, contact, kind, polyline, scene, with_bends
+from scenes import COMMON, SPRINGS_AND_RINGS, base, belt, contact, kind, polyline, scene, with_bends
 
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.engine.threads.workers import BLOCK
@@ -51,13 +51,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
         "base": [{**base(0.4)[0], "tangential": {"stiffness": 2000.0, "damping": 20.0}}],
         "accuracy": {"per_tick": 50, "integrator": "velocity_verlet"},
     },
-    "springs and rings": {
-        "bottle_types": {"bottle": kind(base_radius=0.04), "slim": kind(0.06, 0.15, base_radius=0.03)},
-        "contacts": [
-            contact(5000.0, friction=0.2, tangential={"stiffness": 2000.0, "damping": 0.5}),
-            contact(8000.0, "steel", friction=0.2, tangential={"stiffness": 2000.0, "damping": 0.5}),
-        ],
-    },
+    "springs and rings": SPRINGS_AND_RINGS,
 }
 
 

@@ -87,9 +87,14 @@ class Case:
         return self.short if short and self.short is not None else self.duration
 
     def scene(
-        self, integrator: str = "leapfrog", preset: str = "standard", variant: str = "", short: bool = True
+        self,
+        integrator: str = "leapfrog",
+        preset: str = "standard",
+        variant: str = "",
+        short: bool = True,
+        ledger: bool = True,
     ) -> Scene:
-        """The scene as it is run. Raises SceneError where it is refused."""
+        """The scene as it is run, with a ledger or as it is without. Raises SceneError where it is refused."""
         variant = variant or self.variants[0]
         given = dict(self.given)
         tick = given.get("tick", 0.01)
@@ -99,7 +104,7 @@ class Case:
         common: dict[str, Any] = {
             "duration": self.seconds(short),
             "accuracy": accuracy,
-            "outputs": {**dict.fromkeys(Scene.TOPICS, 0), "ledger": 1.0 / tick},
+            "outputs": {**dict.fromkeys(Scene.TOPICS, 0), "ledger": ledger / tick},
             "effects": {"peaks": "on"},
         }
         if "file" in given:

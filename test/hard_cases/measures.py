@@ -296,10 +296,9 @@ def crossing(one: F8, other: F8, starts: F8, ends: F8) -> NDArray[np.bool_]:
     """Whether the straight way between points (n, 2) and (n, 2) crosses any of m segments; (n,)."""
 
     def turn(a: F8, b: F8, c: F8) -> F8:
-        (dx, dy), (ex, ey) = np.moveaxis(b - a, -1, 0), np.moveaxis(c - a, -1, 0)
-        return np.asarray(dx * ey - dy * ex)
+        return np.asarray((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
-    p, q, a, b = one[:, None], other[:, None], starts[None], ends[None]
+    p, q, a, b = one.T[:, :, None], other.T[:, :, None], starts.T, ends.T
     apart = turn(p, q, a) * turn(p, q, b) < 0.0
     return np.asarray((apart & (turn(a, b, p) * turn(a, b, q) < 0.0)).any(axis=1))
 
@@ -316,7 +315,8 @@ def chatter(simulation: Simulation) -> float:
     supply = {name: "off" for name, there in (("infeed", scene.infeeds), ("outfeed", scene.outfeeds)) if there}
     setting = Setting(simulation.model.integrator, 1, error=scene.accuracy.error)
     # The same effects as those of the run, whose kernels are compiled.
-    probe = variant(scene, setting, tick=step, duration=step, effects=supply, outputs={"ledger": 1.0 / step})
+    outputs = {} if simulation.ledger() is None else {"ledger": 1.0 / step}
+    probe = variant(scene, setting, tick=step, duration=step, effects=supply, outputs=outputs)
     probe.restore_from(simulation)
     radius = simulation.model.type_radius[simulation.bottles().type]
     meter = ChatterMeter()

@@ -255,7 +255,7 @@ def test_belts_that_a_ring_straddles_do_their_own_work_each() -> None:
 
 def test_a_spring_that_holds_has_stored_its_force_squared() -> None:
     """At rest under P sin phi along and P cos phi across: F^2 / (2 k) in each spring."""
-    sim = leaning("rail", 0.8, **SPRING, **ON)
+    sim = leaning("rail", 0.8, **SPRING)
     sim.advance(100)
     phi = math.atan(0.8 * 0.3)
     ledger = ledger_of(sim)

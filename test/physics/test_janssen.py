@@ -37,7 +37,8 @@ def queue(
         accuracy={"per_tick": 200},
         gravity=G,
         slip_limit=SLIP_LIMIT,
-        effects={"rotation": rotation},
+        # Where they turn they have a ledger as well, and with it the kernels of test_tangential_spring.
+        effects={"rotation": rotation, "energy_ledger": rotation},
         contacts=[
             contact(STIFFNESS, damping=DAMPING, **between),
             contact(STIFFNESS, "steel", DAMPING, MU, **tangential),

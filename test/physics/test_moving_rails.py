@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, scene, segment
+from scenes import COMMON, MASS, RADIUS, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.simulation import Simulation
@@ -33,7 +33,8 @@ def plant(*bottles: dict[str, Any], **fields: Any) -> Simulation:
     given: dict[str, Any] = {
         "tick": 0.01,
         "accuracy": {"per_tick": 100},
-        "effects": {"energy_ledger": "on"},
+        # Those of the fuzzed lines whose rails move, for their kernels.
+        "effects": COMMON,
         "contacts": [
             contact(5e3, damping=("normal", 2.0), friction=0.1),
             contact(8e3, "steel", ("normal", 2.0), 0.2),

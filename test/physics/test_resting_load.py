@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import COMMON, PEAKS, base, belt, bottle, contact, kind, scene, segment
+from scenes import COMMON, base, belt, bottle, contact, kind, scene, segment, with_bends
 
+from conveyor_sim.model import build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
@@ -122,8 +123,8 @@ QUEUE = 6
 """Bottles in single file against a stop, half of them on each belt."""
 
 
-def across_a_joint(**accuracy: Any) -> Scene:
-    """A queue that stands on two belts of different speed and friction, before a stop, without friction in contacts."""
+def across_a_joint(**accuracy: Any) -> dict[str, Any]:
+    """Fields of a scene: a queue on two belts of different speed and friction, before a stop; contacts are smooth."""
     length = 2.0 * RADIUS * QUEUE
     belts = {
         f"belt_{number}": {
@@ -133,21 +134,22 @@ def across_a_joint(**accuracy: Any) -> Scene:
         for number, (speed, _) in enumerate(JOINT)
     }  # fmt: skip
     end = 0.5 * length
-    return scene(
-        tick=0.01,
-        duration=3.0,
-        gravity=G,
-        slip_limit=0.01,
-        accuracy=accuracy,
+    drags = [{"between": ["glass", f"chain_{number}"], "friction": mu} for number, (_, mu) in enumerate(JOINT)]
+    return {
+        "tick": 0.01,
+        "duration": 3.0,
+        "gravity": G,
+        "slip_limit": 0.01,
+        "accuracy": accuracy,
         # So much damping that the queue has stopped ringing after 2 s, to 1e-8.
-        contacts=[contact(STIFFNESS, other, ("normal", 100.0)) for other in ("glass", "steel")],
-        base=[{"between": ["glass", f"chain_{number}"], "friction": mu} for number, (_, mu) in enumerate(JOINT)],
-        bottle_types={"bottle": kind(radius=RADIUS, mass=MASS)},
-        belts=belts,
-        rails={"stop": {"kind": "segment", "from": (end, -0.1), "to": (end, 0.1), "material": "steel"}},
-        bottles=[bottle(end - RADIUS * (1.0 + 2.0 * n), 0.0) for n in range(QUEUE)],
-        **PEAKS,
-    )
+        "contacts": [contact(STIFFNESS, other, ("normal", 100.0), SMOOTH) for other in ("glass", "steel")],
+        "base": [*drags, *base(MU)],
+        "bottle_types": {"bottle": kind(radius=RADIUS, mass=MASS)},
+        "belts": belts,
+        "rails": {"stop": segment((end, -0.1), (end, 0.1))},
+        "bottles": [bottle(end - RADIUS * (1.0 + 2.0 * n), 0.0) for n in range(QUEUE)],
+        "effects": COMMON,
+    }
 
 
 @pytest.mark.parametrize("preset", ["standard", "fine"])
@@ -157,9 +159,11 @@ def test_a_queue_across_a_joint_of_belts(integrator: str, preset: Any) -> None:
 
     Straight belts take nothing from resting load at any step; rounding is left.
     """
-    sim = Simulation(across_a_joint(preset=preset, integrator=integrator), threads=1)
-    found = mean_forces(sim, 2.0)
-    assert sim.model.prediction.resting == 0.0
+    given = across_a_joint(preset=preset, integrator=integrator)
+    model = build_model(scene(**given))
+    assert model.prediction.resting == 0.0
+    given["accuracy"] = {"per_tick": model.steps_per_tick, "integrator": integrator}
+    found = mean_forces(Simulation(scene(**with_bends(given)), threads=1), 2.0)
     drags = [MASS * G * mu for _, mu in reversed(JOINT) for _ in range(QUEUE // 2)]
     pressed = [sum(drags[n:]) for n in range(QUEUE + 1)]
     # A contact counts for the bottle that is farther on; the first has the stop's besides.

@@ -9,7 +9,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MASS, RADIUS, base, belt, bottle, contact, order, rms, scene, segment, simulation
+from scenes import (
+    COMMON,
+    MASS,
+    RADIUS,
+    arc,
+    base,
+    belt,
+    bottle,
+    contact,
+    order,
+    rms,
+    scene,
+    segment,
+    simulation,
+)
 from state.test_checkpoint import END, SAVED, everything, queue, run
 
 from conveyor_sim.simulation import Simulation
@@ -26,6 +40,8 @@ SPRING = {"stiffness": STIFFNESS, "damping": 2.0 * MASS * RATE}
 """Critically damped."""
 STOP = 1000.0
 """N/m, of the rail."""
+SMOOTH = 1e-15
+"""Friction of contacts: as good as none."""
 BOTH = ["semi_implicit_euler", "velocity_verlet"]
 ON_TURNTABLES = ["leapfrog", *BOTH]
 
@@ -45,7 +61,7 @@ def standing(integrator: str, steps: int, x: float, y: float, vx: float = 0.0, v
         tick=0.01,
         accuracy={"per_tick": steps, "integrator": integrator},
         gravity=G,
-        contacts=[contact(STOP, "steel", ("normal", 20.0))],
+        contacts=[contact(STOP, other, ("normal", 20.0), SMOOTH) for other in ("glass", "steel")],
         base=sprung(**fields.pop("spring", {})),
         belts={
             "table": table,
@@ -53,9 +69,10 @@ def standing(integrator: str, steps: int, x: float, y: float, vx: float = 0.0, v
             "next": belt(2.0 * speed, (0.0, 2.0), 5.0, 1.0),
             "stopped": belt(speed, (-5.0, -3.0), 10.0, 1.0),
         },
-        rails={"stop": segment((0.5, -3.0), (0.5, -2.0))},
-        bottles=[bottle(x, y, vx, vy)],
-        effects={"energy_ledger": "on"},
+        # With an arc and another bottle, out of the way, it has the kernels of the queue of checkpoints.
+        rails={"stop": segment((0.5, -3.0), (0.5, -2.0)), "spare": arc((9.0, 8.0), 0.1, 0.0, 1.0)},
+        bottles=[bottle(x, y, vx, vy), bottle(9.0, 9.0)],
+        effects=COMMON,
         **fields,
     )
 

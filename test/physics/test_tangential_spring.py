@@ -22,10 +22,11 @@ BELT_SPEED = 40.0
 """m/s, so fast that what the bottle does hardly turns the pull."""
 
 
-def leaning(against: str, share: float, effects: Any = None, **tangential: Any) -> Simulation:
+def leaning(against: str, share: float, **tangential: Any) -> Simulation:
     """Bottle 0 with tan phi = share * mu; bottle 1, far off, goes with the belt and has the lists made anew.
 
-    They are next to impossible to turn: without rotation no other test would have the same kernels.
+    They are next to impossible to turn: without rotation no other test would have the same kernels. With springs there
+    is a ledger, which test_energy_ledger.py looks at.
     """
     phi = math.atan(share * MU)
     normal = -0.5 * math.pi if against == "rail" else -0.75 * math.pi
@@ -33,6 +34,7 @@ def leaning(against: str, share: float, effects: Any = None, **tangential: Any) 
     # Next to smooth, not quite: rail and bottle have the same kernels so.
     sprung = {"tangential": {"stiffness": 1e-3, "damping": 1e-6}} if "tangential" in kept else {}
     smooth = contact(STIFFNESS, "steel", ("normal", 100.0), 1e-9, **sprung)
+    effects = {"energy_ledger": "on"} if "tangential" in kept else {}
     c, s = math.cos(normal), math.sin(normal)
     along_x, along_y = math.cos(normal + phi), math.sin(normal + phi)
     corner = (100.0 * (along_y - along_x), -100.0 * (along_x + along_y))
@@ -52,7 +54,7 @@ def leaning(against: str, share: float, effects: Any = None, **tangential: Any) 
         accuracy={"per_tick": 200},
         gravity=G,
         slip_limit=SLIP_LIMIT,
-        effects=effects or {},
+        effects=effects,
         bottle_types={"bottle": kind(inertia=1e9)},
         contacts=contacts,
         base=base(MU_BASE),

@@ -24,6 +24,7 @@ from scenes import (
     COMMON,
     NO_FLOOR,
     RADIUS,
+    SPRINGS_AND_RINGS,
     base,
     belt,
     bottle,
@@ -46,14 +47,6 @@ from conveyor_sim.state.snapshot import snapshot
 from conveyor_sim.state.world_arrays import CONSTANT, changing_arrays
 from conveyor_sim.state.world_checks import FIXED, SCRATCH, indices, ranges
 
-SPRING = {"stiffness": 2000.0, "damping": 0.5}
-SPRINGS_AND_RINGS: dict[str, Any] = {
-    "bottle_types": {"bottle": kind(base_radius=0.04), "slim": kind(0.06, 0.15, base_radius=0.03)},
-    "contacts": [
-        contact(5000.0, friction=0.2, tangential=SPRING),
-        contact(8000.0, "steel", friction=0.2, tangential=SPRING),
-    ],
-}
 INTEGRATORS: dict[str, dict[str, Any]] = {
     "semi_implicit_euler": {"per_tick": 50},
     "velocity_verlet": {"per_tick": 50},

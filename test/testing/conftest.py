@@ -14,6 +14,19 @@ FEEDER = "belts/feeder/cmd_speed"
 
 STOP = "machines/packer/stop"
 
+LINE = "scenarios/zoned_line"
+"""That of the soft PLCs."""
+
+
+@pytest.fixture(scope="session")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkpoint of LINE with the first bottles on its way, shortly before a soft PLC has something to do."""
+    path = tmp_path_factory.mktemp("filled") / "start.npz"
+    with Scenario(LINE) as line:
+        line.run_for(4.0)
+        line.simulation.save(path)
+    return path
+
 
 @pytest.fixture
 def table() -> Scenario:

@@ -1,9 +1,14 @@
-"""Soft PLCs that are servers, made with the protocols' own libraries: each scans once `tick` has changed."""
+"""Soft PLCs that are servers, made with the protocols' own libraries: each scans once `tick` has changed.
+
+A scan that is asked to end ends by itself: one that is cancelled may go on, as `asyncio.wait_for` within the libraries
+loses that if an answer comes at the same moment.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import gc
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,11 +24,46 @@ def program(bottles: float) -> tuple[float, bool]:
     return speed(bottles), speed(bottles) == 0.0
 
 
-class OpcUaPlc:
-    """Variables of namespace 2."""
+class SoftPlc(ABC):
+    """One whose values can be as at first again, which is cheaper than another server."""
 
     def __init__(self) -> None:
         self.scans = 0
+        self._ends = False
+        self._task: asyncio.Task[None] | None = None
+
+    @abstractmethod
+    async def start(self, port: int) -> str:
+        """Listen; its address. It does not scan yet."""
+
+    async def scan(self) -> None:
+        """Begin, with all values as at first."""
+        await self._clear()
+        self.scans, self._ends = 0, False
+        self._task = asyncio.create_task(self._run())
+
+    async def halt(self) -> None:
+        """Scan no more; the server stays."""
+        self._ends = True
+        if self._task is not None:
+            await self._task
+
+    async def stop(self) -> None:
+        await self.halt()
+        await self._close()
+
+    @abstractmethod
+    async def _clear(self) -> None: ...
+
+    @abstractmethod
+    async def _run(self) -> None: ...
+
+    @abstractmethod
+    async def _close(self) -> None: ...
+
+
+class OpcUaPlc(SoftPlc):
+    """Variables of namespace 2."""
 
     async def start(self, port: int) -> str:
         from asyncua import Server, ua
@@ -46,10 +86,13 @@ class OpcUaPlc:
             )
             await node.set_writable()
             self._nodes[name] = node
-        await self._write("tick", 2**32 - 1, "UInt32")
         await server.start()
-        self._task = asyncio.create_task(self._run())
         return f"opc.tcp://127.0.0.1:{server.bserver.port}"
+
+    async def _clear(self) -> None:
+        first = {"bottles": (0, "UInt16"), "tick": (2**32 - 1, "UInt32"), "target": (0, "UInt32")}
+        for name, (value, kind) in {**first, "speed": (0.0, "Float"), "full": (False, "Boolean")}.items():
+            await self._write(name, value, kind)
 
     async def _write(self, name: str, value: float, kind: str) -> None:
         from asyncua import ua
@@ -58,7 +101,7 @@ class OpcUaPlc:
 
     async def _run(self) -> None:
         last = await self._nodes["tick"].read_value()
-        while True:
+        while not self._ends:
             tick = await self._nodes["tick"].read_value()
             if tick != last:
                 last = tick
@@ -69,13 +112,7 @@ class OpcUaPlc:
                 await self._write("target", tick + 1, "UInt32")
             await asyncio.sleep(0.0005)
 
-    async def halt(self) -> None:
-        """Scan no more; the server stays."""
-        self._task.cancel()
-        await asyncio.wait({self._task}, timeout=10.0)
-
-    async def stop(self) -> None:
-        await self.halt()
+    async def _close(self) -> None:
         await self._server.stop()
 
     @staticmethod
@@ -85,18 +122,19 @@ class OpcUaPlc:
         return {ours: f"ns=2;s=GVL.{theirs}" for ours, theirs in names.items()}
 
 
-class ModbusPlc:
-    """Its program reads and writes the registers of its own server, as a client."""
+FIRST = [0xFFFF, 0xFFFF, *[0] * 20]
+"""Its registers."""
 
-    def __init__(self) -> None:
-        self.scans = 0
+
+class ModbusPlc(SoftPlc):
+    """Its program reads and writes the registers of its own server, as a client."""
 
     async def start(self, port: int) -> str:
         from pymodbus.client import AsyncModbusTcpClient
         from pymodbus.server import ModbusTcpServer
         from pymodbus.simulator import DataType, SimData, SimDevice
 
-        words = SimData(0, values=[0xFFFF, 0xFFFF, *[0] * 20], datatype=DataType.REGISTERS)
+        words = SimData(0, values=[0] * len(FIRST), datatype=DataType.REGISTERS)
         bits = SimData(0, values=[False] * 16, datatype=DataType.BITS)
         nothing = SimData(0, values=[0], datatype=DataType.REGISTERS)
         self._server = ModbusTcpServer(
@@ -106,13 +144,16 @@ class ModbusPlc:
         port = self._server.transport.sockets[0].getsockname()[1]  # type: ignore[union-attr,attr-defined]
         self._client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=60)
         await self._client.connect()
-        self._task = asyncio.create_task(self._run())
         return f"modbus://127.0.0.1:{port}"
+
+    async def _clear(self) -> None:
+        await self._client.write_registers(0, FIRST)
+        await self._client.write_coil(3, False)
 
     async def _run(self) -> None:
         client, word, real = self._client, self._client.DATATYPE.UINT32, self._client.DATATYPE.FLOAT32
         last = 2**32 - 1
-        while True:
+        while not self._ends:
             registers = (await client.read_holding_registers(0, count=4)).registers
             tick = client.convert_from_registers(registers[:2], word)
             if tick != last:
@@ -124,13 +165,7 @@ class ModbusPlc:
                 await client.write_registers(10, client.convert_to_registers(tick + 1, word))
             await asyncio.sleep(0.0005)
 
-    async def halt(self) -> None:
-        """Scan no more; the server stays."""
-        self._task.cancel()
-        await asyncio.wait({self._task}, timeout=10.0)
-
-    async def stop(self) -> None:
-        await self.halt()
+    async def _close(self) -> None:
         self._client.close()
         await self._server.shutdown()
 

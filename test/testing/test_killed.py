@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -13,6 +11,7 @@ from click.testing import CliRunner
 from testing.conftest import STOP, TABLE
 from testing.test_documented import PLUGIN
 from testing.test_inputs import messages
+from warm import Warm
 
 from conveyor_sim.bag.input_log import FILE_NAME
 from conveyor_sim.bag.replay import replay
@@ -54,7 +53,7 @@ LEFT = Path("line-failures", "test_killed.py_test_hangs.unfinished")
 
 
 def pytest_command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "pytest", *PLUGIN, "-p", "no:xdist", *arguments]
+    return ["-m", "pytest", *PLUGIN, "-p", "no:xdist", *arguments]
 
 
 def end_by(kind: signal.Signals, folder: Path) -> None:
@@ -63,13 +62,18 @@ def end_by(kind: signal.Signals, folder: Path) -> None:
     with Scenario(TABLE) as table:
         table.run_for(FIRST * 0.01)
         table.simulation.save(folder / "warm.npz")
-    with subprocess.Popen(pytest_command("-k", "hangs"), cwd=folder, stdout=subprocess.PIPE) as child:
+    with (folder / "told").open("w") as told:
+        child = Warm(pytest_command("-k", "hangs"), told, told, cwd=folder)
+    try:
         end = time.monotonic() + 120.0
         while not (folder / "hangs").exists():
-            assert child.poll() is None and time.monotonic() < end
+            assert child.poll() is None and time.monotonic() < end, (folder / "told").read_text()
             time.sleep(0.05)
         assert (folder / LEFT).is_dir()
         os.kill(child.pid, kind)
+        child.wait(120.0)
+    finally:
+        child.kill()
 
 
 @pytest.fixture(scope="module")

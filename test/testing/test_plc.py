@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from testing.conftest import LINE
 from testing.soft_plc import BOTTLES, SETPOINT, speed
 
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.testing.scenario import Scenario
 
-LINE = "scenarios/zoned_line"
 PLC = [sys.executable, str(Path(__file__).with_name("soft_plc.py"))]
-SECONDS = 8.0
+SECONDS = 4.0
 
 
 class Twin:
@@ -39,8 +39,8 @@ def attach(plant: Scenario, face: str, *arguments: str, patience: float = 60.0) 
     (plant.attach_modbus if face == "modbus" else plant.attach_opcua)([*PLC, *arguments], patience=patience)
 
 
-def test_a_plc_gives_the_bits_of_its_program(face: str, tmp_path: Path) -> None:
-    with Scenario(LINE) as inside, Scenario(LINE, bag=tmp_path / "bag") as outside:
+def test_a_plc_gives_the_bits_of_its_program(face: str, filled: Path, tmp_path: Path) -> None:
+    with Scenario(LINE, start=filled) as inside, Scenario(LINE, start=filled, bag=tmp_path / "bag") as outside:
         inside.attach(Twin())
         attach(outside, face)
         for plant in (inside, outside):

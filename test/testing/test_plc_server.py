@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -15,8 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from testing.conftest import LINE
 from testing.plc_servers import ALARM, KINDS, OWN, program, write_map
 from testing.soft_plc import BOTTLES, SETPOINT
+from warm import Warm
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
@@ -29,8 +29,7 @@ from conveyor_sim.scada.attach.tag_map import TagMapError, read_tag_map
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.testing.scenario import Scenario
 
-LINE = "scenarios/zoned_line"
-SECONDS = 8.0
+SECONDS = 4.0
 
 
 class Twin:
@@ -42,7 +41,7 @@ class Twin:
 
 
 class Plc:
-    """One that runs, with its map."""
+    """One that listens, with its map."""
 
     def __init__(self, kind: str, folder: Path) -> None:
         self.thread = ServerThread()
@@ -51,22 +50,45 @@ class Plc:
         self.url = self.thread.run(self.made.start(0))
         self.tags = write_map(folder / "tags.csv", self.places)
 
-    def stop(self) -> None:
+    def start_again(self) -> None:
+        """Where it was, after `made.stop`."""
+        self.thread.run(self.made.start(int(self.url.rpartition(":")[2])))
+        self.thread.run(self.made.scan())
+
+    def close(self) -> None:
         self.thread.run(self.made.stop())
+        self.thread.close()
+
+
+@pytest.fixture(scope="module")
+def plcs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Plc]]:
+    """One of each kind, which listens from when it is first asked for."""
+    made: dict[str, Plc] = {}
+
+    def of(kind: str) -> Plc:
+        library = {"modbus": "pymodbus", "opcua": "asyncua"}[kind]
+        pytest.importorskip(library, reason=f"{library} is not installed: pip install conveyor-sim[scada]")
+        if kind not in made:
+            made[kind] = Plc(kind, tmp_path_factory.mktemp(kind))
+        return made[kind]
+
+    yield of
+    for plc in made.values():
+        plc.close()
 
 
 @pytest.fixture(params=["modbus", "opcua"])
-def plc(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Plc]:
-    library = {"modbus": "pymodbus", "opcua": "asyncua"}[request.param]
-    pytest.importorskip(library, reason=f"{library} is not installed: pip install conveyor-sim[scada]")
-    plc = Plc(request.param, tmp_path)
+def plc(request: pytest.FixtureRequest, plcs: Callable[[str], Plc]) -> Iterator[Plc]:
+    """It scans, and nobody has written to it."""
+    plc = plcs(request.param)
+    plc.thread.run(plc.made.scan())
     yield plc
-    plc.stop()
-    plc.thread.close()
+    plc.thread.run(plc.made.halt())
 
 
-def test_a_served_plc_gives_the_bits_of_its_program(plc: Plc, tmp_path: Path) -> None:
-    with Scenario(LINE) as inside, Scenario(LINE, bag=tmp_path / "bag") as outside:
+def test_a_served_plc_gives_the_bits_of_its_program(plc: Plc, filled: Path, tmp_path: Path) -> None:
+    with Scenario(LINE, start=filled) as inside, Scenario(LINE, start=filled, bag=tmp_path / "bag") as outside:
+        first = outside.simulation.tick
         inside.attach(Twin())
         outside.attach_plc(plc.url, plc.tags)
         for plant in (inside, outside):
@@ -80,7 +102,7 @@ def test_a_served_plc_gives_the_bits_of_its_program(plc: Plc, tmp_path: Path) ->
     assert replay(tmp_path / "bag").difference is None
     with open_bag(tmp_path / "bag") as bag:
         told = [(tuple(frame.data.name), *frame.data.value) for frame in bag.read("variables")]
-    assert told == [((OWN,), tick + 1) for tick in range(len(told))] and len(told) == plc.made.scans
+    assert told == [((OWN,), first + i + 1) for i in range(len(told))] and len(told) == plc.made.scans
 
 
 def test_a_plc_that_goes_away_fails_the_test(plc: Plc) -> None:
@@ -92,7 +114,7 @@ def test_a_plc_that_goes_away_fails_the_test(plc: Plc) -> None:
             with pytest.raises(ControlError, match=rf"at 0\.1\d? s no PLC: {plc.url}"):
                 plant.run_for(0.1)
         finally:
-            plc.thread.run(plc.made.start(int(plc.url.rpartition(":")[2])))
+            plc.start_again()
 
 
 def test_a_plc_that_does_not_scan_is_waited_for_so_long(plc: Plc) -> None:
@@ -109,19 +131,21 @@ def test_a_plc_that_is_not_there_is_said(plc: Plc) -> None:
 
 def test_the_command_attach_records_what_a_plc_commands(plc: Plc, tmp_path: Path) -> None:
     """In real time; what it did there is on record."""
-    command = [sys.executable, "-c", "from conveyor_sim.cli import main; main()", "attach", LINE, plc.url]
+    command = ["-c", "from conveyor_sim.cli import main; main()", "attach", LINE, plc.url]
     # It ends by the interrupt: a run that has come to its end shows the PLC no new tick, however few it has seen.
     command += ["--tags", str(plc.tags), "--real-time-factor", "10", "--duration", "90", "--out", str(tmp_path / "bag")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    files = [(tmp_path / name).open("w") for name in ("out", "told")]
+    process = Warm(command, *files)
     try:
         end = time.monotonic() + 120.0
         while plc.made.scans < 20 and process.poll() is None and time.monotonic() < end:
             time.sleep(0.05)
         scans = plc.made.scans
         process.send_signal(signal.SIGINT)
-        out, told = process.communicate(timeout=120.0)
+        process.wait(timeout=120.0)
     finally:
         process.kill()
+    out, told = (Path(file.name).read_text() for file in files)
     assert process.returncode == 0 and scans >= 20 and f"{plc.url} commands the line" in told, f"{scans} scans: {told}"
     assert re.search(r"served up to .* s; plc \d+ written, 0 refused; recorded to", out)
     assert replay(tmp_path / "bag").difference is None
@@ -193,19 +217,11 @@ def test_a_signal_is_not_written_where_nothing_can_be(tmp_path: Path) -> None:
         link("modbus://127.0.0.1:1", all_of(read_tag_map(tags, plant.simulation.process_image.tags)))
 
 
-def test_a_place_that_the_plc_lacks_is_said_at_once(tmp_path: Path) -> None:
-    pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
-    plc = Plc("modbus", tmp_path)
-    try:
-        tags = write_map(tmp_path / "tags.csv", plc.places | {SETPOINT: "holding register 900 float32"})
-        with (
-            Scenario(LINE) as plant,
-            pytest.raises(LinkError, match=r"holding register 900 .* refused with exception 2"),
-        ):
-            plant.attach_plc(plc.url, tags)
-    finally:
-        plc.stop()
-        plc.thread.close()
+def test_a_place_that_the_plc_lacks_is_said_at_once(plcs: Callable[[str], Plc], tmp_path: Path) -> None:
+    plc = plcs("modbus")
+    tags = write_map(tmp_path / "tags.csv", plc.places | {SETPOINT: "holding register 900 float32"})
+    with Scenario(LINE) as plant, pytest.raises(LinkError, match=r"holding register 900 .* refused with exception 2"):
+        plant.attach_plc(plc.url, tags)
 
 
 @pytest.mark.parametrize("url", ["http://127.0.0.1:1", "127.0.0.1", "opc.tcp://", "modbus://[", "modbus://a:b"])
@@ -214,16 +230,11 @@ def test_a_url_that_can_t_be_is_refused(url: str) -> None:
         link(url, ())
 
 
-def test_a_variable_that_the_plc_lacks_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("asyncua", reason="asyncua is not installed: pip install conveyor-sim[scada]")
-    plc = Plc("opcua", tmp_path)
-    try:
-        tags = write_map(tmp_path / "tags.csv", plc.places | {ALARM: "ns=2;s=GVL.lost"})
-        with Scenario(LINE) as plant, pytest.raises(TagMapError, match=r"line 4: ns=2;s=GVL\.lost"):
-            plant.attach_plc(plc.url, tags)
-    finally:
-        plc.stop()
-        plc.thread.close()
+def test_a_variable_that_the_plc_lacks_is_named(plcs: Callable[[str], Plc], tmp_path: Path) -> None:
+    plc = plcs("opcua")
+    tags = write_map(tmp_path / "tags.csv", plc.places | {ALARM: "ns=2;s=GVL.lost"})
+    with Scenario(LINE) as plant, pytest.raises(TagMapError, match=r"line 4: ns=2;s=GVL\.lost"):
+        plant.attach_plc(plc.url, tags)
 
 
 class FreeRunning:
@@ -270,7 +281,7 @@ def test_a_free_running_plc_commands_a_line_and_is_reached_again(free: FreeRunni
     plc.thread.run(plc.made.stop())
     free.until(lambda: said and face.status().clients == 0)
     assert said[0].endswith("it commands nothing until it is reached again")
-    plc.thread.run(plc.made.start(int(plc.url.rpartition(":")[2])))
+    plc.start_again()
     free.until(lambda: face.status().clients == 1 and face.status().writes > status.writes)
     assert said[-1] == f"{plc.url}: reached again"
 

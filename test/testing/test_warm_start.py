@@ -1,12 +1,11 @@
 """The fixture `warm_start`: a line is warmed up once for many tests."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from testing.conftest import STOP, TABLE
 from testing.test_documented import PLUGIN
+from warm import run
 
 from conveyor_sim.bag.replay import replay
 
@@ -84,8 +83,8 @@ def test_processes_of_xdist_do_not_tread_on_each_other(tmp_path: Path) -> None:
         folder = tmp_path / workers
         folder.mkdir()
         (folder / "test_warm.py").write_text(TESTS)
-        command = [sys.executable, "-m", "pytest", *PLUGIN, *PASS, "-n", workers, f"--basetemp={tmp_path / 'base'}"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        command = ["-m", "pytest", *PLUGIN, *PASS, "-n", workers, f"--basetemp={tmp_path / 'base'}"]
+        done = run(command, cwd=folder)
         assert done.returncode == 0 and "4 passed" in done.stdout, done.stdout
         found.append(hashes(folder))
         processes = [path.name.split("_")[0] for path in (folder / "warm_ups").iterdir()]

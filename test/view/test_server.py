@@ -120,7 +120,7 @@ def test_the_page_draws_what_the_one_file_draws(
 
 
 def test_what_can_not_be_read_is_said_and_gone_over(browser: Any, tmp_path: Path) -> None:
-    folder = record(tmp_path / "bag", 90.0)
+    folder = record(tmp_path / "bag", 45.0)
     file = next(folder.glob("*.mcap"))
     content = bytearray(file.read_bytes())
     chunk = next_chunk(bytes(content), len(content) // 2, len(content))
@@ -138,7 +138,7 @@ def test_what_can_not_be_read_is_said_and_gone_over(browser: Any, tmp_path: Path
         page.focus("#plan")
         page.keyboard.press("Home")
         page.keyboard.press("k")
-        until(lambda: page.inner_text("#clock") == "90.00 s" or page.wait_for_timeout(20), "the end, past the damage")
+        until(lambda: page.inner_text("#clock") == "45.00 s" or page.wait_for_timeout(20), "the end, past the damage")
         assert int(page.get_attribute("body", "data-bottles")) > 0
         assert len(asked) == len(set(asked)), "each is asked for once"
         page.close()

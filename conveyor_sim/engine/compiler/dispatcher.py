@@ -6,6 +6,7 @@ from typing import Any
 from numba.core.registry import CPUDispatcher
 
 from conveyor_sim.engine.compiler.groups import narrowed
+from conveyor_sim.engine.compiler.kernel_cache import KernelCache
 from conveyor_sim.engine.compiler.reads import Path, reads
 
 
@@ -23,3 +24,12 @@ class KernelDispatcher(CPUDispatcher):
         _, given = compiler.fold_argument_types(args, kws)
         read = zip(given, self.reads, strict=True)
         return super().get_call_template(tuple(narrowed(one, paths) for one, paths in read), {})
+
+    def compile(self, sig: Any) -> Any:
+        """Machine code for arguments of these types, which other processes need not compile at the same time."""
+        try:
+            return super().compile(sig)
+        finally:
+            cache = vars(self)["_cache"]
+            if isinstance(cache, KernelCache):
+                cache.release()

@@ -27,6 +27,7 @@ from numba.core.caching import _Cache
 from numba.core.runtime.nrt import rtsys
 
 from conveyor_sim.engine.compiler.cache_folder import others_can_write
+from conveyor_sim.engine.compiler.claims import Claims
 
 # Untyped in numba.
 _rebuild: Any = compiler.CompileResult._rebuild
@@ -50,6 +51,7 @@ class KernelFolder:
         self.path = path
         self._remark = remark
         self._full = False
+        self._claims = Claims()
         self.received: dict[str, bytes] = {}
         """What a process that compiles for this one has sent."""
         self.send: Callable[[str, bytes], object] | None = None
@@ -63,8 +65,7 @@ class KernelFolder:
 
     def read(self, name: str) -> bytes | None:
         """What was written under a name; None if there is nothing that can be used."""
-        if self.before_read is not None:
-            self.before_read()
+        self._look()
         self._tell_remark()
         if self.path is None or name in self.received:
             return self.received.get(name)
@@ -103,6 +104,19 @@ class KernelFolder:
         if self.send is not None:
             self.send(name, content)
 
+    def claim(self, name: str) -> bool:
+        """This process compiles it now. Returns whether another one did until now: then read again."""
+        return self.path is not None and self._claims.take(self.path, name, self._look)
+
+    def release(self, name: str) -> None:
+        """It has compiled it, or failed."""
+        if self.path is not None:
+            self._claims.give_back(self.path, name)
+
+    def _look(self) -> None:
+        if self.before_read is not None:
+            self.before_read()
+
     def _tell_remark(self) -> None:
         remark, self._remark = self._remark, ""
         if remark:
@@ -116,6 +130,7 @@ class KernelCache(_Cache):
         self._function = function
         self._options = tuple(sorted(options.items()))
         self._folder = folder
+        self._claimed: str | None = None
 
     @property
     def cache_path(self) -> str | None:
@@ -128,6 +143,22 @@ class KernelCache(_Cache):
         rtsys.initialize(target_context)
         key = self._key(sig, target_context.codegen())
         name = self._name(key)
+        loaded = self._load(name, key, target_context)
+        if loaded is None and getattr(_only, "cached", False):
+            raise NotCached(self._function.__qualname__)
+        if loaded is None:
+            self._claimed = name
+            if self._folder.claim(name):
+                loaded = self._load(name, key, target_context)
+        return loaded
+
+    def release(self) -> None:
+        """What was looked for and not found is compiled now, or can't be."""
+        name, self._claimed = self._claimed, None
+        if name is not None:
+            self._folder.release(name)
+
+    def _load(self, name: str, key: tuple[Any, ...], target_context: Any) -> Any:
         payload = self._folder.read(name)
         if payload is not None:
             try:
@@ -138,8 +169,6 @@ class KernelCache(_Cache):
             except Exception as error:  # whatever a file that others wrote makes of pickle, numba or LLVM
                 why = f"it can't be loaded ({type(error).__name__})"
             self._folder.discard(name, why)
-        if getattr(_only, "cached", False):
-            raise NotCached(self._function.__qualname__)
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
