@@ -28,7 +28,7 @@ unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION RMW_IMPLEMENTATION _ROS_WHEEL
 # Without bytecode on disk every process parses 350 files of ours anew, half a second of a core each: hundreds in the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test bench accuracy promises fuzz stability lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs
+.PHONY: help run test bench accuracy promises fuzz stability lint docs docs-check site clean set-up set-up-test set-up-bench set-up-docs set-up-ci
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -81,6 +81,9 @@ set-up-bench:
 
 set-up-docs:
 	@sh tools/set_up.sh "$(DISTRO)" docs
+
+set-up-ci:
+	@sh tools/set_up.sh "$(DISTRO)" test docs
 
 clean:
 	rm -rf .venv .venv-kilted build install log dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

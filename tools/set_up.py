@@ -1,4 +1,4 @@
-"""Makes the environment of `make run`, `make test`, `make bench` and `make site`: set_up.py DISTRO [test|bench|docs]
+"""Makes the environment of `make run`, `make test` and others: set_up.py DISTRO [test] [bench] [docs]
 
 A virtual environment with the ROS 2 wheels of that distribution, this package (editable) and conveyor_msgs, built
 from msg_defs/. `set-up.json` in the environment holds a key of what each stage was made from; a stage whose key
@@ -170,7 +170,7 @@ def check_compiler() -> None:
             )
 
 
-def set_up(distro: str, tools: str) -> None:
+def set_up(distro: str, tools: list[str]) -> None:
     environment = Environment(distro)
     requirements = ROOT / "requirements"
     build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
@@ -180,8 +180,8 @@ def set_up(distro: str, tools: str) -> None:
     packages = key(ros, *(ROOT / name for name in described))
     messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
     needed = {"ros": ros, "packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
-    if tools:
-        needed[tools] = key(requirements / f"{tools}.txt", *(requirements / f"{name}.txt" for name in EXTRAS))
+    for tool in tools:
+        needed[tool] = key(requirements / f"{tool}.txt", *(requirements / f"{name}.txt" for name in EXTRAS))
     if all(environment.state.get(stage) == wanted for stage, wanted in needed.items()):
         return
 
@@ -214,10 +214,10 @@ def set_up(distro: str, tools: str) -> None:
             environment.forget("index")
             environment.register()
             environment.write_state(index=needed["index"])
-        if tools and missing(tools):
-            say(f"{TOOLS[tools]} ...")
-            environment.pip_install(["-r", requirements / f"{tools}.txt"], f"installing {TOOLS[tools]}")
-            environment.write_state(**{tools: needed[tools]})
+        for tool in filter(missing, tools):
+            say(f"{TOOLS[tool]} ...")
+            environment.pip_install(["-r", requirements / f"{tool}.txt"], f"installing {TOOLS[tool]}")
+            environment.write_state(**{tool: needed[tool]})
         if built:
             built.result()
             environment.write_state(messages=messages)
@@ -225,7 +225,7 @@ def set_up(distro: str, tools: str) -> None:
 
 
 def main() -> int:
-    distro, tools = sys.argv[1], "".join(sys.argv[2:])
+    distro, tools = sys.argv[1], sys.argv[2:]
     if distro not in DISTROS:
         print(f"DISTRO={distro}: expected {' or '.join(DISTROS)}.", file=sys.stderr)
         return 1

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Finds a Python that can carry the environment and hands over to set_up.py: set_up.sh DISTRO [test|bench|docs]
+# Finds a Python that can carry the environment and hands over to set_up.py: set_up.sh DISTRO [test] [bench] [docs]
 tools=$(dirname "$0")
 best=0
 complaint="conveyor_sim needs CPython 3.10, 3.11 or 3.12 and there is no python3 on PATH: install python3.12 with its venv module and headers."
