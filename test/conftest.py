@@ -11,10 +11,10 @@ QUICK = frozenset({"control", "effects", "laws", "model", "scene", "state", "sup
 
 LONGEST = (
     "hard_cases/test_hard_cases.py", "fuzz/test_fuzz.py", "ros/test_floods.py", "engine/test_riding.py",
-    "testing/test_plc_server.py", "state/test_checkpoint.py", "view/test_live.py", "timestep/test_prediction.py",
-    "test_shipped_scenes.py", "bag/test_replay.py", "view/test_page.py", "test_simulation.py",
+    "state/test_checkpoint.py", "view/test_live.py", "timestep/test_prediction.py", "test_shipped_scenes.py",
+    "bag/test_replay.py", "view/test_page.py", "test_simulation.py",
 )  # fmt: skip
-"""Files that take 35 s and more where three processes share two cores, the longest first."""
+"""Files that took more than 35 s where three processes shared two cores, the longest first."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -27,8 +27,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _turn(file: Path) -> tuple[int, bytes]:
-    """The longest first, for nobody is to be left with one at the end. The others as chance has it: files that lie side
-    by side wait for the same things, or want the same kernels compiled.
+    """The longest first, so that no process is left with one when the others have ended. The rest by a hash of their
+    names: files of one folder at the same time would all wait, or all want the same kernels compiled.
     """
     name = file.relative_to(HERE).as_posix() if file.is_relative_to(HERE) else file.name
     return LONGEST.index(name) if name in LONGEST else len(LONGEST), blake2b(name.encode()).digest()

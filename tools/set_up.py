@@ -196,8 +196,8 @@ def set_up(distro: str, tools: list[str]) -> None:
     if missing("ros"):
         say(f"ROS 2 {distro.capitalize()} and what the simulation runs with: about 1 GB on disk, a minute or two ...")
         # Together: numba allows fewer versions of NumPy than ROS does.
-        wanted = [requirements / f"ros-{distro}.txt", requirements / "run.txt"]
-        environment.pip_install(["-r", wanted[0], "-r", wanted[1]], "installing ROS 2 and Python packages")
+        lists_of_both = ["-r", requirements / f"ros-{distro}.txt", "-r", requirements / "run.txt"]
+        environment.pip_install(lists_of_both, "installing ROS 2 and Python packages")
         environment.write_state(ros=ros)
     # The compiler and pip wait for different things.
     with ThreadPoolExecutor(1) as beside:

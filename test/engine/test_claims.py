@@ -20,8 +20,10 @@ from conveyor_sim.engine.compiler.pipelines import KernelCompiler
 WANTING = """
 import sys
 from pathlib import Path
-import numba
+from conveyor_sim.engine.compiler.compile import OPTIONS
+from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
+from conveyor_sim.engine.compiler.pipelines import KernelCompiler
 
 def twice(x):
     return 2.0 * x
@@ -36,20 +38,22 @@ def look():
     if looks > 2 and len(sys.argv) > 2:
         raise SystemExit("ended while it waited")
 
-function = numba.njit(twice)
+function = KernelDispatcher(twice, targetoptions=OPTIONS, pipeline_class=KernelCompiler)
 folder = KernelFolder(Path(sys.argv[1]), "")
 folder.before_read = look
-cache = function._cache = KernelCache(twice, {}, folder)
+function._cache = KernelCache(twice, {}, folder)
 assert function(1.5) == 3.0
-print(sum(function.stats.cache_hits.values()), "loaded,", sum(function.stats.cache_misses.values()), "compiled")
+loaded, missed = (sum(counts.values()) for counts in (function.stats.cache_hits, function.stats.cache_misses))
+print(loaded, "loaded,", missed, "compiled", flush=True)
+sys.stdin.read()
 """
 
 HOLDING = """
 import sys
 from pathlib import Path
 from conveyor_sim.engine.compiler.claims import Claims
-claims = Claims()
-waited = claims.take(Path(sys.argv[1]), sys.argv[2], lambda: None)
+claims = Claims(Path(sys.argv[1]))
+waited = claims.take(sys.argv[2], lambda: None)
 print("waited for it" if waited else "has it", flush=True)
 sys.stdin.read()
 """
@@ -103,6 +107,16 @@ def test_one_compiles_and_the_other_waits(
     assert kernel.exists()
 
 
+def test_of_two_that_wait_only_one_compiles(kernel: Path, start: Callable[..., "subprocess.Popen[str]"]) -> None:
+    kernel.unlink()
+    holds = start(HOLDING, str(kernel.parent), kernel.name)
+    assert holds.stdout.readline() == "has it\n"
+    both = [start(WANTING, str(kernel.parent)) for _ in range(2)]
+    assert [wants.stdout.readline() for wants in both] == ["waits\n"] * 2
+    holds.communicate()
+    assert sorted(wants.stdout.readline() for wants in both) == ["0 loaded, 1 compiled\n", "1 loaded, 0 compiled\n"]
+
+
 def test_who_waits_can_be_ended(kernel: Path, start: Callable[..., "subprocess.Popen[str]"]) -> None:
     kernel.unlink()
     holds = start(HOLDING, str(kernel.parent), kernel.name)
@@ -119,15 +133,15 @@ def test_a_process_that_stands_still_is_not_waited_for_long(
     holds.send_signal(signal.SIGSTOP)
     monkeypatch.setattr(claims, "LONGEST", 0.1)
     looks: list[None] = []
-    assert Claims().take(kernel.parent, "one", lambda: looks.append(None))
+    assert Claims(kernel.parent).take("one", lambda: looks.append(None))
     assert 1 <= len(looks) <= 5
-    assert not Claims().take(kernel.parent, "another", lambda: looks.append(None))
+    assert not Claims(kernel.parent).take("another", lambda: looks.append(None))
 
 
 def test_where_files_can_not_be_locked_everybody_compiles(tmp_path: Path) -> None:
-    assert not Claims().take(Path("/proc/nowhere"), "one", lambda: None)
+    assert not Claims(Path("/proc/nowhere")).take("one", lambda: None)
     (tmp_path / claims.NAME).symlink_to("elsewhere")
-    assert not Claims().take(tmp_path, "one", lambda: None)
+    assert not Claims(tmp_path).take("one", lambda: None)
     assert not (tmp_path / "elsewhere").exists()
 
 
@@ -149,4 +163,4 @@ def test_a_kernel_that_can_not_be_compiled_is_given_back(
     holds = start(HOLDING, str(tmp_path), "one")
     assert holds.stdout.readline() == "has it\n"
     holds.communicate()
-    assert not Claims().take(tmp_path, "one", lambda: None)
+    assert not Claims(tmp_path).take("one", lambda: None)

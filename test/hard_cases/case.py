@@ -94,7 +94,10 @@ class Case:
         short: bool = True,
         ledger: bool = True,
     ) -> Scene:
-        """The scene as it is run, with a ledger or as it is without. Raises SceneError where it is refused."""
+        """The scene as it is run. Raises SceneError where it is refused.
+
+        ledger: whether the ledger of energy is kept, from which the residual is measured.
+        """
         variant = variant or self.variants[0]
         given = dict(self.given)
         tick = given.get("tick", 0.01)
@@ -104,7 +107,7 @@ class Case:
         common: dict[str, Any] = {
             "duration": self.seconds(short),
             "accuracy": accuracy,
-            "outputs": {**dict.fromkeys(Scene.TOPICS, 0), "ledger": ledger / tick},
+            "outputs": {**dict.fromkeys(Scene.TOPICS, 0), "ledger": 1.0 / tick if ledger else 0},
             "effects": {"peaks": "on"},
         }
         if "file" in given:

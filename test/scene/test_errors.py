@@ -100,7 +100,7 @@ def test_not_utf_8(tmp_path: Path) -> None:
         ("a: 1\n---\nb: 2\n", "plant.yaml:2: not valid YAML: expected a single document in the stream"),
         ("a: \x01\n", "plant.yaml:1: not valid YAML: a control character that YAML does not allow"),
         ("a: &a [*a]\n", "plant.yaml:1: not a scene: nested too deeply"),
-        ("[" * 1000, "plant.yaml:1: not a scene: nested too deeply"),
+        ("[" * 5000, "plant.yaml:1: not a scene: nested too deeply"),
         ("a: *nowhere\n", "plant.yaml:1: not valid YAML: found undefined alias 'nowhere'"),
     ],
 )
@@ -110,8 +110,7 @@ def test_what_is_no_scene_at_all(text: str, says: str) -> None:
     assert str(error.value).startswith(says)
 
 
-def test_aliases_that_multiply_are_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yaml_lines, "_LARGEST", 10**5)  # there are 10**12
+def test_aliases_that_multiply_are_stopped() -> None:
     levels = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     levels += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12)]
     with pytest.raises(SceneError, match="too many values"):

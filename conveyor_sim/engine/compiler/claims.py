@@ -8,14 +8,16 @@ import fcntl
 import hashlib
 import os
 import time
+import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 NAME = "claims"
 """Of the file, in the folder of the kernels."""
 
 LONGEST = 60.0
-"""s that another process is waited for: it may stand still. A kernel takes up to ten of a core."""
+"""s that another process is waited for: it may stand still. A kernel takes some seconds of a core."""
 
 PAUSE = 0.02
 """s between two looks."""
@@ -24,35 +26,36 @@ PAUSE = 0.02
 class Claims:
     """Those of a folder. Where files can't be locked, every process compiles for itself."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / NAME
         self._file: int | None = None
-        self._path: Path | None = None
 
-    def take(self, folder: Path, name: str, look: Callable[[], object]) -> bool:
-        """Claim a kernel. Returns whether another process had it, and has compiled it or given up since.
+    def take(self, name: str, look: Callable[[], object]) -> bool:
+        """Claim a kernel by the name of its file. Returns whether another process had it, and gave it back since then
+        or was waited for too long.
 
-        look: called again and again while the other one is waited for; what it raises ends that.
+        look: called again and again while the other one is waited for. Raises only what that raises.
         """
         end = time.monotonic() + LONGEST
         waited = False
-        while not self._lock(folder, name) and time.monotonic() < end:
+        while not self._lock(name) and time.monotonic() < end:
             look()
             time.sleep(PAUSE)
             waited = True
         return waited
 
-    def give_back(self, folder: Path, name: str) -> None:
-        """Others may look for the kernel now."""
-        if self._file is not None and self._path == folder:
-            fcntl.lockf(self._file, fcntl.LOCK_UN, 1, _place(name))
+    def give_back(self, name: str) -> None:
+        """Others may look for the kernel now. Raises nothing."""
+        if self._file is not None:
+            with suppress(OSError):
+                fcntl.lockf(self._file, fcntl.LOCK_UN, 1, _place(name))
 
-    def _lock(self, folder: Path, name: str) -> bool:
-        """Whether nobody else has it."""
+    def _lock(self, name: str) -> bool:
+        """Whether no other process has it."""
         try:
-            if self._path != folder:
-                flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-                self._file, self._path = os.open(folder / NAME, flags, 0o600), folder
-            assert self._file is not None
+            if self._file is None:
+                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+                weakref.finalize(self, os.close, self._file)
             fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _place(name))
         except BlockingIOError:
             return False
@@ -62,4 +65,5 @@ class Claims:
 
 
 def _place(name: str) -> int:
+    """Which byte: two kernels with the same one only wait for each other."""
     return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=6).digest(), "big")

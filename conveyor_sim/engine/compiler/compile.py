@@ -45,7 +45,8 @@ _typeof: Any = numba.typeof
 # Numba leaves this part of LLVM off: it joins neighbouring loads, sums and stores to packed ones, which gathers by row
 # of `Bottles.packed` live on.
 _config.SLP_VECTORIZE = 1
-# It also looks for sums across a vector. Of floats it may not reorder one, and the search took a tenth of compiling.
+# It also looks for sums over the entries of a vector. Sums of floats must keep their order, so there is next to nothing
+# for it to find, and the search took up to a fifth of compiling.
 llvm.set_option("conveyor_sim", "-slp-vectorize-hor=0")
 # Level 3 compiles for an eighth longer, and no tick was faster for it.
 _config.OPT = type(_config.OPT)(2)

@@ -51,7 +51,7 @@ class KernelFolder:
         self.path = path
         self._remark = remark
         self._full = False
-        self._claims = Claims()
+        self._claims = None if path is None else Claims(path)
         self.received: dict[str, bytes] = {}
         """What a process that compiles for this one has sent."""
         self.send: Callable[[str, bytes], object] | None = None
@@ -62,6 +62,7 @@ class KernelFolder:
     def use(self, path: Path | None) -> None:
         """Another folder from now on, or none."""
         self.path, self._remark = path, ""
+        self._claims = None if path is None else Claims(path)
 
     def read(self, name: str) -> bytes | None:
         """What was written under a name; None if there is nothing that can be used."""
@@ -105,13 +106,13 @@ class KernelFolder:
             self.send(name, content)
 
     def claim(self, name: str) -> bool:
-        """This process compiles it now. Returns whether another one did until now: then read again."""
-        return self.path is not None and self._claims.take(self.path, name, self._look)
+        """This process is to compile it. Returns whether another one did until now: then read again."""
+        return self._claims is not None and self._claims.take(name, self._look)
 
     def release(self, name: str) -> None:
         """It has compiled it, or failed."""
-        if self.path is not None:
-            self._claims.give_back(self.path, name)
+        if self._claims is not None:
+            self._claims.give_back(name)
 
     def _look(self) -> None:
         if self.before_read is not None:
@@ -153,7 +154,7 @@ class KernelCache(_Cache):
         return loaded
 
     def release(self) -> None:
-        """What was looked for and not found is compiled now, or can't be."""
+        """End the claim to what was looked for and not found: it is compiled now, or can't be."""
         name, self._claimed = self._claimed, None
         if name is not None:
             self._folder.release(name)
