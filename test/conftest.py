@@ -1,5 +1,6 @@
 """Which tests belong to `-m quick`, and in which order several processes take the files of tests."""
 
+import gc
 from hashlib import blake2b
 from pathlib import Path
 
@@ -15,6 +16,15 @@ LONGEST = (
     "bag/test_replay.py", "view/test_page.py", "test_simulation.py",
 )  # fmt: skip
 """Files that took more than 35 s where three processes shared two cores, the longest first."""
+
+
+def pytest_collection() -> None:
+    """No look for garbage while modules are imported: they stay, and the looks would take a fifth of the time."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
