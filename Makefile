@@ -15,7 +15,7 @@ SCENE ?= config/paper_plant.yaml
 VENV := $(if $(filter jazzy,$(DISTRO)),.venv,.venv-$(DISTRO))
 PYTHON := $(VENV)/bin/python
 # Three processes of tests on two cores: many wait for others. A module stays in one, for its tests share nodes and what was compiled.
-# They begin with the files that test/conftest.py puts first, not with those of the most tests.
+# test/conftest.py says what one of them takes whole, and what they begin with.
 SIDE_BY_SIDE := --numprocesses=3 --dist=loadfile --no-loadscope-reorder
 
 # The environment is private: nothing of a sourced ROS, nor of another environment of ROS wheels, may reach it.

@@ -1,7 +1,9 @@
 """Which tests belong to `-m quick`, and in which order several processes take the files of tests."""
 
+import gc
 from hashlib import blake2b
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,12 +11,28 @@ HERE = Path(__file__).parent
 QUICK = frozenset({"control", "effects", "laws", "model", "scene", "state", "support", "timestep"})
 """Folders. The others start nodes and processes, take whole lines through minutes, or draw."""
 
-LONGEST = (
-    "hard_cases/test_hard_cases.py", "fuzz/test_fuzz.py", "ros/test_floods.py", "engine/test_riding.py",
-    "state/test_checkpoint.py", "view/test_live.py", "timestep/test_prediction.py", "test_shipped_scenes.py",
-    "bag/test_replay.py", "view/test_page.py", "test_simulation.py",
+COMPILING = (
+    "hard_cases/", "physics/", "state/", "timestep/", "effects/", "stepping/", "engine/test_riding.py",
+    "engine/test_dormand_prince.py", "accuracy/test_closed_forms.py", "accuracy/test_resting.py", "bag/test_replay.py",
 )  # fmt: skip
-"""Files that took more than 35 s where three processes shared two cores, the longest first."""
+"""Folders and files that spend most of their time compiling. One process takes them all: two kernels have parts in
+common, which each process compiles for itself.
+"""
+
+LONGEST = (
+    "fuzz/test_fuzz.py", "ros/test_floods.py", "view/test_live.py", "test_shipped_scenes.py", "view/test_page.py",
+    "test_simulation.py",
+)  # fmt: skip
+"""Other files that took more than 35 s where three processes shared two cores, the longest first."""
+
+
+def pytest_collection() -> None:
+    """No look for garbage while modules are imported: they stay, and the looks would take a fifth of the time."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -26,9 +44,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.quick)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """As `--dist=loadfile` has it, but for what compiles."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file: str = super()._split_scope(nodeid)
+            return "what compiles" if file.removeprefix("test/").startswith(COMPILING) else file
+
+    return Scheduling(config, log)
+
+
 def _turn(file: Path) -> tuple[int, bytes]:
-    """The longest first, so that no process is left with one when the others have ended. The rest by a hash of their
-    names: files of one folder at the same time would all wait, or all want the same kernels compiled.
+    """What compiles, then the longest first, so that no process is left with one when the others have ended. The rest
+    by a hash of their names: files of one folder at the same time would all wait, or all want the same kernels.
     """
     name = file.relative_to(HERE).as_posix() if file.is_relative_to(HERE) else file.name
-    return LONGEST.index(name) if name in LONGEST else len(LONGEST), blake2b(name.encode()).digest()
+    first = -1 if name.startswith(COMPILING) else LONGEST.index(name) if name in LONGEST else len(LONGEST)
+    return first, blake2b(name.encode()).digest()

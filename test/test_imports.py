@@ -23,7 +23,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "version": "engine",
     "support": "errors | rich",
     "control": "",
-    "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel",
+    "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel yaml",
     "laws": "engine scene | numpy",
     "timestep": "laws scene",
     "effects": "engine errors laws scene timestep | numpy",

@@ -23,7 +23,8 @@ EXTRAS = ("foxglove", "mqtt", "scada", "st")
 DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
 TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "what the docs site is built with"}
 SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, where ROS looks for a package's share
-STRIP = ROOT / "tools" / "strip_missing_includes.cmake"
+MESSAGE_BUILD = ROOT / "tools" / "message_build"
+STRIP = MESSAGE_BUILD / "strip_missing_includes.cmake"
 
 
 class SetUpError(Exception):
@@ -65,6 +66,9 @@ class Environment:
     def create(self) -> None:
         say(f"Python {sys.version.split()[0]} environment in {self.path.name}/")
         command([sys.executable, "-I", "-m", "venv", "--clear", self.path], "creating the environment")
+        # Python 3.11 brings a pip that takes twice as long to find what fits together, but finds it: this may fail.
+        pip = [self.python, "-m", "pip", "--disable-pip-version-check", "install", "--no-compile", "pip>=25"]
+        subprocess.run(pip, stdin=subprocess.DEVNULL, capture_output=True)
         self.state = {}
 
     def pip_install(self, what: list, why: str) -> None:
@@ -92,7 +96,10 @@ class Environment:
         log.unlink(missing_ok=True)
         # CMake looks for packages beside every bin/ on PATH: a sourced ROS must not be among them.
         path = [p for p in os.environ["PATH"].split(":") if not (Path(p).parent / "share" / "ament_index").is_dir()]
+        parsed = build / "parsed"
+        parsed.mkdir(parents=True)
         env = {**os.environ, "AMENT_PREFIX_PATH": str(self.path), "PATH": ":".join([f"{self.path}/bin", *path])}
+        env |= {"PYTHONPATH": str(MESSAGE_BUILD), "CONVEYOR_MSGS_PARSED": str(parsed)}
         options = {
             "CMAKE_BUILD_TYPE": "Release",
             "CMAKE_PREFIX_PATH": self.path,
@@ -178,7 +185,8 @@ def set_up(distro: str, tools: list[str]) -> None:
     described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/version.py")
     ros = key(*build, requirements / "run.txt")
     packages = key(ros, *(ROOT / name for name in described))
-    messages = key(*build, STRIP, *sorted(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
+    sources = (*MESSAGE_BUILD.glob("*.*"), *(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))
+    messages = key(*build, *sorted(sources))
     needed = {"ros": ros, "packages": packages, "messages": messages, "index": key(packages, Path(__file__))}
     for tool in tools:
         needed[tool] = key(requirements / f"{tool}.txt", *(requirements / f"{name}.txt" for name in EXTRAS))

@@ -20,7 +20,7 @@ from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.support.files import FileError, in_mb, read_file
 
 _KEPT_TEXT = 200_000
-"""Letters of a text that is kept once it was read: a run asks for its scene some ten times, in 20 ms each."""
+"""Letters of a text that is kept once it was read: a run asks for its scene some ten times, in 3 ms each."""
 _MOST_PROBLEMS = 50  # listed; more would scroll the first ones away
 
 

@@ -3,7 +3,6 @@
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ruamel.yaml.reader import ReaderError
@@ -11,10 +10,11 @@ from ruamel.yaml.reader import ReaderError
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.problems import Path, dotted
 from conveyor_sim.scene.words import cut
+from conveyor_sim.scene.yaml_nodes import TooManyError, compose
 from conveyor_sim.support.files import MB, in_mb
 
 LONGEST_TEXT = 8 * MB
-"""Bytes of a file. A bottle that is listed by itself takes 40 of them and 8 values: 0.4 ms and 8 kB to read."""
+"""Bytes of a file. A bottle that is listed by itself takes 40 of them and 8 values: 0.15 ms and 8 kB to read."""
 
 _DEEPEST = 30  # levels; a scene needs 6, an alias that contains itself has no end
 _LARGEST = 1_000_000  # values; nested aliases grow without bound
@@ -31,16 +31,15 @@ class Document:
         self._name = name
         self._lines: dict[Path, int] = {(): 1}
         self._size = 0
-        self._yaml = YAML(typ="safe", pure=True)
-        self._yaml.Composer = _Composer
+        self._value_of = YAML(typ="safe", pure=True).constructor.construct_object
         if len(text) > LONGEST_TEXT:
             raise SceneError(f"{name}: has {in_mb(len(text))}, expected a scene of at most {in_mb(LONGEST_TEXT)}")
         try:
-            root = self._yaml.compose(text)
+            root = compose(text, _LARGEST)
         except ReaderError as error:
             line = text.count("\n", 0, error.position) + 1
             raise self._error(line, "not valid YAML: a control character that YAML does not allow") from None
-        except _TooManyError as error:
+        except TooManyError as error:
             raise self._error(error.line, _TOO_MANY) from None
         except MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
@@ -107,7 +106,7 @@ class Document:
 
     def _scalar(self, node: Node) -> Any:
         try:
-            value = self._yaml.constructor.construct_object(node)
+            value = self._value_of(node)
             if isinstance(value, int) and value.bit_length() > 1024:
                 raise ValueError("beyond every float")
             if isinstance(value, str):
@@ -117,25 +116,6 @@ class Document:
             text = str(node.value).encode(errors="backslashreplace").decode()
             raise self._error(line, f"a value that can't be read: {cut(text)}") from None
         return value if value is None or isinstance(value, (str, int, float)) else str(node.value)
-
-
-class _TooManyError(Exception):
-    def __init__(self, line: int) -> None:
-        super().__init__()
-        self.line = line
-
-
-class _Composer(Composer):
-    """Stops where a text has too many values, before all of it is in memory."""
-
-    values = 0
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        """One value and all in it."""
-        self.values += 1
-        if self.values > _LARGEST:
-            raise _TooManyError(self.parser.peek_event().start_mark.line + 1)
-        return super().compose_node(parent, index)
 
 
 def _one_line(error: MarkedYAMLError) -> str:

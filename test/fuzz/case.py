@@ -14,6 +14,8 @@ from fuzz.scenes import scenes
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
+from conveyor_sim.scene.yaml_lines import Document
+
 MOST_TICKS = 200
 
 
@@ -56,13 +58,14 @@ class Case:
 
 def load_case(file: Path) -> Case:
     """The case that a scene file and the script beside it are."""
-    yaml = YAML(typ="safe", pure=True)
-    script = yaml.load(file.with_suffix(".script.yaml").read_text(encoding="utf-8"))
+    scene, script = (
+        Document(one.read_text(encoding="utf-8"), one.name).data for one in (file, file.with_suffix(".script.yaml"))
+    )
     sent = [
         Command(one["tick"], tuple(one["names"]), tuple(map(float, one["values"])), one.get("fault", False))
         for one in script["commands"]
     ]
-    return Case(yaml.load(file.read_text(encoding="utf-8")), **{**script, "commands": sent})
+    return Case(scene, **{**script, "commands": sent})
 
 
 def yaml_text(data: Any) -> str:

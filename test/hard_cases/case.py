@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-
 from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.timestep.presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -162,7 +161,7 @@ def bounds(wanted: Any, preset: str) -> tuple[float, float]:
 
 def read_table() -> list[Case]:
     """All rows, in order."""
-    data = YAML(typ="safe", pure=True).load(TABLE.read_text(encoding="utf-8"))
+    data = Document(TABLE.read_text(encoding="utf-8"), TABLE.name).data
     return [
         Case(family=family, given=row["scene"], **{key: value for key, value in row.items() if key != "scene"})
         for family, rows in data["cases"].items()

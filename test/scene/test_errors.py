@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene import load_scene, parse_scene, yaml_lines
@@ -12,7 +11,7 @@ from conveyor_sim.support.resources import scene_path
 
 HERE = Path(__file__).parent
 GOOD = (HERE / "good.yaml").read_text(encoding="utf-8")
-CASES = YAML(typ="safe", pure=True).load((HERE / "bad_scenes.yaml").read_text(encoding="utf-8"))
+CASES = yaml_lines.Document((HERE / "bad_scenes.yaml").read_text(encoding="utf-8"), "bad_scenes.yaml").data
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["id"] for case in CASES])

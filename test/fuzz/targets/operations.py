@@ -18,7 +18,6 @@ import numpy as np
 from fuzz.device_invariants import DeviceWatch
 from fuzz.play import check_sentence
 from fuzz.violation import Violation
-from ruamel.yaml import YAML
 
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
@@ -32,6 +31,7 @@ from conveyor_sim.line.time_account import CATEGORIES
 from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.scene import Scene, parse_scene
+from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
 
 BASE = Path(__file__).parents[3] / "config" / "scenarios" / "two_stations.yaml"
@@ -78,7 +78,7 @@ def attack(seed: int, folder: Path) -> str:
 
 @cache
 def _plain() -> str:
-    return json.dumps(YAML(typ="safe", pure=True).load(BASE.read_text(encoding="utf-8")))
+    return json.dumps(Document(BASE.read_text(encoding="utf-8"), BASE.name).data)
 
 
 def drawn(rng: random.Random) -> Scene:

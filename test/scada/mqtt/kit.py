@@ -182,10 +182,11 @@ class Host:
             self.alive["line"] = kind == "DBIRTH"
         for name, metric in heard.metrics.items():
             assert metric.timestamp > 0 and metric.datatype > 0
-            self.values[name] = value_of(metric)
             found = properties_of(metric)
             self.qualities[name] = found.get("Quality", 192)
             (self.forced.add if found.get("forced") else self.forced.discard)(name)
+        # All at once: tests read them from another thread, and what is in one message belongs together.
+        self.values |= {name: value_of(metric) for name, metric in heard.metrics.items()}
 
     def kinds(self) -> list[str]:
         return [heard.kind for heard in self.heard]
