@@ -66,8 +66,8 @@ class Environment:
     def create(self) -> None:
         say(f"Python {sys.version.split()[0]} environment in {self.path.name}/")
         command([sys.executable, "-I", "-m", "venv", "--clear", self.path], "creating the environment")
-        # Python 3.11 brings a pip that takes twice as long to find what fits together, but finds it: this may fail.
-        pip = [self.python, "-m", "pip", "--disable-pip-version-check", "install", "--no-compile", "pip>=25"]
+        # The pip that comes with Python 3.11 takes twice as long. If no newer one can be had, it will do.
+        pip = [self.python, "-m", "pip", "--disable-pip-version-check", "install", "--no-compile", "pip>=25,<27"]
         subprocess.run(pip, stdin=subprocess.DEVNULL, capture_output=True)
         self.state = {}
 

@@ -1,6 +1,7 @@
-"""YAML text to nodes: by libyaml, the faster, where it reads what ruamel.yaml does; else by that, which knows YAML 1.2.
+"""YAML text to nodes (https://yaml.org/spec/1.2.2), by one of two libraries.
 
-What is wrong with a text is always said in ruamel's words: libyaml's refusals are not shown.
+libyaml is much faster, and follows YAML 1.1: it reads what both understand in the same way. ruamel.yaml, which follows
+YAML 1.2, reads all other texts, and says what is wrong with a text.
 """
 
 import re
@@ -17,9 +18,9 @@ from ruamel.yaml.tag import Tag
 _LIBYAML = getattr(yaml, "CSafeLoader", None)
 """None where PyYAML was built without it."""
 _ORDINARY = re.compile("[\n -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]*")
-"""No tab, no line end but \\n, no byte order mark: of these YAML 1.1, which is libyaml's, has rules of its own."""
+"""Texts without tabs, byte order marks and line ends other than \\n: YAML 1.1 has other rules for these."""
 _READ_OTHERWISE = re.compile(r"""[]}"']:\S|[&*][\w-]+[?:%@`]|^\.\.\.""", re.MULTILINE)
-"""A colon right behind a bracket or a quote, a name of an alias with such a sign in it, the end of a document."""
+"""The two differ in a colon right after a bracket or a quote, in anchors with such signs in their names, in "..."."""
 
 _RESOLVER = VersionedResolver()
 _MAPPING, _SEQUENCE, _STRING = (Tag(suffix=f"tag:yaml.org,2002:{name}") for name in ("map", "seq", "str"))
@@ -35,9 +36,10 @@ class TooManyError(Exception):
 
 
 def compose(text: str, most: int) -> Node | None:
-    """The root of the one document of a text; None if there is nothing in it. What is an alias of a node is that node.
+    """Read a text of one document. Returns its root; None if the text is empty. An alias is the node that it names.
 
-    Raises TooManyError for more than `most` values, before all are in memory; RecursionError; YAMLError of ruamel.
+    most: values, an alias counted as one. Raises TooManyError if there are more, before all of them are in memory;
+    RecursionError if they are nested too deeply; ruamel's YAMLError for what is no YAML.
     """
     if _LIBYAML and _ORDINARY.fullmatch(text) and not _READ_OTHERWISE.search(text):
         try:
@@ -48,7 +50,7 @@ def compose(text: str, most: int) -> Node | None:
 
 
 def compose_in_full(text: str, most: int) -> Node | None:
-    """As `compose`, by ruamel whatever the text."""
+    """As `compose`, but always by ruamel."""
     reader = YAML(typ="safe", pure=True)
     reader.Composer = _RuamelComposer
     reader.composer.left = most
@@ -117,13 +119,13 @@ class _LibyamlComposer:
         return mapping
 
     def _kept(self, event: Any, node: Node) -> Node:
-        """Before what is in it is read: an alias may be within what it stands for."""
+        """Keep a node by its anchor, before its content is read: an alias in there may name it."""
         if event.anchor is not None:
             self._named[event.anchor] = node
         return node
 
     def _scalar(self, event: Any) -> ScalarNode:
-        # Of an empty value they see the line in different places, of a block of text its end.
+        # The two put an empty value on different lines, and end a block of text at different places.
         if event.style in ("|", ">") or not (event.value or event.style):
             raise _OtherwiseError
         tag = _tag(event.value) if event.implicit[0] else _STRING

@@ -1,6 +1,6 @@
-"""Read by every Python that starts while conveyor_msgs is built: keeps what ROS's generators make of an IDL file.
+"""Every Python that starts while conveyor_msgs is built runs this: each IDL file is parsed once.
 
-Nine generators parse each of the same files, which takes two thirds of their time.
+ROS has nine generators, and each would parse all files, which takes two thirds of its time.
 """
 
 import os
