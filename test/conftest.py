@@ -15,8 +15,8 @@ COMPILING = (
     "hard_cases/", "physics/", "state/", "timestep/", "effects/", "stepping/", "engine/test_riding.py",
     "engine/test_dormand_prince.py", "accuracy/test_closed_forms.py", "accuracy/test_resting.py", "bag/test_replay.py",
 )  # fmt: skip
-"""Folders and files that spend most of their time compiling. One process takes them all: two kernels have parts in
-common, which each process compiles for itself.
+"""Folders and files that spend most of their time compiling kernels. One process takes them all: kernels share parts,
+and each process compiles the parts again.
 """
 
 LONGEST = (
@@ -27,7 +27,7 @@ LONGEST = (
 
 
 def pytest_collection() -> None:
-    """No look for garbage while modules are imported: they stay, and the looks would take a fifth of the time."""
+    """No garbage collection while test modules are imported: it takes a fifth of the time, and modules stay."""
     gc.disable()
 
 
@@ -46,7 +46,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """As `--dist=loadfile` has it, but for what compiles."""
+    """`--dist=loadfile`, but all that compiles is one unit of work."""
     if config.getoption("dist") != "loadfile":
         return None
     from xdist.scheduler import LoadFileScheduling

@@ -56,7 +56,7 @@ def test_a_text_of_the_pages_is_the_same(text: str) -> None:
 
 @pytest.mark.filterwarnings("ignore::ruamel.yaml.error.ReusedAnchorWarning")
 @pytest.mark.parametrize("text", READ_OTHERWISE.values(), ids=READ_OTHERWISE)
-def test_what_both_do_not_read_alike_is_ruamels(text: str) -> None:
+def test_what_libyaml_reads_otherwise_is_left_to_ruamel(text: str) -> None:
     assert outcome(compose, text) == outcome(compose_in_full, text)
 
 
