@@ -9,10 +9,11 @@ import io
 import json
 import math
 import os
+import re
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import numpy as np
 from numpy.lib import format as npy
@@ -41,6 +42,10 @@ MOST = 512 * MB
 _HEADER = "header"
 _MAGIC = b"PK\x03\x04"
 _CHECKSUM, _DIGITS = b"sha256:", 64
+_LOCAL, _NAMES = 30, slice(26, 30)
+"""Bytes of the fixed part of a .zip's entry, and where it has the lengths of its name and of its extra field."""
+_BEGINNING = re.compile(rb'\x93NUMPY.{1,400}\n\{"format": \d{1,9}, "versions": \["engine=', re.DOTALL)
+"""The header of every format so far: a NumPy array that holds JSON."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ def write_checkpoint(
     """Write a file in one go: it is complete, or what was there before is untouched.
 
     memory: as JSON can hold it, as is what the controller remembers. folder: which the path may not leave. Raises
-    CheckpointError.
+    CheckpointError, also if the path names a file that is not a checkpoint (of any format, damaged ones included).
     """
     source = {"text": scene.source_text, "name": scene.source_name, "overrides": scene.overrides_text}
     header = {"format": FORMAT, "versions": versions(), "scene": source, "memory": memory, "controller": controller}
@@ -93,9 +98,19 @@ def write_checkpoint(
     if size > MOST - MB:
         raise CheckpointError(f"{path}: would have {in_mb(size)}, expected a state of less than {in_mb(MOST - MB)}")
     try:
-        write_file(path, sealed(json.dumps(header), arrays), folder)
+        write_file(path, sealed(json.dumps(header), arrays), folder, _objection)
     except FileError as error:
         raise CheckpointError(f"{path}: {error}, expected {_place(path, folder)}") from error
+
+
+def _objection(stream: BinaryIO) -> str:
+    """Return why a file may not be replaced by a checkpoint, "" for a file that begins with a checkpoint's header."""
+    entry = stream.read(_LOCAL)
+    name, extra = entry[_NAMES][:2], entry[_NAMES][2:]
+    path = stream.read(int.from_bytes(name, "little"))
+    stream.seek(int.from_bytes(extra, "little"), os.SEEK_CUR)
+    is_one = entry.startswith(_MAGIC) and path == f"{_HEADER}.npy".encode() and _BEGINNING.match(stream.read(1000))
+    return "" if is_one else "is not a checkpoint and is not replaced"
 
 
 def sealed(header: str, arrays: Arrays) -> bytes:
@@ -220,7 +235,7 @@ def _expected(folder: Path | None) -> str:
 
 def _place(path: Path, folder: Path | None) -> str:
     if folder is not None:
-        return f"a file in {folder} that can be written, and room for it"
+        return f"a new name or a checkpoint in {folder}, and room for it"
     if not os.path.isdir(path.parent):
         return f"the folder {path.parent} to be there"
-    return "a file that can be written, and room for it"
+    return "a new name or a checkpoint, and room for it"

@@ -7,8 +7,10 @@ Nobody can put another file in its place in between.
 
 import os
 import stat
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 from uuid import uuid4
 
 MB = 1_000_000
@@ -20,6 +22,10 @@ _KINDS = {
     stat.S_IFCHR: "is a device, not a regular file",
     stat.S_IFBLK: "is a device, not a regular file",
 }
+
+
+Objection = Callable[[BinaryIO], str]
+"""Reads a file from its beginning and returns why it may not be replaced, in words that follow its path; "" if it may."""
 
 
 class FileError(Exception):
@@ -59,10 +65,11 @@ def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
     return content
 
 
-def write_file(path: Path, content: bytes, folder: Path | None = None) -> None:
+def write_file(path: Path, content: bytes, folder: Path | None = None, objection: Objection | None = None) -> None:
     """Write a file in one go: it is complete and on the disk, or what was there before is untouched.
 
     A link of that name is replaced, not followed. folder: as for `read_file`; it is made if it is not there.
+    objection: checks a file of that name, or the file that a link of that name leads to; None: any file is replaced.
     Raises FileError.
     """
     try:
@@ -74,7 +81,7 @@ def write_file(path: Path, content: bytes, folder: Path | None = None) -> None:
         parent = os.open(place.parent, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
             _require_below(parent, folder)
-            _replace(parent, place.name, content)
+            _replace(parent, place.name, content, objection)
         finally:
             os.close(parent)
     except (OSError, ValueError) as error:
@@ -86,11 +93,8 @@ def in_mb(size: int) -> str:
     return f"{size / MB:.3g} MB" if size < 1000 * MB else f"{size / MB:.0f} MB"
 
 
-def _replace(parent: int, name: str, content: bytes) -> None:
-    with suppress(FileNotFoundError):
-        kind = stat.S_IFMT(os.stat(name, dir_fd=parent, follow_symlinks=False).st_mode)
-        if kind in _KINDS:
-            raise FileError(_KINDS[kind])
+def _replace(parent: int, name: str, content: bytes, objection: Objection | None) -> None:
+    _is_there(parent, name, objection)  # a refusal costs no write
     unfinished = f".{uuid4().hex}.unfinished"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     try:
@@ -98,10 +102,49 @@ def _replace(parent: int, name: str, content: bytes) -> None:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        os.replace(unfinished, name, src_dir_fd=parent, dst_dir_fd=parent)
+        # Another program may have put a file there while this one was written.
+        if _is_there(parent, name, objection) or objection is None or not _linked(parent, unfinished, name):
+            _is_there(parent, name, objection)
+            os.replace(unfinished, name, src_dir_fd=parent, dst_dir_fd=parent)
     finally:
         with suppress(OSError):
             os.unlink(unfinished, dir_fd=parent)
+
+
+def _linked(parent: int, unfinished: str, name: str) -> bool:
+    """Give a finished file its name, which must be free. Return False if it is taken or there are no hard links."""
+    try:
+        os.link(unfinished, name, src_dir_fd=parent, dst_dir_fd=parent, follow_symlinks=False)
+    except OSError:
+        return False
+    return True
+
+
+def _is_there(parent: int, name: str, objection: Objection | None) -> bool:
+    """Return True if there is a file of that name. Raise FileError if it may not be replaced."""
+    try:
+        kind = stat.S_IFMT(os.stat(name, dir_fd=parent, follow_symlinks=False).st_mode)
+    except FileNotFoundError:
+        return False
+    if kind in _KINDS:
+        raise FileError(_KINDS[kind])
+    if objection is None:
+        return True
+    try:
+        opened = os.open(name, os.O_PATH | os.O_CLOEXEC, dir_fd=parent)
+    except FileNotFoundError:
+        raise FileError("is a link to a file that does not exist") from None
+    try:
+        kind = stat.S_IFMT(os.fstat(opened).st_mode)
+        if kind in _KINDS:
+            raise FileError(f"is a link to what {_KINDS[kind]}")
+        with open(os.open(_of(opened), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
+            reason = objection(stream)
+    finally:
+        os.close(opened)
+    if reason:
+        raise FileError(reason)
+    return True
 
 
 def _in_folder(path: Path, folder: Path | None) -> Path:

@@ -157,7 +157,12 @@ def test_what_can_not_be_saved_is_told(line: LineClient, folder: Path) -> None:
     response = save(line, folder / "no" / "file")
     assert (response.success, response.tick) == (False, 3)
     assert response.message.startswith(f"{folder / 'no' / 'file'}: can't be written (No such file or directory)")
-    assert "is a folder, expected a file" in save(line, "").message
+    assert "is a folder, expected a new name or a checkpoint" in save(line, "").message
+    (folder / "mine.yaml").write_text("name: mine\n")
+    response = save(line, "mine.yaml")
+    assert (response.success, response.tick) == (False, 3)
+    assert response.message.startswith(f"{folder / 'mine.yaml'}: is not a checkpoint and is not replaced")
+    assert (folder / "mine.yaml").read_text() == "name: mine\n"
 
 
 @pytest.mark.parametrize("ask", [save, load])

@@ -657,7 +657,7 @@ def test_a_file_that_can_not_be_written_is_told_and_nothing_is_left(saved: Path,
     assert failure_to_save(sim, tmp_path / "no" / "file") == (
         f"can't be written (No such file or directory), expected the folder {tmp_path / 'no'} to be there"
     )
-    assert failure_to_save(sim, tmp_path) == "is a folder, expected a file that can be written, and room for it"
+    assert failure_to_save(sim, tmp_path) == "is a folder, expected a new name or a checkpoint, and room for it"
     locked.mkdir(mode=0o500)
     with as_nobody():
         assert failure_to_save(sim, locked / "file").startswith("can't be written (Permission denied), expected ")
@@ -674,6 +674,6 @@ def test_a_full_disk_leaves_the_checkpoint_that_was_there(saved: Path, tmp_path:
         told = failure_to_save(sim, file)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert told == "can't be written (File too large), expected a file that can be written, and room for it"
+    assert told == "can't be written (File too large), expected a new name or a checkpoint, and room for it"
     assert file.read_bytes() == whole
     assert [left.name for left in tmp_path.iterdir()] == ["checkpoint"]
