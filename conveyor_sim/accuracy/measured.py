@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 from conveyor_sim.accuracy.bars import Bars
 from conveyor_sim.accuracy.candidates import candidates, compared, forbidden, own_setting, preset_setting
@@ -15,7 +14,8 @@ from conveyor_sim.accuracy.cases import closed_forms
 from conveyor_sim.accuracy.effort import PROCESSORS, Effort, bars_with_left
 from conveyor_sim.accuracy.measure.cpu import Meter
 from conveyor_sim.accuracy.measure.precision import COST_BUDGET, FIRST_COST_BUDGET, FIRST_WORK, MOST_WORK, WorkPrecision
-from conveyor_sim.accuracy.measure.sample_file import check_origin
+from conveyor_sim.accuracy.measure.sample_file import check_origin, fingerprint
+from conveyor_sim.accuracy.report.files import write
 from conveyor_sim.accuracy.report.forecast import forecast, foretold
 from conveyor_sim.accuracy.report.no_contact import NoContact
 from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
@@ -25,10 +25,14 @@ from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.model.remedies import STEP_COST
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.files import FileError
 from conveyor_sim.support.machine import machine
+from conveyor_sim.support.sealed_json import read_sealed, sealed
 from conveyor_sim.timestep.presets import PRESETS
 
 MEASURED = "measured.json"
+MEASURED_OF = "measured_of"
+"""Field of that file: the fingerprint of scene and version."""
 
 BUDGET_SPENT = {"closed forms": "not run within the budget (--thorough does)"}
 
@@ -72,19 +76,14 @@ def measured_once(
     check_origin(folder, scene)
     file = folder / MEASURED
     if file.exists():
-        kept = _read(file)
+        kept = _read(file, scene)
         if not kept.left_out or math.isfinite(effort.measuring):
             return kept
     with Meter(compiles) as meter:
         left = bars_with_left(bars, lambda: max(0.0, effort.budget / PROCESSORS - meter.cpu))
         measured = _measure(scene, tolerance, effort, left, meter, preliminary)
     measured = replace(measured, cpu=meter.cpu, compiling=meter.compiling)
-    part = file.with_suffix(".part")
-    try:
-        part.write_text(json.dumps(plain(measured), indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        raise ConveyorError(f"{file}: can't be written ({error.strerror}), expected a folder to write to") from None
+    write(file, sealed({MEASURED_OF: fingerprint(scene), **cast("dict[str, object]", plain(measured))}, indent=1))
     return measured
 
 
@@ -184,10 +183,15 @@ def _closed_forms(scene: Scene, bars: Bars) -> tuple[tuple[Order, ...], dict[str
     return tuple(found), without
 
 
-def _read(file: Path) -> Measured:
+def _read(file: Path, scene: Scene) -> Measured:
     try:
-        measured = typed(Measured, json.loads(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError, Unlike) as error:
+        kept = read_sealed(file)
+        if not kept.sealed:
+            raise FileError("has no checksum")
+        if kept.data.pop(MEASURED_OF, None) != fingerprint(scene):
+            raise FileError("was measured in another scene or version")
+        measured = typed(Measured, kept.data)
+    except (FileError, Unlike) as error:
         raise ConveyorError(f"{file}: {error}; expected what an earlier study wrote, or no such file") from None
     assert isinstance(measured, Measured)
     return measured

@@ -154,6 +154,8 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
         from conveyor_sim.studies.verdict import verdicts
 
     found = read_results(results)
+    if not found.verified:
+        say(f"{results}: was made by an older version without checksums, so it can't be verified")
     if not any(row.status == "finished" for row in found.rows):
         raise ConveyorError(f"{results}: none of its {len(found.rows)} runs has finished, expected one at least")
     show(points_table(found.rows, found.units, found.parameters))

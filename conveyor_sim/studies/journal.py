@@ -3,55 +3,66 @@
 from __future__ import annotations
 
 import fcntl
-import json
+import hashlib
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, suppress
-from dataclasses import asdict, fields
-from hashlib import blake2b
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
+from conveyor_sim.studies.origin import ORIGIN, WARM_UP, Origin, deciding, origin_of, read_origin, read_study_json
 from conveyor_sim.studies.row import BAGS, Job, Pilot, Row
+from conveyor_sim.studies.run_file import (
+    MADE_WITH,
+    RUNS,
+    content_of,
+    made_with,
+    name_of,
+    objection,
+    read_row,
+    run_files,
+)
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
-from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
+from conveyor_sim.support.sealed_json import Kept, sealed
 
-ORIGIN = "study.json"
-"""What a folder's runs are of."""
 SOURCE = "study.yaml"
-RUNS = "runs"
+"""The study as text, for people: commands read it in ORIGIN."""
 STARTS = "warm_starts"
 PILOTS = "pilots"
 """Runs that find the warm-up."""
-WARM_UP = "warm_up"
-"""What they have found, in ORIGIN."""
-VERSION = "version of conveyor_sim"
 UNITS = "units.json"
 """Of metrics and parameters, what each metric is, and the path of the study."""
 ASKED = "asked"
 """What each metric is, in UNITS."""
-FREE = ("description", "seeds", "bags", "metrics", "optimise", "points")
-"""Fields of a study that may change while its finished runs stay: all but these decide a run."""
-
-_FIELDS = {item.name for item in fields(Row)}
+ACCURACY = "origin.json"
+"""A file that `conveyor-sim accuracy` writes first into a folder."""
+ASIDE = ".unusable"
+"""Added to the name of a file that is damaged or of another study. Such a file is kept and never read."""
+NAMED = 10
+"""Unusable files that are named one by one."""
+LARGEST_START = 512 * MB
 
 
 class Journal(AbstractContextManager["Journal"]):
     """The finished runs of one study, by their keys. One process at a time writes it."""
 
-    def __init__(self, folder: Path, setup: Setup) -> None:
-        """Read what is there. The folder is made.
+    def __init__(self, folder: Path, setup: Setup, say: Callable[[str], object] = lambda _: None) -> None:
+        """Read what is there. The folder is made. A file that is damaged, or of another study, is set aside and named.
 
-        Raises StudyError if it has runs of another study or version, another process works on it, or it can't be
-        written.
+        say: called with each sentence on such a file. Raises StudyError if the runs are of another study or version,
+        another process works on the folder, or it can't be written.
         """
         self.folder = folder
-        self._setup, self._asked = setup, setup.asked
+        self._setup, self._asked, self._say, self._aside = setup, setup.asked, say, 0
         self.warm_up: float | None = None
         """s, as pilot runs have found it; None: they have not yet, or need not."""
+        self.rows: dict[tuple[int, int], Row] = {}
+        """Those that were there, and those added since."""
         try:
             (folder / RUNS).mkdir(parents=True, exist_ok=True)
             self._lock = open(folder / ".lock", "ab")  # noqa: SIM115 (closed by __exit__)
@@ -61,11 +72,13 @@ class Journal(AbstractContextManager["Journal"]):
                 raise StudyError(f"{folder}: another process works on this study, expected it to end first") from None
             except OSError:
                 pass  # a file system without locks
-            self._check_origin()
+            try:
+                self._read()
+            except BaseException:
+                self._lock.close()
+                raise
             for cut_short in (folder / BAGS).glob(".*"):  # by a process that was killed
                 shutil.rmtree(cut_short, ignore_errors=True)
-            self.rows = {row.key: row for row in read_rows(folder) if row.status != "lost"}
-            """Those that were there, and those added since."""
         except OSError as error:
             raise StudyError(f"{error.filename or folder}: {error.strerror}, expected a folder to write to") from None
 
@@ -87,7 +100,7 @@ class Journal(AbstractContextManager["Journal"]):
 
     def add(self, row: Row) -> None:
         """Keep a run; when this returns, it is on the disk. Raises StudyError if it can't be written."""
-        self._write(Path(RUNS) / f"point_{row.point}_seed_{row.seed}.json", json.dumps(asdict(row), default=str))
+        self._write(Path(name_of(row)), content_of(row, self._made_with))
         self.rows[row.key] = row
 
     def start_of(self, seed: int) -> Path:
@@ -95,139 +108,227 @@ class Journal(AbstractContextManager["Journal"]):
         forced = "".join(f"_{effect}" for effect in sorted(self._setup.needs({}).get("effects", {})))
         return self.folder / STARTS / f"seed_{seed}{forced}.npz"
 
+    def has_start(self, seed: int) -> bool:
+        """Return True if the warm start of a seed is there and intact."""
+        start = self.start_of(seed)
+        mark = start.with_suffix(".json")
+        try:
+            digest = self._own(mark).get("start")
+        except FileError as error:
+            self._set_aside(mark, str(error))
+            self._set_aside(start, f"has no intact {mark.name} beside it")
+            return False
+        try:
+            if digest == hashlib.sha256(read_file(start, LARGEST_START)).hexdigest():
+                return True
+            reason = f"does not fit the checksum in {mark.name}"
+        except FileError as error:
+            reason = str(error)
+        self._set_aside(start, reason)
+        return False
+
     def keep_start(self, seed: int, content: bytes) -> None:
         """Keep a warm start. Raises StudyError if it can't be written."""
-        self._write(self.start_of(seed).relative_to(self.folder), content)
+        start = self.start_of(seed).relative_to(self.folder)
+        self._write(start, content)
+        mark = {"start": hashlib.sha256(content).hexdigest()}
+        self._write(start.with_suffix(".json"), sealed({**mark, MADE_WITH: self._made_with}))
 
     def pilot_of(self, job: Job) -> Pilot | None:
         """What a pilot run has shown before; None if it is to be made."""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            found = json.loads((self.folder / _pilot(job)).read_text(encoding="utf-8"))
-            if (found["parameters"], found["asked"]) == (dict(job.parameters), self._asked):
+        file = self.folder / _pilot(job)
+        try:
+            found = self._own(file, finite=False)
+            if (found.get("parameters"), found.get("asked")) == (dict(job.parameters), self._asked):
                 return Pilot(found["part"], found["series"])
+        except FileError as error:
+            self._set_aside(file, str(error))
         return None
 
     def keep_pilot(self, job: Job, made: Pilot) -> None:
         """Keep a pilot run. Raises StudyError if it can't be written."""
         about = {"parameters": dict(job.parameters), "asked": self._asked}
-        self._write(_pilot(job), json.dumps({**about, **asdict(made)}))
+        self._write(_pilot(job), sealed({**about, **asdict(made), MADE_WITH: self._made_with}))
 
     def keep_warm_up(self, seconds: float) -> None:
         """Keep what pilot runs have found: that of all runs in the folder. Raises StudyError if it can't be written."""
-        self._write(Path(ORIGIN), json.dumps({**origin_of(self._setup), WARM_UP: seconds}, indent=1))
         self.warm_up = seconds
+        self._write_origin()
 
     @property
     def has_units(self) -> bool:
         """Whether those are kept that belong to the metrics of today."""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            found = json.loads((self.folder / UNITS).read_text(encoding="utf-8"))
-            return bool((found["path"], found[ASKED]) == (self._setup.path, self._asked))
-        return False
+        file = self.folder / UNITS
+        try:
+            found = self._own(file)
+            return (found.get("path"), found.get(ASKED)) == (self._setup.path, self._asked)
+        except FileError as error:
+            self._set_aside(file, str(error))
+            return False
 
     def keep_units(self, metrics: Mapping[str, str], parameters: Mapping[str, str]) -> None:
         """Keep the units of metrics and parameters. Raises StudyError if they can't be written."""
         units = {"units": dict(metrics), "parameters": dict(parameters)}
-        about = {"path": self._setup.path, ASKED: self._asked, **units}
-        self._write(Path(UNITS), json.dumps(about, indent=1))
+        about = {"path": self._setup.path, ASKED: self._asked, **units, MADE_WITH: self._made_with}
+        self._write(Path(UNITS), sealed(about, indent=1))
 
-    def _write(self, name: Path, content: str | bytes) -> None:
+    @property
+    def _made_with(self) -> dict[str, Any]:
+        return made_with(origin_of(self._setup), self.warm_up)
+
+    def _write(self, name: Path, content: bytes) -> None:
         path = self.folder / name
         try:
             path.parent.mkdir(exist_ok=True)
-            write_file(path, content.encode() if isinstance(content, str) else content)
+            write_file(path, content)
         except (FileError, OSError) as error:
             reason = error if isinstance(error, FileError) else f"can't be written ({error.strerror})"
             raise StudyError(
                 f"{path}: {reason}; {len(self.rows)} finished runs are kept, and the same command goes on with them"
             ) from None
 
-    def _check_origin(self) -> None:
-        origin, path = origin_of(self._setup), self.folder / ORIGIN
-        found: Any = None
-        if path.exists():
-            with suppress(ValueError):
-                found = json.loads(path.read_text(encoding="utf-8"))
-        elif any((self.folder / RUNS).iterdir()):
-            found = {}
-        if found is None:
-            self.rows = {}
-            self._write(Path(ORIGIN), json.dumps(origin, indent=1))
-            self._keep_source()
+    def _write_origin(self) -> None:
+        """Write what the runs are made with, and the study as it is now: its FREE fields may have changed."""
+        origin = Origin(origin_of(self._setup), self.warm_up, self._setup.source, True)
+        file = self.folder / ORIGIN
+        with suppress(FileError):
+            if read_file(file, 2 * len(origin.content())) == origin.content():
+                return
+        self._write(Path(ORIGIN), origin.content())
+
+    def _own(self, file: Path, finite: bool = True) -> dict[str, Any]:
+        """Return the content of a file that was made with what this study is made with. Raises FileError."""
+        kept = read_study_json(file, finite)
+        made = kept.data.pop(MADE_WITH, None)
+        if not kept.sealed or not isinstance(made, dict):
+            raise FileError("has no checksum")
+        if any(made.get(what) != value for what, value in origin_of(self._setup).items()):
+            raise FileError("was made with another study")
+        return kept.data
+
+    def _set_aside(self, file: Path, reason: str) -> None:
+        """Rename a file that can't be used, if it is there, so that nothing is lost when it is made again."""
+        if not file.is_symlink() and not file.exists():
             return
-        self.warm_up = found.get(WARM_UP) if isinstance(found, dict) else None
-        other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
-        if other:
-            fields = ", ".join(self._other_fields())
-            named = [f"{what} ({fields})" if what == "study" and fields else what for what in other]
-            raise StudyError(
-                f"{self.folder}: its runs were made with another {' and another '.join(named)}, so they can't be "
-                "compared with new ones; expected another folder, or this one emptied to begin anew"
-            )
+        names = (file.with_name(f"{file.name}{ASIDE}{number or ''}") for number in range(10_000))
+        free = next(name for name in names if not name.is_symlink() and not name.exists())
+        file.rename(free)
+        self._aside += 1
+        if self._aside <= NAMED:
+            self._say(f"{file}: {reason}; it is kept as {free.name} and made again")
+        elif self._aside == NAMED + 1:
+            self._say(f"{file.parent}: more such files are kept as *{ASIDE} and made again")
+
+    def _read(self) -> None:
+        """Read the origin and the runs. Set aside what can't be used."""
+        origin, wanted = self.folder / ORIGIN, origin_of(self._setup)
+        if (self.folder / ACCURACY).exists():
+            raise StudyError(f"{self.folder}: has a study of conveyor-sim accuracy, expected another folder")
+        found: Origin | None = None
+        try:
+            found = read_origin(self.folder)
+            if found.fields != wanted:
+                raise self._of_another(found.fields)
+            self.warm_up = found.warm_up
+            if not found.sealed:
+                raise FileError("has no checksum")
+            reason = ""
+        except FileError as error:
+            reason = str(error)
+        runs = list(_runs_in(self.folder))
+        if reason and any(not isinstance(run, FileError) for _, run in runs):
+            self.warm_up = self._warm_up_of(runs, wanted)
+            if not origin.exists():
+                self._say(f"{origin}: {reason}; it is written again by what the runs were made with")
+        if reason:
+            self._set_aside(origin, reason)
+        own = Origin(wanted, self.warm_up, self._setup.source, True)
+        for file, run in runs:
+            problem = str(run) if isinstance(run, FileError) else objection(*run, own)
+            if problem:
+                self._set_aside(file, problem)
+            elif not isinstance(run, FileError) and run[0].status != "lost":
+                self.rows[run[0].key] = run[0]
+        self._write_origin()
         self._keep_source()
+
+    def _warm_up_of(self, runs: _Runs, wanted: Mapping[str, str]) -> float | None:
+        """Return the warm-up of finished runs of this study. Raises StudyError if most intact runs are of others."""
+        made = [run[1].data.get(MADE_WITH, {}) for _, run in runs if not isinstance(run, FileError)]
+        rows = [run[0] for _, run in runs if not isinstance(run, FileError)]
+        own = [(row, dict(one)) for row, one in zip(rows, made, strict=True) if wanted.items() <= dict(one).items()]
+        if 2 * len(own) <= len(made):
+            raise self._of_another(next(dict(one) for one in made if not wanted.items() <= dict(one).items()))
+        finished = [one.get(WARM_UP) for row, one in own if row.status == "finished"]
+        return finished[0] if finished else None
+
+    def _of_another(self, found: Mapping[str, Any]) -> StudyError:
+        other = [what for what, value in origin_of(self._setup).items() if found.get(what) != value]
+        fields = ", ".join(self._other_fields())
+        named = [f"{what} ({fields})" if what == "study" and fields else what for what in other]
+        return StudyError(
+            f"{self.folder}: its runs were made with another {' and another '.join(named)}, so they can't be "
+            "compared with new ones; expected another folder, or this one emptied to begin anew"
+        )
 
     def _other_fields(self) -> list[str]:
         """Of the study, those that decide a run and are others than where its runs were made."""
-        with suppress(OSError, ValueError, SceneError):
-            before = Study.model_validate(parse_overrides((self.folder / SOURCE).read_text(encoding="utf-8")))
-            then, now = _deciding(before), _deciding(self._setup.study)
+        with suppress(FileError, ValueError, SceneError, StudyError):
+            text = read_origin(self.folder).text or read_file(self.folder / SOURCE, MB).decode()
+            before = Study.model_validate(parse_overrides(text))
+            then, now = deciding(before), deciding(self._setup.study)
             return [name for name, value in now.items() if then[name] != value]
         return []
 
     def _keep_source(self) -> None:
-        """The study as it is now: some of its fields may have changed since the folder was made."""
-        with suppress(OSError, ValueError):
-            if (self.folder / SOURCE).read_text(encoding="utf-8") == self._setup.source:
+        """Write the study's text, for people."""
+        with suppress(FileError, ValueError):
+            if read_file(self.folder / SOURCE, 8 * MB).decode() == self._setup.source:
                 return
-        self._write(Path(SOURCE), self._setup.source)
+        self._write(Path(SOURCE), self._setup.source.encode())
 
 
 def _pilot(job: Job) -> Path:
     return Path(PILOTS) / f"point_{job.point}_seed_{job.seed}.json"
 
 
-def origin_of(setup: Setup) -> dict[str, str]:
-    """What decides a run beside its parameters and seed, by what it is."""
-    return {
-        "study": _hash(json.dumps(_deciding(setup.study), sort_keys=True)),
-        "scene": _hash(setup.text, setup.overrides),
-        "code": _hash(*(f"{Path(file).name} {setup.code[file]}" for file in setup.made_by)),
-        "engine": setup.engine,
-        VERSION: setup.sources,
-    }
+_Runs = list[tuple[Path, "tuple[Row, Kept] | FileError"]]
 
 
-def _deciding(study: Study) -> dict[str, Any]:
-    """The fields of a study that decide its runs."""
-    return study.model_dump(mode="json", exclude=set(FREE))
+def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, Kept] | FileError]]:
+    """Files of runs, each with its content or why it can't be used. Raises OSError."""
+    for file in run_files(folder):
+        try:
+            yield file, read_row(folder, file)
+        except FileError as error:
+            yield file, error
 
 
-def fingerprint(setup: Setup) -> str:
-    """A short text by which a study and a version differ from all others."""
-    return _hash(*origin_of(setup).values())[:8]
+def read_rows(folder: Path, origin: Origin | None = None) -> list[Row]:
+    """The finished runs in a folder, in the order of their keys. origin: what its `study.json` says; None: it is read.
 
-
-def read_rows(folder: Path) -> list[Row]:
-    """The finished runs in a folder, in the order of their keys. Raises StudyError for what is no such folder."""
+    Raises StudyError for what is no such folder, and for a run that is damaged or of another study.
+    """
     rows = []
     try:
-        files = [*(folder / RUNS).iterdir()]
+        origin = read_origin(folder) if origin is None else origin
+        for file, run in _runs_in(folder):
+            problem = str(run) if isinstance(run, FileError) else objection(*run, origin)
+            if isinstance(run, FileError) or problem:
+                raise StudyError(
+                    f"{file}: {problem}, expected an intact run of this study; the command that made it makes it "
+                    "again, and without the file the other runs are shown"
+                )
+            rows.append(run[0])
     except OSError as error:
         raise StudyError(f"{folder}: {error.strerror}, expected the folder of a study") from None
-    for file in files:
-        if file.suffix != ".json":
-            continue  # an unfinished one of a process that was killed
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            if set(data) != _FIELDS:
-                raise ValueError
-            rows.append(Row(**data))
-        except (ValueError, TypeError, OSError):
-            raise StudyError(
-                f"{file}: not a run as conveyor_sim writes it, expected it removed to make it anew"
-            ) from None
+    except FileError as error:
+        raise unusable(folder / ORIGIN, error) from None
     return sorted(rows, key=lambda row: row.key)
 
 
-def _hash(*parts: str) -> str:
-    return blake2b("\0".join(parts).encode(), digest_size=8).hexdigest()
+def unusable(file: Path, reason: object) -> StudyError:
+    """The error for a file about a study that is missing, damaged or of another study."""
+    return StudyError(
+        f"{file}: {reason}, expected what conveyor-sim sweep or optimise has written; the same command writes it again"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import shlex
@@ -11,20 +12,25 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.errors import StudyError
+from pydantic import BaseModel, TypeAdapter
+
+from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
-from conveyor_sim.studies.journal import ASKED, ORIGIN, SOURCE, UNITS, VERSION, WARM_UP, read_rows
+from conveyor_sim.studies.journal import SOURCE, UNITS, read_rows, unusable
+from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, Origin, read_origin, read_study_json
 from conveyor_sim.studies.row import Row
+from conveyor_sim.studies.run_file import MADE_WITH, row_of
 from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
-from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
+from conveyor_sim.support.sealed_json import SEAL, parsed
 from conveyor_sim.version import __version__
 
 PARQUET = "results.parquet"
 METADATA = "conveyor_sim"
 """Key of what the file says of itself."""
 FIXED_UNITS = {"simulated": "s", "dt": "s", "wall": "s", "cpu": "s"}
-MOST = 64_000_000
-"""Bytes of a file of units or of a study that are read."""
+MOST = 512 * MB
+"""Bytes of a Parquet file that are read."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,8 @@ class Results:
     rows: Sequence[Row]
     warm_up: float | None = None
     """s, where pilot runs have found it; None: as the study says."""
+    verified: bool = True
+    """False for files of older versions, which have no checksums: damage in them can't be found."""
 
     @property
     def name(self) -> str:
@@ -85,19 +93,58 @@ def read_results(path: Path) -> Results:
     """Of the folder of a study, finished or not, or of its Parquet file alone. Raises StudyError."""
     if path.is_file():
         return _of_parquet(path)
-    rows = read_rows(path)
     try:
-        study = (path / SOURCE).read_text(encoding="utf-8")
-        about = json.loads((path / UNITS).read_text(encoding="utf-8"))
-        origin = json.loads((path / ORIGIN).read_text(encoding="utf-8"))
-        versions = {"conveyor_sim": __version__, "engine": origin["engine"], "sources": origin[VERSION]}
-        units, parameters, found = about["units"], about["parameters"], origin.get(WARM_UP)
-        rows = [_as_asked(row, about[ASKED]) for row in rows]
-        return Results(study, about["path"], units, parameters, versions, rows, found)
-    except (OSError, ValueError, KeyError, TypeError):
-        raise StudyError(
-            f"{path}: not the folder of a study that has begun, expected one of conveyor-sim sweep"
-        ) from None
+        origin = read_origin(path)
+    except FileError as error:
+        raise unusable(path / ORIGIN, error) from None
+    rows = read_rows(path, origin)
+    try:
+        about = _about(path / UNITS, origin)
+    except (FileError, ValueError) as error:
+        reason = error if isinstance(error, FileError) else "has other fields than conveyor-sim sweep writes"
+        raise unusable(path / UNITS, reason) from None
+    versions = {"conveyor_sim": __version__, "engine": origin.fields["engine"], "sources": origin.fields[VERSION]}
+    rows = [_as_asked(row, about.asked) for row in rows]
+    try:
+        study = read_file(path / SOURCE, 8 * MB).decode() if origin.text is None else origin.text
+        found = Results(study, about.path, about.units, about.parameters, versions, rows, origin.warm_up, origin.sealed)
+        return _fitting(found)
+    except (FileError, ValueError, SceneError) as error:
+        reason = error if isinstance(error, FileError) else "does not fit the runs beside it"
+        raise unusable(path / (SOURCE if origin.text is None else ORIGIN), reason) from None
+
+
+def _fitting(results: Results) -> Results:
+    """The results. Raises ValueError or SceneError if its parts are not of one study."""
+    if not isinstance(parse_overrides(results.study), dict) or not results.name:
+        raise ValueError("no study")
+    _ = results.until
+    if any(row.parameters.keys() != results.parameters.keys() for row in results.rows):
+        raise ValueError("other parameters")
+    return results
+
+
+class _About(BaseModel, strict=True, extra="forbid"):
+    """Content of UNITS."""
+
+    path: str
+    asked: dict[str, str]
+    units: dict[str, str]
+    parameters: dict[str, str]
+
+
+def _about(file: Path, origin: Origin) -> _About:
+    """Content of a file of units that belongs to an origin. Raises FileError, and ValueError for other fields."""
+    kept = read_study_json(file)
+    made = kept.data.pop(MADE_WITH, {})
+    if kept.sealed is not origin.sealed:
+        raise FileError("has no checksum" if origin.sealed else f"has a checksum, which {ORIGIN} has not")
+    if kept.sealed and not (isinstance(made, dict) and origin.fields.items() <= made.items()):
+        raise FileError("was made with another study")
+    about = _About.model_validate(kept.data)
+    if about.units.keys() != about.asked.keys():
+        raise ValueError("other metrics")
+    return about
 
 
 def _as_asked(row: Row, asked: Mapping[str, str]) -> Row:
@@ -165,34 +212,57 @@ def _table(results: Results) -> Any:
         "versions": dict(results.versions),
         WARM_UP: results.warm_up,
     }
-    schema = pyarrow.schema(fields, metadata={METADATA: json.dumps(about)})
-    return pyarrow.Table.from_arrays([column for column, _ in columns.values()], schema=schema)
+    made = pyarrow.Table.from_arrays([column for column, _ in columns.values()], schema=pyarrow.schema(fields))
+    about[SEAL] = _digest(about, made.to_pylist())
+    return made.replace_schema_metadata({METADATA: json.dumps(about)})
 
 
 def _of_parquet(path: Path) -> Results:
     if find_spec("pyarrow") is None:
         raise StudyError(f"{path}: pyarrow is not installed, expected it (pip install 'conveyor_sim[studies]')")
-    from pyarrow import ArrowException, parquet
+    from pyarrow import ArrowException, BufferReader, parquet
 
+    expected = "expected an intact Parquet file of conveyor-sim sweep"
     try:
-        table = parquet.read_table(path)
-        about = json.loads(table.schema.metadata[METADATA.encode()])
-        rows = [_row(values, about) for values in table.to_pylist()]
+        content = read_file(path, MOST)
+        table = parquet.read_table(BufferReader(content))
+        about = parsed(table.schema.metadata[METADATA.encode()])
+        digest, rows = about.pop(SEAL, None), table.to_pylist()
+        if digest is not None and digest != _digest(about, rows):
+            raise StudyError(f"{path}: its checksum does not fit, {expected}")
         kept = {name: about[name] for name in ("study", "path", "units", "parameters", "versions")}
-        return Results(**kept, rows=rows, warm_up=about.get(WARM_UP))
-    except (ArrowException, KeyError, TypeError, ValueError, OSError):
-        raise StudyError(f"{path}: not the results of a study, expected a Parquet file of conveyor-sim sweep") from None
+        kept[WARM_UP] = about.get(WARM_UP)
+        _PARQUET.validate_python(kept)
+        made = [_row(values, about) for values in rows]
+        return _fitting(Results(**kept, rows=made, verified=digest is not None))
+    except FileError as error:
+        raise StudyError(f"{path}: {error}, {expected}") from None
+    except (ArrowException, KeyError, TypeError, ValueError, AttributeError, OSError, SceneError):
+        raise StudyError(f"{path}: not the results of a study, {expected}") from None
+
+
+_PARQUET = TypeAdapter(dict[str, str | float | dict[str, str] | None])
+
+
+def _digest(about: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
+    """A checksum over all that is read of a Parquet file."""
+    text = json.dumps([dict(about), [list(row.items()) for row in rows]])
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> Row:
+    """The run of a line. Raises ValueError or KeyError for values of other types."""
     kept = ("point", "seed", "status", "error", *FIXED_UNITS, "bag")
     finished = values["status"] == "finished"
     halves = {name: values[name + HALF_WIDTH] for name in about["units"] if name + HALF_WIDTH in values}
-    return Row(
-        **{name: values[name] for name in kept},
-        parameters={name: values[name] for name in about["parameters"]},
-        metrics={name: values[name] for name in about["units"]} if finished else {},
-        half_widths=halves if finished else {},
+    return row_of(
+        {name: values[name] for name in kept}
+        | {
+            "parameters": {name: values[name] for name in about["parameters"]},
+            "metrics": {name: values[name] for name in about["units"]} if finished else {},
+            "asked": {},
+            "half_widths": halves if finished else {},
+        }
     )
 
 

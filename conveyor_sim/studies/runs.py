@@ -43,7 +43,7 @@ class Runs(AbstractContextManager["Runs"]):
         self._setup, self._say = setup, say
         self.folder = folder
         with ExitStack() as stack:
-            self.journal = stack.enter_context(Journal(folder, setup))
+            self.journal = stack.enter_context(Journal(folder, setup, say))
             self._engine = stack.enter_context(WorkerPool() if engine is None else engine)
             self._stack = stack.pop_all()
         if self.journal.warm_up is not None:
@@ -129,7 +129,7 @@ class Runs(AbstractContextManager["Runs"]):
         if self._setup.study.warm_start is None:
             return {}
         seeds = {job.seed: replace(job, point=-1, parameters={}) for job in jobs}
-        works = [Work(self._setup, job) for seed, job in seeds.items() if not self.journal.start_of(seed).exists()]
+        works = [Work(self._setup, job) for seed, job in seeds.items() if not self.journal.has_start(seed)]
         failed: dict[int, tuple[Status, str]] = {}
         for work, made in self._engine.each(_warmed, works):
             if isinstance(made, bytes):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import Point, points_of
-from conveyor_sim.studies.journal import fingerprint
+from conveyor_sim.studies.origin import fingerprint
 from conveyor_sim.studies.row import Job, Row
 from conveyor_sim.studies.runs import Progress, Runs
 from conveyor_sim.studies.setup import Setup

@@ -25,7 +25,7 @@ _KINDS = {
 
 
 Objection = Callable[[BinaryIO], str]
-"""Reads a file from its beginning and returns why it may not be replaced, in words that follow its path; "" if it may."""
+"""Reads a file from its beginning. Returns why it may not be replaced, in words that follow its path; "" if it may."""
 
 
 class FileError(Exception):

@@ -111,7 +111,7 @@ def studied() -> list[str]:
 
 def of_today(name: str) -> Study:
     """A study with the errors that are predicted now, and the answer that follows: they are computed, not measured."""
-    study, scene = read_study(FOLDER / name / STUDY), load_scene(ROOT / scene_file(name))
+    study, scene = read_study(FOLDER / name / STUDY, print), load_scene(ROOT / scene_file(name))
     points = tuple(foretold(scene, point) for point in study.points)
     answer = find_answer(points, study.reference, study.comparisons, study.tolerance, study.rest)
     return replace(study, points=points, answer=answer)

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import random
+import resource
 import struct
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +20,7 @@ from conveyor_sim.accuracy.report.files import STUDY, read_study, write_study
 from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.results import Cost, Study
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.sealed_json import sealed
 
 
 def bare() -> Study:
@@ -177,8 +179,9 @@ def flag(data: Any) -> None:
 def test_a_file_that_was_edited_badly_is_told(tmp_path: Path, edit: Callable[[Any], None], message: str) -> None:
     file = write_study(study(), tmp_path)[0]
     data = json.loads(file.read_text(encoding="utf-8"))
+    del data["sha256"]
     edit(data)
-    file.write_text(json.dumps(data), encoding="utf-8")
+    file.write_bytes(sealed(data))
     with pytest.raises(ConveyorError) as raised:
         read_study(file)
     assert str(raised.value).startswith(f"{file}: {message}")
@@ -188,9 +191,9 @@ def test_files_that_are_no_studies_are_told(tmp_path: Path) -> None:
     (tmp_path / "list").write_text("[1, 2]")
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     for name, message in (
-        ("list", r"list: all of it: found \[1, 2\], expected the fields scene, source"),
-        ("bytes", r"bytes: is no text, expected the study\.json of a study"),
-        ("nothing", r"nothing: can't be read \(No such file or directory\), expected the study\.json of a study"),
+        ("list", r"list: is no mapping of fields, expected the whole study\.json of a study"),
+        ("bytes", r"bytes: is no text in UTF-8, expected the whole study\.json of a study"),
+        ("nothing", r"nothing: no such file, expected the whole study\.json of a study"),
     ):
         with pytest.raises(ConveyorError, match=message):
             read_study(tmp_path / name)
@@ -204,7 +207,35 @@ def test_a_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
 
 def test_a_write_that_fails_leaves_the_file_that_was_there(tmp_path: Path) -> None:
     write_study(study(), tmp_path)
-    (tmp_path / f"{STUDY}.part").mkdir()  # in the way of the new file
-    with pytest.raises(ConveyorError, match="can't be written"):
-        write_study(bare(), tmp_path)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        with pytest.raises(ConveyorError, match=r"study\.json: can't be written \(File too large\)"):
+            write_study(bare(), tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert read_study(tmp_path / STUDY) == study()
+
+
+def test_every_flipped_bit_and_cut_is_found(tmp_path: Path) -> None:
+    file = write_study(bare(), tmp_path)[0]
+    content = file.read_bytes()
+    for place in range(len(content)):
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << place % 8
+        for wrong in (bytes(damaged), content[:place]):
+            file.write_bytes(wrong)
+            with pytest.raises(ConveyorError, match=r"study\.json: .*expected the "):
+                read_study(file)
+
+
+def test_a_file_of_an_older_version_is_read_and_said_to_be_unverified(tmp_path: Path) -> None:
+    file = write_study(study(), tmp_path)[0]
+    said: list[str] = []
+    assert read_study(file, said.append) == study() and not said
+    data = json.loads(file.read_text(encoding="utf-8"))
+    del data["sha256"]
+    file.write_text(json.dumps(data), encoding="utf-8")
+    assert read_study(file, said.append) == study()
+    (sentence,) = said
+    assert sentence.startswith(f"{file}: ") and "can't be verified" in sentence

@@ -13,6 +13,7 @@ from conveyor_sim.accuracy.results import Sample
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene, parse_scene
+from conveyor_sim.support.sealed_json import sealed
 
 SCENE = scene()
 NAMES = [observable.name for observable in OBSERVABLES]
@@ -72,15 +73,22 @@ def test_runs_of_something_else_are_refused(tmp_path: Path) -> None:
         with pytest.raises(ConveyorError, match=r"origin\.json: its runs were made with another scene, .* emptied"):
             SampleFile(tmp_path, other)
     origin = json.loads((tmp_path / ORIGIN).read_text())
-    (tmp_path / ORIGIN).write_text(json.dumps({**origin, "engine": "0", "definition of observables": "0"}))
+    del origin["sha256"]
+    (tmp_path / ORIGIN).write_bytes(sealed({**origin, "engine": "0", "definition of observables": "0"}))
     with pytest.raises(ConveyorError, match="made with another engine and another definition of observables, so"):
         SampleFile(tmp_path, SCENE)
-    for broken in ("[]", "{", "{}"):
+    (tmp_path / ORIGIN).write_text("{}")
+    with pytest.raises(ConveyorError, match="another scene and another engine"):
+        SampleFile(tmp_path, SCENE)
+    (tmp_path / ORIGIN).write_text(json.dumps(origin))
+    with pytest.raises(ConveyorError, match="another version of conveyor_sim"):
+        SampleFile(tmp_path, SCENE)
+    for broken in ("[]", "{", "", "[" * 100_000, json.dumps({**origin, "sha256": "0" * 64})):
         (tmp_path / ORIGIN).write_text(broken)
-        with pytest.raises(ConveyorError, match="another scene and another engine"):
+        with pytest.raises(ConveyorError, match=r"origin\.json: .*, so it can't be told what the runs"):
             SampleFile(tmp_path, SCENE)
     (tmp_path / ORIGIN).unlink()
-    with pytest.raises(ConveyorError, match="another scene and another engine"):
+    with pytest.raises(ConveyorError, match=r"origin\.json: no such file, so it can't be told"):
         SampleFile(tmp_path, SCENE)
 
 
@@ -99,11 +107,47 @@ def test_a_folder_without_runs_is_of_one_scene_too(tmp_path: Path) -> None:
 
 def test_a_file_of_another_kind_is_refused_and_left_alone(tmp_path: Path) -> None:
     content = written(tmp_path)
-    for strange in (b"a,b\n1,2\n", content + b"1,2\n", content.replace(b",0,", b",x,"), content + b"\xff\n"):
+    for strange, reason in (
+        (b"a,b\n1,2\n", "not a file of finished runs"),
+        (content + b"\xff\n", "not a file of finished runs"),
+        (content + b"1,2\n", "line 5 of 5: not a finished run"),
+        (content.replace(b",0,", b",x,"), "line 2 of 4: not a finished run"),
+    ):
         (tmp_path / SAMPLES).write_bytes(strange)
-        with pytest.raises(ConveyorError, match=r"samples\.csv: not a file of finished runs"):
+        with pytest.raises(ConveyorError, match=rf"samples\.csv: {reason}"):
             SampleFile(tmp_path, SCENE)
         assert (tmp_path / SAMPLES).read_bytes() == strange
+
+
+def test_every_flipped_bit_of_a_line_is_found(tmp_path: Path) -> None:
+    """Or the line is dropped as one that was cut short, and its run is made again."""
+    content = written(tmp_path)
+    for place in range(content.index(b"\n") + 1, len(content)):
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << place % 8
+        (tmp_path / SAMPLES).write_bytes(damaged)
+        try:
+            found = read(tmp_path)
+        except ConveyorError as error:
+            assert "samples.csv: " in str(error)
+        else:
+            assert found == MADE[: len(found)]
+
+
+def test_lines_of_another_scene_are_refused(tmp_path: Path) -> None:
+    written(tmp_path)
+    other = scene(gravity=9.8)
+    SampleFile(tmp_path / "other", other).close()
+    (tmp_path / "other" / SAMPLES).write_bytes((tmp_path / SAMPLES).read_bytes())
+    with pytest.raises(ConveyorError, match="line 2 of 4: not a finished run of this scene"):
+        SampleFile(tmp_path / "other", other)
+
+
+def test_the_folder_of_a_sweep_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(ConveyorError, match="has another kind of study"):
+        check_origin(tmp_path, SCENE)
+    assert [file.name for file in tmp_path.iterdir()] == ["study.json"]
 
 
 def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_a_file_that_is_no_checkpoint_is_not_replaced(
         "behind.npz": saved_npz(tmp_path, x=np.zeros(1)) + content,
         "zip": b"PK\x03\x04",
         "cut.npz": content[:100],
-        "flipped.npz": content.replace(b"\"format\"", b"\"farmat\"", 1),
+        "flipped.npz": content.replace(b'"format"', b'"farmat"', 1),
         "unreadable": os.urandom(2000),
     }
     for name, held in strange.items():

@@ -267,7 +267,7 @@ def test_controllers_are_compared_from_one_warm_line_a_seed(tmp_path: Path) -> N
     with Runs(setup, tmp_path / "out", Here()) as runs:
         rows = sweep(runs, setup)
     assert [row.status for row in rows] == ["finished"] * 4, [row.error for row in rows]
-    starts = sorted(path.name for path in (tmp_path / "out" / "warm_starts").iterdir())
+    starts = sorted(path.name for path in (tmp_path / "out" / "warm_starts").glob("*.npz"))
     assert starts == ["seed_1.npz", "seed_2.npz"]
     # Bottles of the warm start are there, but not counted; with its own settings the run is as one without a stop.
     plain = setup_of(tmp_path, **{**study, "warm_start": None, "warm_up": 1.0, "duration": 1.5})

@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import json
-import os
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +18,8 @@ from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.observe import itinerary
 from conveyor_sim.scene import Scene
+from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.support.sealed_json import read_sealed, sealed
 from conveyor_sim.version import sources_hash
 
 SAMPLES = "samples.csv"
@@ -27,7 +27,10 @@ ORIGIN = "origin.json"
 """What a folder's results are of: hashes that a study must share to go on with them."""
 
 _OF_SETTING = ("integrator", "per_tick", "stiffness", "error")
-_COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "cpu", "failure")
+_COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "cpu", "failure", "checksum")
+"""The checksum of a line is over its other columns, and over scene and version."""
+OTHER_STUDY = "study.json"
+"""File that `conveyor-sim sweep` writes first into a folder."""
 
 
 class SampleFile:
@@ -38,16 +41,16 @@ class SampleFile:
 
         Raises ConveyorError if the runs are of another scene or another version, or the folder can't be written.
         """
-        self.path = folder / SAMPLES
+        self.path, self._of = folder / SAMPLES, fingerprint(scene)
         try:
             check_origin(folder, scene)
             kept = self._whole_lines()
-            self.found = _parsed(kept, self.path)
+            self.found = _parsed(kept, self.path, self._of)
             """Runs that were there, in the order in which they were finished."""
             self._file = open(self.path, "ab")  # noqa: SIM115 (closed by close)
             self._file.truncate(len(kept))
             if not kept:
-                self._write(_COLUMNS)
+                self._write(_line(_COLUMNS))
         except OSError as error:
             raise _unwritable(folder, error) from None
 
@@ -56,19 +59,18 @@ class SampleFile:
         way = sample.setting
         error = "" if way.error is None else repr(way.error)
         values = [repr(sample.values[item.name]) if item.name in sample.values else "" for item in OBSERVABLES]
-        self._write(
+        line = _line(
             (way.integrator, way.per_tick, repr(way.stiffness), error, sample.seed, *values,
              repr(sample.cpu), sample.failure)
         )  # fmt: skip
+        self._write(line[:-1] + f",{_checksum(line, self._of)}\n")
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
 
-    def _write(self, row: Any) -> None:
-        line = io.StringIO()
-        csv.writer(line, lineterminator="\n").writerow(row)
-        self._file.write(line.getvalue().encode())
+    def _write(self, line: str) -> None:
+        self._file.write(line.encode())
         self._file.flush()
 
     def _whole_lines(self) -> bytes:
@@ -84,17 +86,21 @@ def check_origin(folder: Path, scene: Scene) -> None:
     origin, path = _origin(scene), folder / ORIGIN
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        if not path.exists() and (folder / OTHER_STUDY).exists():
+            raise ConveyorError(f"{folder}: has another kind of study ({OTHER_STUDY}), expected another folder")
         if not path.exists() and not (folder / SAMPLES).exists():
-            part = path.with_suffix(".part")
-            part.write_text(json.dumps(origin, indent=2) + "\n", encoding="utf-8")
-            os.replace(part, path)
-        found = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+            write_file(path, sealed(origin, indent=2))
+        kept = read_sealed(path)
     except OSError as error:
         raise _unwritable(folder, error) from None
-    except ValueError:
-        found = {}
-    other = [what for what, value in origin.items() if not isinstance(found, dict) or found.get(what) != value]
-    if other:
+    except FileError as error:
+        raise ConveyorError(
+            f"{path}: {error}, so it can't be told what the runs beside it are of; expected the file as it was, "
+            "another folder, or this one emptied to begin anew"
+        ) from None
+    other = [what for what, value in origin.items() if kept.data.get(what) != value]
+    if other or not kept.sealed:
+        other = other or ["version of conveyor_sim"]
         raise ConveyorError(
             f"{path}: its runs were made with another {' and another '.join(other)}, so they can't be compared with "
             "new ones; expected another folder, or this one emptied to begin anew"
@@ -129,13 +135,31 @@ def _hash(*parts: bytes) -> str:
     return hashlib.blake2b(b"\0".join(parts), digest_size=8).hexdigest()
 
 
-def _parsed(content: bytes, path: Path) -> list[Sample]:
+def _line(row: Any) -> str:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(row)
+    return line.getvalue()
+
+
+def _checksum(line: str, of: str) -> str:
+    """Of a line without this column."""
+    return _hash(line.encode(), of.encode())
+
+
+def _parsed(content: bytes, path: Path, of: str) -> list[Sample]:
     try:
         rows = list(csv.reader(io.StringIO(content.decode(), newline="")))
         if rows and tuple(rows[0]) != _COLUMNS:
             raise ValueError
+        damaged = [number for number, row in enumerate(rows[1:], 2) if row[-1:] != [_checksum(_line(row[:-1]), of)]]
+        if damaged:
+            raise ConveyorError(
+                f"{path}: line {damaged[0]} of {len(rows)}: not a finished run of this scene as conveyor_sim writes it "
+                f"(its checksum does not fit; {len(damaged)} such lines), expected the line as it was; without it, its "
+                "run is made again"
+            )
         return [_sample(dict(zip(_COLUMNS, row, strict=True))) for row in rows[1:]]
-    except ValueError:
+    except (ValueError, csv.Error):
         raise ConveyorError(
             f"{path}: not a file of finished runs as conveyor_sim writes it; expected another folder, or the file "
             "removed to begin anew"

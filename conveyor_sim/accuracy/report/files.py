@@ -1,19 +1,24 @@
-"""A study on disk: one JSON that holds all of it exactly, and CSV files of its rows for other programs."""
+"""A study on disk: one JSON with a checksum that holds all of it exactly, and CSV files of its rows for other programs.
+
+`conveyor-sim sweep` writes a `study.json` of its own (`studies/origin.py`); neither command replaces the other's.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import math
-import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.report.plain import Unlike, plain, typed
 from conveyor_sim.accuracy.results import Study
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
+from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.support.sealed_json import read_sealed, sealed
 
 STUDY = "study.json"
 
@@ -27,41 +32,43 @@ def write_study(study: Study, out_dir: str | Path) -> list[Path]:
     SampleFile holds them. Returns the files; ConveyorError if one can't be written.
     """
     out = Path(out_dir)
-    texts = {STUDY: json.dumps(plain(study), indent=1, allow_nan=False, ensure_ascii=False) + "\n"}
-    texts |= {f"{name}.csv": _csv(table) for name, table in _tables(study).items() if table}
-    for name, text in texts.items():
-        _write(out / name, text)
-    return [out / name for name in texts]
+    contents = {STUDY: sealed(cast("dict[str, object]", plain(study)), indent=1)}
+    contents |= {f"{name}.csv": _csv(table).encode() for name, table in _tables(study).items() if table}
+    for name, content in contents.items():
+        write(out / name, content)
+    return [out / name for name in contents]
 
 
-def read_study(path: str | Path) -> Study:
+def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) -> Study:
     """The study in a study.json, equal to the one that was written.
 
-    Raises ConveyorError if the file can't be read or holds no study.
+    say: called with one sentence for a file of an older version, which has no checksum and can't be verified.
+    Raises ConveyorError if the file can't be read, is damaged or holds no study.
     """
     try:
-        study = typed(Study, json.loads(Path(path).read_text(encoding="utf-8")))
-    except OSError as error:
-        raise ConveyorError(f"{path}: can't be read ({error.strerror}), expected the {STUDY} of a study") from None
-    except json.JSONDecodeError as error:
-        what = f"line {error.lineno}: {error.msg}"
-        raise ConveyorError(f"{path}: {what}, expected the whole {STUDY} of a study") from None
+        kept = read_sealed(Path(path))
+    except FileError as error:
+        raise ConveyorError(
+            f"{path}: {error}, expected the whole {STUDY} of a study of conveyor-sim accuracy"
+        ) from None
+    try:
+        study = typed(Study, kept.data)
     except Unlike as unlike:
         raise ConveyorError(f"{path}: {unlike}") from None
-    except UnicodeDecodeError:
-        raise ConveyorError(f"{path}: is no text, expected the {STUDY} of a study") from None
     assert isinstance(study, Study)
+    if not kept.sealed:
+        say(f"{path}: was made by an older version without checksums, so it can't be verified")
     return study
 
 
-def _write(file: Path, text: str) -> None:
-    part = file.with_name(file.name + ".part")
+def write(file: Path, content: bytes) -> None:
+    """Write a file in one go; its folder is made. Raises ConveyorError if it can't be written."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        raise ConveyorError(f"{file}: can't be written ({error.strerror}), expected a folder to write to") from None
+        write_file(file, content)
+    except (FileError, OSError) as error:
+        reason = error if isinstance(error, FileError) else f"can't be written ({error.strerror})"
+        raise ConveyorError(f"{file}: {reason}, expected a folder to write to") from None
 
 
 def _tables(study: Study) -> dict[str, Table]:

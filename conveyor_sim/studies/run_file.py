@@ -1,0 +1,102 @@
+"""The file of one finished run: its row, what it was made with, and a checksum."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+
+from conveyor_sim.studies.origin import WARM_UP, Origin, read_study_json
+from conveyor_sim.studies.row import Job, Row, Status
+from conveyor_sim.support.files import FileError
+from conveyor_sim.support.sealed_json import Kept, sealed
+
+RUNS = "runs"
+MADE_WITH = "made_with"
+"""Field that has what `study.json` has, but for the text of the study."""
+
+_Seconds = Annotated[FiniteFloat, Field(ge=0.0)]
+
+
+class _Row(BaseModel, strict=True, extra="forbid"):
+    """The types of a `Row` in a file; metrics may be NaN or infinite."""
+
+    point: Annotated[int, Field(ge=0, lt=2**63)]
+    seed: Annotated[int, Field(ge=0, lt=2**64)]
+    parameters: dict[str, bool | int | FiniteFloat | str]
+    status: Status
+    error: str
+    metrics: dict[str, float]
+    asked: dict[str, str]
+    half_widths: dict[str, float | None]
+    simulated: _Seconds
+    dt: _Seconds
+    wall: _Seconds
+    cpu: _Seconds
+    bag: str
+
+
+def name_of(job: Job | Row) -> str:
+    """Return the name of the file of a run, below the folder of the study."""
+    return f"{RUNS}/point_{job.point}_seed_{job.seed}.json"
+
+
+def content_of(row: Row, made_with: Mapping[str, Any]) -> bytes:
+    """Return the content of the file of a run. made_with: as `made_with` returns it."""
+    return sealed({**json.loads(json.dumps(asdict(row), default=str)), MADE_WITH: dict(made_with)})
+
+
+def made_with(fields: Mapping[str, str], warm_up: float | None) -> dict[str, Any]:
+    """Return what a file says that it was made with."""
+    return {**fields, **({} if warm_up is None else {WARM_UP: warm_up})}
+
+
+def row_of(data: Mapping[str, Any]) -> Row:
+    """Return a row from plain data. Raises ValueError (pydantic's) for data of other types."""
+    return Row(**dict(_Row.model_validate(dict(data))))
+
+
+def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
+    """Return a run and the content of its file, with its field MADE_WITH.
+
+    Raises FileError for a file that is damaged, or has the name of another run.
+    """
+    kept = read_study_json(file, finite=False)
+    data = {name: value for name, value in kept.data.items() if name != MADE_WITH}
+    try:
+        row = row_of(data)
+    except ValidationError as error:
+        where = ".".join(map(str, error.errors(include_url=False)[0]["loc"]))
+        raise FileError(f"{where}: is not as conveyor_sim writes it") from None
+    if kept.sealed is not isinstance(kept.data.get(MADE_WITH), dict):
+        raise FileError("does not say what it was made with")
+    if file.relative_to(folder).as_posix() != name_of(row):
+        raise FileError(f"holds the run of point {row.point} with seed {row.seed}")
+    if row.status == "finished" and row.metrics.keys() != row.asked.keys():
+        raise FileError("has other metrics than it was asked for")
+    return row, kept
+
+
+def objection(row: Row, kept: Kept, origin: Origin) -> str:
+    """Return why a run is not one of a folder, in words that follow its file, "" if it is one."""
+    if kept.sealed is not origin.sealed:
+        return "has no checksum" if origin.sealed else "has a checksum, which study.json has not"
+    if not kept.sealed:
+        return ""
+    fields = dict(kept.data[MADE_WITH])
+    warm_up = fields.pop(WARM_UP, None)
+    other = [what for what, value in origin.fields.items() if fields.get(what) != value]
+    if other or fields.keys() != origin.fields.keys():
+        return f"was made with another {' and another '.join(other) or 'version'}"
+    if row.status == "finished" and warm_up != origin.warm_up:  # others may have failed before it was found
+        return "was made with another warm-up"
+    return ""
+
+
+def run_files(folder: Path) -> list[Path]:
+    """Return the files of runs in a folder, ordered by name, but for unfinished ones. Raises OSError."""
+    return sorted(file for file in (folder / RUNS).iterdir() if file.suffix == ".json")

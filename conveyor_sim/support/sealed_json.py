@@ -1,0 +1,120 @@
+"""JSON files that a later command reads back: bounded, strict, and ended by a checksum over every byte before it.
+
+A file ends in `"sha256": "<64 digits>"}`. The digits are the SHA-256 of all bytes in front of them. The checksum finds
+damage; it is no signature. A file without it may come from an older version: its reader decides if that is accepted.
+"""
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.support.files import MB, FileError, in_mb, read_file
+
+SEAL = "sha256"
+"""Name of the last field."""
+MOST = 64 * MB
+"""Bytes of a file that are read."""
+DEEPEST = 32
+"""Lists and mappings inside each other that are read."""
+_HALF = re.compile("[\\ud800-\\udc7f\\udd00-\\udfff]")
+"""Surrogates but for those by which Python holds bytes of paths that are no UTF-8."""
+LARGEST = 10**300
+"""Of whole numbers that are read: all of them are floats, too."""
+
+_BEFORE, _DIGITS, _AFTER = f'"{SEAL}": "'.encode(), 64, b'"}\n'
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Content of a file."""
+
+    data: dict[str, Any]
+    """Without the checksum."""
+    sealed: bool
+    """True if a checksum was there and is right; False if there is none."""
+
+
+def sealed(data: Mapping[str, Any], indent: int | None = None) -> bytes:
+    """Return a mapping of at least one field as JSON with its checksum. It may hold NaN and Infinity."""
+    text = json.dumps(dict(data), indent=indent)
+    body = text[:-1].rstrip().encode() + (b", " if indent is None else b",\n ") + _BEFORE
+    return body + hashlib.sha256(body).hexdigest().encode() + _AFTER
+
+
+def read_sealed(path: Path, most: int = MOST, finite: bool = True) -> Kept:
+    """Return the content of a file of at most `most` bytes.
+
+    finite: refuse numbers that are not. Raises FileError, in words that follow the path, for a file that can't be
+    read, is no JSON, repeats a field, is nested more than DEEPEST levels deep or does not fit its checksum.
+    """
+    content = read_file(path, most)
+    place = len(content) - len(_AFTER) - _DIGITS
+    has_seal = place > 0 and content.endswith(_AFTER) and content[:place].endswith(_BEFORE)
+    if has_seal and hashlib.sha256(content[:place]).hexdigest().encode() != content[place : -len(_AFTER)]:
+        raise FileError("its checksum does not fit")
+    data = parsed(content, finite)
+    if not isinstance(data, dict):
+        raise FileError("is no mapping of fields")
+    if (SEAL in data) is not has_seal:
+        raise FileError("its checksum does not fit")
+    data.pop(SEAL, None)
+    return Kept(data, has_seal)
+
+
+def parsed(content: bytes, finite: bool = True) -> Any:
+    """Return JSON as plain data. Raises FileError as `read_sealed`."""
+    if len(content) > MOST:
+        raise FileError(f"has {in_mb(len(content))}, more than the {in_mb(MOST)} that are read")
+    try:
+        data = json.loads(content.decode("utf-8"), object_pairs_hook=_fields, parse_constant=_constant(finite))
+    except UnicodeDecodeError:
+        raise FileError("is no text in UTF-8") from None
+    except json.JSONDecodeError as error:
+        raise FileError(f"line {error.lineno}: {error.msg}") from None
+    except ValueError as error:  # a whole number of thousands of digits
+        raise FileError(f"has a number that can't be read ({str(error).partition(':')[0]})") from None
+    except RecursionError:
+        raise FileError(f"is nested more than {DEEPEST} levels deep") from None
+    _check(data, finite)
+    return data
+
+
+def _fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise FileError(f"has the field {twice[:40]!a} twice")
+    return data
+
+
+def _constant(finite: bool) -> Any:
+    def value(text: str) -> float:
+        if finite:
+            raise FileError(f"has the number {text}, expected finite numbers")
+        return float(text)
+
+    return value
+
+
+def _check(data: Any, finite: bool) -> None:
+    """Raise FileError for what `json` accepts beyond the promise."""
+    todo = [(data, 0)]
+    while todo:
+        value, depth = todo.pop()
+        if isinstance(value, (dict, list)):
+            if depth == DEEPEST:
+                raise FileError(f"is nested more than {DEEPEST} levels deep")
+            parts = [*value, *value.values()] if isinstance(value, dict) else value
+            todo += [(part, depth + 1) for part in parts]
+        elif isinstance(value, str) and not value.isascii() and _HALF.search(value):
+            raise FileError("has a text with half a character (a lone surrogate)")
+        elif isinstance(value, int) and abs(value) > LARGEST:
+            raise FileError("has a whole number of more than 300 digits")
+        elif finite and isinstance(value, float) and not math.isfinite(value):
+            raise FileError("has a number beyond the range of 64 bits, expected finite numbers")
