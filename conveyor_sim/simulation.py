@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accounts.clogging import Clogging
+from conveyor_sim.accounts.clogging import clogging_of
 from conveyor_sim.accounts.damage import DamageAccount
 from conveyor_sim.accounts.energy import EnergyAccount
 from conveyor_sim.engine.arrays.bodies import Bottles
@@ -27,9 +27,10 @@ from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
 from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
+from conveyor_sim.state.full_state_hash import full_state_hash
 from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
 from conveyor_sim.state.state import FIRST_SLOTS, Held, State
-from conveyor_sim.state.state_hash import state_hash
+from conveyor_sim.state.state_hash import COLUMNS, state_hash
 from conveyor_sim.state.world_arrays import changing_arrays
 from conveyor_sim.stepping.guard import GuardEvent
 from conveyor_sim.stepping.tick import Integration
@@ -63,13 +64,8 @@ class Simulation:
         self._line = Line(scene, self._state)
         for kind, x, y, theta, vx, vy, omega in bottles:
             self._state.add(self.model.bottle_types.index(kind), x, y, theta, vx, vy, omega)
-        self._damage: DamageAccount | None = None
-        if self._state.world.damage is not None:
-            self._damage = DamageAccount(self._state, scene.limits)
-        self._clogging: Clogging | None = None
-        if scene.limits.clogging_time is not None:
-            exits = {name: np.array(outfeed.region) for name, outfeed in scene.outfeeds.items()}
-            self._clogging = Clogging(self._state, scene.limits.clogging_time, exits)
+        self._damage = None if self._state.world.damage is None else DamageAccount(self._state, scene.limits)
+        self._clogging = clogging_of(self._state, scene)
         self._account: EnergyAccount | None = None
         self._feed()
         self._line.end(self.tick)
@@ -338,11 +334,14 @@ class Simulation:
         return self._line.signals().values
 
     def state_hash(self) -> int:
-        """64 bits over tick, bottles, belts and moving rails: equal if and (all but surely) only if the states are."""
+        """64 bits over tick, bottles, stretched springs, belts, moving rails: `state/state_hash.py` says what not."""
         bottles, now = self.bottles(), self._line.now
-        names = ("id", "type", "x", "y", "theta", "vx", "vy", "omega")
-        columns = [*(getattr(bottles, name) for name in names), now.setpoints, now.speeds]
+        columns = [*(getattr(bottles, name) for name in COLUMNS), now.setpoints, now.speeds]
         return state_hash(self.tick, columns, self._state)
+
+    def full_state_hash(self) -> int:
+        """64 bits over all that decides how the run goes on, as `state/full_state_hash.py` lists it."""
+        return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
     def rehearse(self) -> None:
         """Call what the line may call of the engine in a later tick, so that it is compiled before a run begins."""

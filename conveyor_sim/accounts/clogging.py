@@ -8,11 +8,20 @@ from numpy.typing import NDArray
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.observe.damage import DamageEvent
+from conveyor_sim.scene import Scene
 from conveyor_sim.scene.types import Unchecked
 from conveyor_sim.state import State
 
 SLOW = 0.1
 """Of the speed of the belt under it: what is slower is held up."""
+
+
+def clogging_of(state: State, scene: Scene) -> "Clogging | None":
+    """Return the watch on a scene's outfeeds; None if the scene has no limit of `clogging_time`."""
+    if scene.limits.clogging_time is None:
+        return None
+    exits = {name: np.array(outfeed.region) for name, outfeed in scene.outfeeds.items()}
+    return Clogging(state, scene.limits.clogging_time, exits)
 
 
 class Clogging:

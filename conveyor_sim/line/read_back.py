@@ -24,7 +24,7 @@ class ReadBack:
     def __init__(self, commands: Sequence[Tag]) -> None:
         """As it is before anybody commands."""
         self._index = {command.name: place for place, command in enumerate(commands)}
-        self.values = [command.initial for command in commands]
+        self.values = [float(command.initial) for command in commands]
         self.since = [0] * len(commands)
         self.writers = [SCENE] * len(commands)
         self._changed = True

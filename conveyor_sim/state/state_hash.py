@@ -1,4 +1,4 @@
-"""One number for the state at a tick."""
+"""One number for what is seen of a state at a tick."""
 
 import hashlib
 from collections.abc import Iterable
@@ -9,9 +9,18 @@ from numpy.typing import NDArray
 
 from conveyor_sim.state.state import State
 
+COLUMNS = ("id", "type", "x", "y", "theta", "vx", "vy", "omega")
+"""Of the bottles on the line, by id."""
+
 
 def state_hash(tick: int, columns: Iterable[NDArray[Any]], state: State) -> int:
-    """64 bits over a tick, columns, tangential springs and moving rails."""
+    """64 bits over a tick, columns, tangential springs that are not slack, and the places and speeds of moving rails.
+
+    A Simulation gives COLUMNS, and setpoints and speeds of belts. Recordings hold this hash, so it stays as it is. It
+    does not cover what else decides the next ticks: memories of devices and random streams, commands that wait, bottles
+    that machines hold, the next id, neighbour lists, contact laws, courses and drives of moving rails, histories of
+    impacts. `full_state_hash` does.
+    """
     digest = hashlib.blake2b(np.int64(tick).tobytes(), digest_size=8)
     for column in columns:
         digest.update(column.tobytes())

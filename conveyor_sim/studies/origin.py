@@ -80,8 +80,8 @@ def read_origin(folder: Path) -> Origin:
     if not sound or isinstance(text, str) is not kept.sealed:
         if kept.sealed or "scene" not in data or "study" not in data:
             raise StudyError(
-                f"{folder / ORIGIN}: is not that of conveyor-sim sweep or optimise (conveyor-sim accuracy has one of the "
-                "same name), expected the folder of a study"
+                f"{folder / ORIGIN}: is not that of conveyor-sim sweep or optimise (conveyor-sim accuracy has one of "
+                "the same name), expected the folder of a study"
             )
         raise FileError("has other fields than conveyor-sim sweep writes")
     return Origin(data, warm_up, text, kept.sealed)

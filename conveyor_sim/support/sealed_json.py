@@ -21,7 +21,7 @@ MOST = 64 * MB
 """Bytes of a file that are read."""
 DEEPEST = 32
 """Lists and mappings inside each other that are read."""
-_HALF = re.compile("[\\ud800-\\udc7f\\udd00-\\udfff]")
+_HALF = re.compile(r"[\ud800-\udc7f\udd00-\udfff]")
 """Surrogates but for those by which Python holds bytes of paths that are no UTF-8."""
 LARGEST = 10**300
 """Of whole numbers that are read: all of them are floats, too."""

@@ -122,7 +122,7 @@ def test_two_runs_give_the_same_bytes(scene: Scene, record_line: Callable[[str, 
 def test_watching_changes_nothing(scene: Scene) -> None:
     watched = run(scene, [Collector(set(OUTPUTS))], 80)
     alone = run(scene, [], 80)
-    assert watched.state_hash() == alone.state_hash()
+    assert watched.full_state_hash() == alone.full_state_hash()
 
 
 def test_a_photo_eye_is_told_at_the_start_and_when_it_changes_and_is_not_recorded() -> None:

@@ -220,7 +220,7 @@ def by_tick(case: Case) -> dict[int, Sent]:
 
 def state_of(simulation: Simulation) -> str:
     """Bottles, belts and rails, and all that controllers see."""
-    return f"{simulation.state_hash():016x}{blake2b(simulation.signals().tobytes(), digest_size=8).hexdigest()}"
+    return f"{simulation.full_state_hash():016x}{blake2b(simulation.signals().tobytes(), digest_size=8).hexdigest()}"
 
 
 def send(simulation: Simulation, inputs: Sent) -> None:

@@ -58,7 +58,7 @@ def test_the_worked_shim_does_what_the_program_does(tmp_path: Path) -> None:
         plant.run_for(2.0)
         plant.inject("machines/packer/stop", 0)
         plant.eventually(lambda s: s["belts/feeder/speed"] > 0, within=15)
-        hashes.append(plant.simulation.state_hash())
+        hashes.append(plant.simulation.full_state_hash())
     assert hashes[0] == hashes[1]
     assert plant.signals["plc/held"] == 0
 
@@ -75,7 +75,7 @@ def test_two_side_by_side_share_neither_time_nor_state(tmp_path: Path) -> None:
         early.run_for(0.1)
         late.run_for(0.1)
     alone.run_for(5.0)
-    assert early.simulation.state_hash() == alone.simulation.state_hash()
+    assert early.simulation.full_state_hash() == alone.simulation.full_state_hash()
 
 
 def test_its_state_is_part_of_a_checkpoint(tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_its_state_is_part_of_a_checkpoint(tmp_path: Path) -> None:
     second = Scenario(whole.scene, start=tmp_path / "warm.npz")
     second.attach(CompiledProgram(made, TAGS), resume=True)
     second.run_for(10.0)
-    assert second.simulation.state_hash() == whole.simulation.state_hash()
+    assert second.simulation.full_state_hash() == whole.simulation.full_state_hash()
 
 
 def test_its_instance_is_destroyed_at_the_end(tmp_path: Path) -> None:

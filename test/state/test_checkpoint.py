@@ -106,7 +106,7 @@ def run(sim: Simulation, end: int, after_tick: Callable[[], None] = lambda: None
         if not sim._line._pending:
             command(sim)
         sim.advance()
-        hashes.append(sim.state_hash())
+        hashes.append(sim.full_state_hash())
         after_tick()
     return hashes
 
@@ -199,7 +199,7 @@ def test_bottles_put_into_each_other_may_part_after_a_checkpoint_too(tmp_path: P
         each.advance(30)
         assert each.deepest_overlap < 0.75
         assert np.diff(each.bottles().x)[0] > 2.0 * RADIUS
-    assert loaded.state_hash() == sim.state_hash()
+    assert loaded.full_state_hash() == sim.full_state_hash()
 
 
 BUILT_ANEW = {"scene", "model", "_state", "_every", "_line"}
@@ -299,7 +299,7 @@ def test_the_same_scene_may_be_given_and_last_longer(saved: Path) -> None:
     longer = queue(duration=50.0, description="goes on", start_time="2026-03-01T06:00:00Z", where="hall/line_1")
     loaded = Simulation.load(saved, scene=longer)
     assert loaded.scene is longer
-    assert loaded.state_hash() == Simulation.load(saved).state_hash()
+    assert loaded.full_state_hash() == Simulation.load(saved).full_state_hash()
     assert Simulation.load(saved).scene.source_text == queue().source_text
 
 

@@ -254,7 +254,7 @@ def _state(sim: Simulation) -> str:
     read = image.values.tobytes().hex(), image.truth.tobytes().hex()
     alarms = [(alarm.id, alarm.state, alarm.shelved) for alarm in line.alarms]
     counters, read_back = _exact(line.counters()), _exact(line.read_back.columns())
-    return repr((sim.state_hash(), read, alarms, counters, read_back, line.modes.modes, line.modes.owner))
+    return repr((sim.full_state_hash(), read, alarms, counters, read_back, line.modes.modes, line.modes.owner))
 
 
 def _exact(columns: CounterColumns | ReadBackColumns) -> list[Any]:
