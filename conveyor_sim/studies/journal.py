@@ -27,6 +27,7 @@ from conveyor_sim.studies.run_file import (
 )
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
+from conveyor_sim.studies.units_file import UNITS, Units, read_units
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import Kept, sealed
 
@@ -35,10 +36,6 @@ SOURCE = "study.yaml"
 STARTS = "warm_starts"
 PILOTS = "pilots"
 """Runs that find the warm-up."""
-UNITS = "units.json"
-"""Of metrics and parameters, what each metric is, and the path of the study."""
-ASKED = "asked"
-"""What each metric is, in UNITS."""
 ACCURACY = "origin.json"
 """A file that `conveyor-sim accuracy` writes first into a folder."""
 ASIDE = ".unusable"
@@ -160,17 +157,16 @@ class Journal(AbstractContextManager["Journal"]):
         """Whether those are kept that belong to the metrics of today."""
         file = self.folder / UNITS
         try:
-            found = self._own(file)
-            return (found.get("path"), found.get(ASKED)) == (self._setup.path, self._asked)
+            found = read_units(file, origin_of(self._setup), True)
+            return (found.path, found.asked) == (self._setup.path, self._asked)
         except FileError as error:
             self._set_aside(file, str(error))
             return False
 
     def keep_units(self, metrics: Mapping[str, str], parameters: Mapping[str, str]) -> None:
         """Keep the units of metrics and parameters. Raises StudyError if they can't be written."""
-        units = {"units": dict(metrics), "parameters": dict(parameters)}
-        about = {"path": self._setup.path, ASKED: self._asked, **units, MADE_WITH: self._made_with}
-        self._write(Path(UNITS), sealed(about, indent=1))
+        found = Units(path=self._setup.path, asked=dict(self._asked), units=dict(metrics), parameters=dict(parameters))
+        self._write(Path(UNITS), sealed({**dict(found), MADE_WITH: self._made_with}, indent=1))
 
     @property
     def _made_with(self) -> dict[str, Any]:
@@ -184,7 +180,8 @@ class Journal(AbstractContextManager["Journal"]):
         except (FileError, OSError) as error:
             reason = error if isinstance(error, FileError) else f"can't be written ({error.strerror})"
             raise StudyError(
-                f"{path}: {reason}; {len(self.rows)} finished runs are kept, and the same command goes on with them"
+                f"{path}: {reason}; {len(self.rows)} finished runs are kept, and the same command goes on with them; "
+                "expected a file to write, and room for it"
             ) from None
 
     def _write_origin(self) -> None:
@@ -282,9 +279,11 @@ class Journal(AbstractContextManager["Journal"]):
 
     def _keep_source(self) -> None:
         """Write the study's text, for people."""
-        with suppress(FileError, ValueError):
-            if read_file(self.folder / SOURCE, 8 * MB).decode() == self._setup.source:
+        try:
+            if read_file(self.folder / SOURCE, 16 * MB) == self._setup.source.encode():
                 return
+        except FileError as error:
+            self._set_aside(self.folder / SOURCE, str(error))
         self._write(Path(SOURCE), self._setup.source.encode())
 
 

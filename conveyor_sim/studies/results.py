@@ -12,15 +12,16 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, TypeAdapter
+from pydantic import TypeAdapter
 
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
-from conveyor_sim.studies.journal import SOURCE, UNITS, read_rows, unusable
-from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, Origin, read_origin, read_study_json
+from conveyor_sim.studies.journal import SOURCE, read_rows, unusable
+from conveyor_sim.studies.origin import ORIGIN, VERSION, WARM_UP, read_origin
 from conveyor_sim.studies.row import Row
-from conveyor_sim.studies.run_file import MADE_WITH, row_of
+from conveyor_sim.studies.run_file import row_of
 from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
+from conveyor_sim.studies.units_file import UNITS, read_units
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import SEAL, parsed
 from conveyor_sim.version import __version__
@@ -99,10 +100,9 @@ def read_results(path: Path) -> Results:
         raise unusable(path / ORIGIN, error) from None
     rows = read_rows(path, origin)
     try:
-        about = _about(path / UNITS, origin)
-    except (FileError, ValueError) as error:
-        reason = error if isinstance(error, FileError) else "has other fields than conveyor-sim sweep writes"
-        raise unusable(path / UNITS, reason) from None
+        about = read_units(path / UNITS, origin.fields, origin.sealed)
+    except FileError as error:
+        raise unusable(path / UNITS, error) from None
     versions = {"conveyor_sim": __version__, "engine": origin.fields["engine"], "sources": origin.fields[VERSION]}
     rows = [_as_asked(row, about.asked) for row in rows]
     try:
@@ -122,29 +122,6 @@ def _fitting(results: Results) -> Results:
     if any(row.parameters.keys() != results.parameters.keys() for row in results.rows):
         raise ValueError("other parameters")
     return results
-
-
-class _About(BaseModel, strict=True, extra="forbid"):
-    """Content of UNITS."""
-
-    path: str
-    asked: dict[str, str]
-    units: dict[str, str]
-    parameters: dict[str, str]
-
-
-def _about(file: Path, origin: Origin) -> _About:
-    """Content of a file of units that belongs to an origin. Raises FileError, and ValueError for other fields."""
-    kept = read_study_json(file)
-    made = kept.data.pop(MADE_WITH, {})
-    if kept.sealed is not origin.sealed:
-        raise FileError("has no checksum" if origin.sealed else f"has a checksum, which {ORIGIN} has not")
-    if kept.sealed and not (isinstance(made, dict) and origin.fields.items() <= made.items()):
-        raise FileError("was made with another study")
-    about = _About.model_validate(kept.data)
-    if about.units.keys() != about.asked.keys():
-        raise ValueError("other metrics")
-    return about
 
 
 def _as_asked(row: Row, asked: Mapping[str, str]) -> Row:

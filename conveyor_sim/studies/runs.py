@@ -67,7 +67,7 @@ class Runs(AbstractContextManager["Runs"]):
 
         total = len(rows) + len(todo)
         progress(len(rows), total, left(), None)
-        if todo or not self.journal.has_units:
+        if not self.journal.has_units or todo:
             self._compile(todo or jobs[:1])
         unstarted = self._warm(todo)
         for job in [job for job in todo if job.seed in unstarted]:
