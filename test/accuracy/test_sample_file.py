@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -154,6 +155,12 @@ def test_a_folder_that_can_not_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ConveyorError, match=r"file: File exists, expected a folder to write to"):
         SampleFile(tmp_path / "file", SCENE)
-    (tmp_path / "folder" / SAMPLES).mkdir(parents=True)
-    with pytest.raises(ConveyorError):
+    (tmp_path / "folder").mkdir()
+    check_origin(tmp_path / "folder", SCENE)
+    (tmp_path / "folder" / SAMPLES).mkdir()
+    with pytest.raises(ConveyorError, match=r"samples\.csv: is a folder, expected a file of finished runs"):
+        SampleFile(tmp_path / "folder", SCENE)
+    (tmp_path / "folder" / SAMPLES).rmdir()
+    os.mkfifo(tmp_path / "folder" / SAMPLES)
+    with pytest.raises(ConveyorError, match=r"samples\.csv: is a named pipe"):
         SampleFile(tmp_path / "folder", SCENE)

@@ -18,11 +18,13 @@ from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.observe import itinerary
 from conveyor_sim.scene import Scene
-from conveyor_sim.support.files import FileError, write_file
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import read_sealed, sealed
 from conveyor_sim.version import sources_hash
 
 SAMPLES = "samples.csv"
+MOST = 512 * MB
+"""Bytes of that file that are read."""
 ORIGIN = "origin.json"
 """What a folder's results are of: hashes that a study must share to go on with them."""
 
@@ -74,7 +76,10 @@ class SampleFile:
         self._file.flush()
 
     def _whole_lines(self) -> bytes:
-        content = self.path.read_bytes() if self.path.exists() else b""
+        try:
+            content = read_file(self.path, MOST) if self.path.is_symlink() or self.path.exists() else b""
+        except FileError as error:
+            raise ConveyorError(f"{self.path}: {error}, expected a file of finished runs, or no such file") from None
         return content[: content.rfind(b"\n") + 1]
 
 
@@ -90,9 +95,12 @@ def check_origin(folder: Path, scene: Scene) -> None:
             raise ConveyorError(f"{folder}: has another kind of study ({OTHER_STUDY}), expected another folder")
         if not path.exists() and not (folder / SAMPLES).exists():
             write_file(path, sealed(origin, indent=2))
-        kept = read_sealed(path)
     except OSError as error:
         raise _unwritable(folder, error) from None
+    except FileError as error:
+        raise ConveyorError(f"{path}: {error}, expected a folder to write to") from None
+    try:
+        kept = read_sealed(path)
     except FileError as error:
         raise ConveyorError(
             f"{path}: {error}, so it can't be told what the runs beside it are of; expected the file as it was, "
