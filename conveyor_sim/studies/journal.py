@@ -158,7 +158,8 @@ class Journal(AbstractContextManager["Journal"]):
         file = self.folder / UNITS
         try:
             found = read_units(file, origin_of(self._setup), True)
-            return (found.path, found.asked) == (self._setup.path, self._asked)
+            same = (found.path, found.asked) == (self._setup.path, self._asked)
+            return same and found.parameters.keys() == self._setup.study.parameters.keys()
         except FileError as error:
             self._set_aside(file, str(error))
             return False
