@@ -1,4 +1,4 @@
-"""Any bag that rosbags can read: of several files, of another recorder, without an index, ..."""
+"""Bags whose storage is not plain MCAP and that rosbags can read: sqlite3, compressed by file or by message."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
+from rosbags.interfaces import Qos as RosbagsQos
 from rosbags.rosbag2 import Reader
 
 from conveyor_sim.bag.qos import DATA, Qos
@@ -73,7 +74,11 @@ def _is_scanned(reader: AnyReader) -> bool:
 
 
 def _offered(connection: Connection) -> Qos:
-    profiles = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
+    return offered(connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else [])
+
+
+def offered(profiles: Sequence[RosbagsQos]) -> Qos:
+    """Return the quality of service of a topic from the profiles that its publishers offered; DATA without any."""
     if not profiles:
         return DATA
     first = profiles[0]  # of one publisher; several of one topic offer the same here

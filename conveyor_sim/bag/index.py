@@ -6,9 +6,9 @@ import struct
 from dataclasses import dataclass, field
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Schema, Statistics
+from mcap.records import AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Schema, Statistics
 
-from conveyor_sim.bag.records import MAGIC, PRIVATE, Data, Malformed, checksum, records
+from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, UNKNOWN, Data, Malformed, checksum, records
 
 DATA_END = struct.Struct("<BQI")
 """Opcode, length 4, CRC of all bytes before."""
@@ -20,7 +20,7 @@ HELD = (
     Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX, Opcode.STATISTICS,
     Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET,
 )  # fmt: skip
-"""Records that an index may hold, beside a writer's own."""
+"""Known records that an index may hold."""
 
 
 @dataclass
@@ -31,12 +31,50 @@ class Index:
     """Byte at which it begins."""
     stop: int
     """Byte after the file's end mark."""
+    stated: int
+    """Byte at which it begins as the footer states it; 0: there is no index."""
     verified: bool
     """Its checksum holds; False: it carries none."""
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: list[ChunkIndex] = field(default_factory=list)
     statistics: Statistics | None = None
+    places: set[int] = field(default_factory=set)
+    """Bytes at which it states that known records begin: chunks, their indexes, attachments, metadata."""
+    unknown: list[int] = field(default_factory=list)
+    """Opcodes of records that the specification does not define."""
+
+    @property
+    def absent(self) -> bool:
+        """The file has no index, as its footer states."""
+        return self.stated == 0 and self.start == self.stop - len(MAGIC) - FOOTER.size
+
+    @property
+    def counts_messages(self) -> bool:
+        """It shows which messages there were."""
+        return bool(self.chunks) or self.statistics is not None
+
+
+def chained_to(data: Data) -> int | None:
+    """Return the byte of DataEnd if record lengths lead from the first record to footer and end mark, else None.
+
+    Then the lengths can be trusted, also those of records that the specification does not define.
+    """
+    size = len(data)
+    footer = size - len(MAGIC) - FOOTER.size
+    if footer < len(MAGIC) or data[: len(MAGIC)] != MAGIC or data[size - len(MAGIC) :] != MAGIC:
+        return None
+    position, end = len(MAGIC), None
+    while position < footer - RECORD_HEAD.size:
+        opcode, length = RECORD_HEAD.unpack_from(data, position)
+        if opcode in (0, Opcode.FOOTER) or (opcode == Opcode.DATA_END and (end is not None or length != CRC_SIZE)):
+            return None
+        if opcode == Opcode.DATA_END:
+            end = position
+        position += RECORD_HEAD.size + length
+    if position != footer or RECORD_HEAD.unpack_from(data, footer) != (Opcode.FOOTER, FOOTER.size - RECORD_HEAD.size):
+        return None
+    return end
 
 
 def sealed(data: Data) -> bool:
@@ -69,7 +107,7 @@ def read_index(data: Data) -> Index | None:
         if not len(MAGIC) <= start <= footer or (crc and checksum(data, start, end - CRC_SIZE) != crc):
             continue
         try:
-            return _parse(data, Index(start, end + len(MAGIC), verified=crc != 0), footer)
+            return _parse(data, Index(start, end + len(MAGIC), stated, verified=crc != 0), footer)
         except Malformed:
             continue
     return None
@@ -77,7 +115,9 @@ def read_index(data: Data) -> Index | None:
 
 def _parse(data: Data, index: Index, stop: int) -> Index:
     for _, opcode, record in records(data, index.start, stop):
-        if opcode not in HELD and opcode < PRIVATE:
+        if opcode >= UNKNOWN:
+            index.unknown.append(opcode)
+        elif opcode not in HELD:
             raise Malformed("a record in it is of a kind that no index holds")
         if isinstance(record, Schema):
             index.schemas[record.id] = record
@@ -85,6 +125,9 @@ def _parse(data: Data, index: Index, stop: int) -> Index:
             index.channels[record.id] = record
         elif isinstance(record, ChunkIndex):
             index.chunks.append(record)
+            index.places |= {record.chunk_start_offset, *record.message_index_offsets.values()}
+        elif isinstance(record, (AttachmentIndex, MetadataIndex)):
+            index.places.add(record.offset)
         elif isinstance(record, Statistics):
             index.statistics = record
     return index

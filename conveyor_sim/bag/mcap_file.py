@@ -49,12 +49,16 @@ class McapFile:
         self._writer = McapWriter(stream, PROFILE, f"{LIBRARY} {__version__}")
         self._schemas: dict[Schema, int] = {}
         self._topics: dict[int, TopicInfo] = {}
+        self._foreign: set[int] = set()  # channels without a ROS 2 type
+        self._times: tuple[int, int] | None = None  # of the other channels; kept only if there are foreign ones
         self._name = name
 
     @property
     def info(self) -> FileInfo:
-        """The file so far."""
-        return FileInfo(self._name, *self._writer.times, self._writer.counts.total())
+        """The file so far: its ROS 2 messages."""
+        times = (self._times or (0, 0)) if self._foreign else self._writer.times
+        foreign = sum(self._writer.counts[channel] for channel in self._foreign)
+        return FileInfo(self._name, *times, self._writer.counts.total() - foreign)
 
     @property
     def topics(self) -> list[TopicInfo]:
@@ -64,15 +68,31 @@ class McapFile:
 
     def add_topic(self, name: str, schema: Schema, encoding: str, metadata: dict[str, str]) -> int:
         """Registers a channel for messages of the schema's type; returns its number."""
-        if schema not in self._schemas:
-            self._schemas[schema] = self._writer.register_schema(schema.name, schema.encoding, schema.text)
-        channel = self._writer.register_channel(name, encoding, self._schemas[schema], metadata)
+        channel = self._writer.register_channel(name, encoding, self._number(schema), metadata)
         self._topics[channel] = topic_info(name, schema.name, metadata, 0)
         return channel
+
+    def add_foreign(self, name: str, schema: Schema | None, encoding: str, metadata: dict[str, str]) -> int:
+        """Register a channel without a ROS 2 type, before the first message. Return its number.
+
+        rosbag2's metadata leave it out. schema: None for messages that describe themselves.
+        """
+        channel = self._writer.register_channel(name, encoding, 0 if schema is None else self._number(schema), metadata)
+        self._foreign.add(channel)
+        return channel
+
+    def _number(self, schema: Schema) -> int:
+        """Return the number of a schema, which is registered the first time."""
+        if schema not in self._schemas:
+            self._schemas[schema] = self._writer.register_schema(schema.name, schema.encoding, schema.text)
+        return self._schemas[schema]
 
     def add_message(self, channel: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
         """Appends a message; times in ns."""
         self._writer.add_message(channel, log_time, data, publish_time, sequence)
+        if self._foreign and channel not in self._foreign:
+            start, end = self._times or (log_time, log_time)
+            self._times = min(start, log_time), max(end, log_time)
 
     def add_metadata(self, name: str, content: dict[str, str]) -> None:
         """Appends a metadata record."""

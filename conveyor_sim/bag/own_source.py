@@ -68,7 +68,7 @@ class OwnSource:
             late = start_ns is not None and chunk.message_end_time < start_ns
             if early or late or not any(number in chunk.message_index_offsets for number in names):
                 continue
-            found = list(_messages(self._content(chunk.chunk_start_offset), names))
+            found = list(messages_of(self._content(chunk.chunk_start_offset), names))
             found.sort(key=itemgetter(1))  # what belongs to an earlier tick may have been written later
             for raw in found:
                 if (start_ns is None or raw[1] >= start_ns) and (stop_ns is None or raw[1] < stop_ns):
@@ -108,14 +108,15 @@ def own_source(file: Path) -> OwnSource | None:
     """A source of a sealed file; None for one that has to be read by rosbags."""
     with file.open("rb") as stream:
         data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    index = read_index(data) if _is_of_this_package(data) else None
+    index = read_index(data) if is_of_this_package(data) else None
     if index is None or not _is_simple(index):
         data.close()
         return None
     return OwnSource(file, index, data)
 
 
-def _is_of_this_package(data: Data) -> bool:
+def is_of_this_package(data: Data) -> bool:
+    """Return True if the header names this package as the writer."""
     head = head_at(data, len(MAGIC), len(data))
     if head is None or head[0] != Opcode.HEADER:
         return False
@@ -142,8 +143,11 @@ def _is_simple(index: Index) -> bool:
     )
 
 
-def _messages(content: bytes, names: dict[int, str]) -> Iterator[Raw]:
-    """Those of some channels, in the order in which they were written. Raises Malformed."""
+def messages_of(content: bytes, names: dict[int, str]) -> Iterator[Raw]:
+    """Yield the messages of some channels of a chunk's content, in the order in which they were written.
+
+    Raises Malformed.
+    """
     position, end = 0, len(content)
     while position < end:
         opcode, length = RECORD_HEAD.unpack_from(content, position)

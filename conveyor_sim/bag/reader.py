@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import stat
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path, PurePath
 from typing import Any, Generic, TypeVar
 
@@ -16,20 +17,22 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.any_source import AnySource
 from conveyor_sim.bag.index import sealed
+from conveyor_sim.bag.mcap_source import McapSource
 from conveyor_sim.bag.messages import LINE, Outcome
 from conveyor_sim.bag.metadata import FILE_NAME, file_names, is_stated_in, read_metadata
 from conveyor_sim.bag.own_source import own_source
 from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.records import mapped
-from conveyor_sim.bag.salvage import Salvage
 from conveyor_sim.bag.source import Source
+from conveyor_sim.bag.storage import other_storage
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.support.printable import printable
+from conveyor_sim.support.printable import SENTENCE, printable
 
 T = TypeVar("T")
 
+LOG = logging.getLogger("conveyor_sim")
 SUFFIXES = (".mcap", ".db3")
 """Of files that are a bag by themselves."""
 
@@ -232,9 +235,8 @@ class in_one_sentence(AbstractContextManager[None]):
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if isinstance(error, Exception) and not isinstance(error, ConveyorError):
             reason = printable(" ".join(f"{type(error).__name__}: {error}".split()))
-            raise BagError(
-                f"{self._path}: {self._what} ({reason}); damaged? `conveyor-sim recover` may help"
-            ) from error
+            hint = other_storage(self._path) or "`conveyor-sim recover` may help"
+            raise BagError(f"{self._path}: {self._what} ({reason}); damaged? {hint}") from error
 
 
 def mcap_files(path: Path) -> list[Path]:
@@ -245,11 +247,12 @@ def mcap_files(path: Path) -> list[Path]:
     return sorted(files, key=lambda file: (len(file.name), file.name))
 
 
-def open_bag(path: str | Path, by_index: bool = False) -> Bag:
+def open_bag(path: str | Path, by_index: bool = False, *, report: bool = True) -> Bag:
     """Opens a rosbag2 folder or a single .mcap file, once all of it that carries a checksum has been verified.
 
     by_index: a whole recording of this package is opened by its index alone, however long it is; what is read of it
     later is verified then, chunk by chunk.
+    report: log one line for each file with valid parts that are not read, such as channels without ROS 2 type.
     Raises BagError, in one sentence, if it is missing, cut short or damaged, or holds no `line`.
     """
     path = Path(path)
@@ -258,17 +261,21 @@ def open_bag(path: str | Path, by_index: bool = False) -> Bag:
         files = _checked_files(path)
         if by_index and len(files) == 1 and (own := own_source(files[0])) is not None:
             return Bag(path, own, verified=False)
-        seals = [_verify(path, file) for file in files]
-        verified = bool(seals) and all(seals)
-        # By its files, if it is MCAP: these repeat, under a checksum, what metadata.yaml says.
-        own = own_source(files[0]) if verified and len(files) == 1 else None
-        source = own or AnySource(files or [path])
+        source, verified = _source(path, files)
+        if report and isinstance(source, McapSource):
+            for sentence in source.skipped:
+                _report_skipped(sentence)
         try:
             return Bag(path, source, verified)
         except BaseException:
             with suppress(Exception):
                 source.close()
             raise
+
+
+@lru_cache(maxsize=1024)  # a command may open a bag several times
+def _report_skipped(sentence: str) -> None:
+    LOG.warning("%s", printable(sentence, SENTENCE))
 
 
 def _require_bag(path: Path) -> None:
@@ -282,16 +289,23 @@ def _require_bag(path: Path) -> None:
             f"{path}: can't be read ({error.strerror}), expected a rosbag2 folder or an .mcap file"
         ) from error
     if not (stat.S_ISDIR(kind) or (stat.S_ISREG(kind) and path.suffix in SUFFIXES)):
-        raise BagError(f"{path}: is no bag; expected a rosbag2 folder or an .mcap file")
+        storage = other_storage(path)
+        raise BagError(f"{path}: {storage or 'is no bag; expected a rosbag2 folder or an .mcap file'}")
 
 
 def _checked_files(path: Path) -> list[Path]:
     """The MCAP files that a bag consists of; none if rosbags must read it by its metadata.yaml."""
     if path.is_file():
-        return [path] if path.suffix == ".mcap" else []
+        if path.suffix != ".mcap":
+            return []
+        if storage := other_storage(path):
+            raise BagError(f"{path}: {storage}")
+        return [path]
     files = mcap_files(path)
     if not (path / FILE_NAME).exists():
         hint = "`conveyor-sim recover` repairs it" if files else "expected a rosbag2 folder"
+        if not files and (storage := other_storage(path)):
+            hint = f"`ros2 bag reindex` writes it ({storage})"
         raise BagError(f"{path}: {FILE_NAME} is missing; {hint}")
     with suppress(OSError, UnicodeDecodeError):
         if len(files) == 1 and is_stated_in(files[0]):
@@ -314,12 +328,19 @@ def _checked_files(path: Path) -> list[Path]:
     return files
 
 
-def _verify(path: Path, file: Path) -> bool:
-    """Whether every byte of a file is as it was written; False: as far as can be seen. Raises BagError."""
+def _source(path: Path, files: list[Path]) -> tuple[Source, bool]:
+    """Open a bag, by its MCAP files if it has any: these repeat, under a checksum, what metadata.yaml says.
+
+    Return also True if every byte is as it was written. Raises BagError for damage that can be seen.
+    """
+    if not files:
+        return AnySource([path]), False
+    if len(files) == 1 and _is_sealed(files[0]) and (own := own_source(files[0])) is not None:
+        return own, True
+    source = McapSource(path, files)
+    return source, source.verified
+
+
+def _is_sealed(file: Path) -> bool:
     with mapped(file) as data:
-        if sealed(data):
-            return True
-        damage = Salvage(file, data).damage
-    if damage:
-        raise BagError(f"{file}: is damaged ({damage[0]}); `conveyor-sim recover {path}` saves what is sound")
-    return False
+        return sealed(data)

@@ -13,6 +13,8 @@ from pathlib import Path
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.folder import make_folder, remove_folders
 from conveyor_sim.bag.input_log import START_NAME
+from conveyor_sim.bag.line_copy import NAME as LINE_COPY
+from conveyor_sim.bag.line_copy import LineCopy
 from conveyor_sim.bag.lock import claim
 from conveyor_sim.bag.mcap_file import McapFile
 from conveyor_sim.bag.metadata import write_metadata
@@ -20,6 +22,7 @@ from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import BagError, CheckpointError
 
+LINE_TOPIC = "line"
 FLUSH_INTERVAL = 0.5
 """s of wall time that a message waits at most to be handed to the operating system. A killed process loses these, and
 what a loaded machine adds: less than a second."""
@@ -86,6 +89,9 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             if self._ended:
                 raise BagError(f"{self.path}: the recording has ended and takes no more messages")
             try:
+                if topic == LINE_TOPIC and not self._begun:
+                    line = LineCopy(f"/{topic}", OUTPUTS[topic].type, stamp_ns, data)
+                    self._file.add_metadata(LINE_COPY, line.to_record())
                 self._file.add_message(self._channels[topic], data, log_time=stamp_ns, publish_time=stamp_ns)
                 if not self._begun:
                     self._file.flush()

@@ -15,6 +15,7 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
+    AttachmentIndex,
     Channel,
     ChunkIndex,
     Header,
@@ -22,6 +23,7 @@ from mcap.records import (
     Message,
     MessageIndex,
     Metadata,
+    MetadataIndex,
     Schema,
     Statistics,
 )
@@ -38,8 +40,8 @@ PIECE = 1 << 20
 
 Data = mmap.mmap | bytes
 
-PRIVATE = 0x80
-"""Opcodes from here on are a writer's own, to be skipped."""
+UNKNOWN = 0x10
+"""First opcode that the specification leaves open: reserved below 0x80, private from there on. Readers skip both."""
 
 _READERS = {
     Opcode.HEADER: Header.read,
@@ -47,6 +49,8 @@ _READERS = {
     Opcode.CHANNEL: Channel.read,
     Opcode.METADATA: Metadata.read,
     Opcode.ATTACHMENT: Attachment.read,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex.read,
+    Opcode.METADATA_INDEX: MetadataIndex.read,
     Opcode.MESSAGE_INDEX: MessageIndex.read,
     Opcode.CHUNK_INDEX: ChunkIndex.read,
     Opcode.STATISTICS: Statistics.read,
@@ -102,18 +106,24 @@ class _Whole(ReadDataStream):
 
 
 def parse(opcode: int, body: bytes) -> McapRecord | None:
-    """A record of a kind that is needed, else None. Raises Malformed."""
+    """Return a record of a known kind, else None. Raises Malformed."""
+    return parse_part(opcode, body)[0]
+
+
+def parse_part(opcode: int, body: bytes) -> tuple[McapRecord | None, int]:
+    """Return a record of a known kind, else None, and the bytes that its known fields take. Raises Malformed.
+
+    A record may be longer: the specification lets later versions append fields, which readers ignore.
+    """
     stream = _Whole(BytesIO(body))
     try:
         if opcode == Opcode.MESSAGE:
             message: McapRecord = Message.read(stream, len(body))
-            return message
+            return message, len(body)
         record: McapRecord | None = _READERS[Opcode(opcode)](stream) if opcode in _READERS else None
     except (McapError, struct.error, ValueError) as error:  # a UnicodeDecodeError is a ValueError
         raise Malformed("a record can't be read") from error
-    if record is not None and stream.count != len(body):
-        raise Malformed("a record does not end where it should")
-    return record
+    return record, stream.count
 
 
 def records(data: Data, start: int, stop: int) -> Iterator[tuple[int, int, McapRecord | None]]:

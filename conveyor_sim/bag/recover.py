@@ -12,7 +12,9 @@ from pathlib import Path, PurePath
 from mcap.records import Channel
 from mcap.records import Schema as SchemaRecord
 
-from conveyor_sim.bag.index import read_index, sealed
+from conveyor_sim.bag.foreign import is_ros
+from conveyor_sim.bag.index import Index, read_index, sealed
+from conveyor_sim.bag.line_copy import NAME as LINE_COPY
 from conveyor_sim.bag.lock import alone
 from conveyor_sim.bag.mcap_file import McapFile, Schema, topic_info
 from conveyor_sim.bag.metadata import (
@@ -27,13 +29,18 @@ from conveyor_sim.bag.metadata import (
     to_yaml,
     write_metadata,
 )
+from conveyor_sim.bag.own_source import is_of_this_package
 from conveyor_sim.bag.reader import mcap_files, open_bag
 from conveyor_sim.bag.records import mapped
-from conveyor_sim.bag.salvage import NothingLeft, Salvage
+from conveyor_sim.bag.salvage import Salvage
+from conveyor_sim.bag.storage import other_storage, packed_part
 from conveyor_sim.bag.topics import STATES
 from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.walk import NothingLeft
 from conveyor_sim.errors import BagError
 
+WRITTEN_ANEW = (RECORD_NAME, LINE_COPY)
+"""Names of metadata records that repeat what else is in the file."""
 STATE_TYPES = {topic.type for topic in STATES.values()}
 
 
@@ -46,13 +53,16 @@ class RecoverReport:
     """Nothing was wrong, and nothing was done."""
     unverified: tuple[str, ...]
     """What carries no checksum, so that damage in it can't be seen, a phrase each; empty: every byte was verified."""
+    skipped: tuple[str, ...]
+    """One sentence for each file with valid parts that are not read: channels without ROS 2 type, unknown records."""
     message_count: int
+    """ROS 2 messages."""
     end_ns: int
-    """Log time of the last message, ns."""
+    """Log time of the last of them, ns."""
     damage: tuple[str, ...]
     """What was wrong and what is lost, one sentence each."""
     kept: tuple[Path, ...]
-    """The damaged originals; they may be deleted."""
+    """The damaged originals."""
     unusable: str
     """Why what is there can't be replayed or drawn; empty: it can."""
 
@@ -65,6 +75,12 @@ class _Content:
     topics: tuple[TopicInfo, ...]
     damage: tuple[str, ...] = ()
     unverified: tuple[str, ...] = ()
+    skipped: str = ""
+    """Phrase that counts the parts that are not read; "": there are none."""
+    others: int = 0
+    """Messages without ROS 2 type, attachments, and metadata of other programs."""
+    chained: bool = False
+    """Record lengths lead from the first record to a proper end."""
     nothing_left: bool = False
 
 
@@ -85,6 +101,9 @@ def recover(path: str | Path) -> RecoverReport:
     with contextlib.ExitStack() as locks:
         try:
             files = mcap_files(path)
+            storage = other_storage(path) if path.is_file() or not files else packed_part(path)
+            if storage:
+                raise BagError(f"{path}: can't be verified or repaired: {storage}")
             if not files:
                 raise BagError(f"{path}: no MCAP file found, expected a rosbag2 folder or an .mcap file")
             for file in files:
@@ -113,6 +132,7 @@ def recover(path: str | Path) -> RecoverReport:
         path=path,
         healthy=not damage,
         unverified=tuple(unverified),
+        skipped=tuple(f"{content.file.path}: skipped {content.skipped}" for content in contents if content.skipped),
         message_count=sum(content.file.message_count for content in contents),
         end_ns=max(content.file.end_ns for content in contents),
         damage=tuple(damage),
@@ -158,16 +178,17 @@ def _missing(folder: Path) -> list[str]:
 def _repair(file: Path) -> _Content:
     """Verifies a file; if it is damaged, writes a copy of what is sound beside it."""
     with mapped(file) as data:
-        if sealed(data) and (index := read_index(data)) is not None and index.statistics is not None:
+        index = read_index(data) if sealed(data) and is_of_this_package(data) else None
+        if index is not None and index.statistics is not None and _is_ours(index):
             statistics = index.statistics
             span = (statistics.message_start_time, statistics.message_end_time)
             topics = _topics(index.schemas, index.channels, statistics.channel_message_counts)
             return _Content(FileInfo(file.name, *span, statistics.message_count), topics)
         salvage = Salvage(file, data)
         if not salvage.damage:
-            info = FileInfo(file.name, *salvage.span, sum(salvage.counts.values()))
-            topics = _topics(salvage.schemas, salvage.channels, salvage.counts)
-            return _Content(info, topics, unverified=tuple(salvage.unverified))
+            info = FileInfo(file.name, *salvage.span, sum(salvage.counts[number] for number in salvage.ros_channels))
+            topics = _topics(salvage.schemas, salvage.ros_channels, salvage.counts)
+            return _Content(info, topics, unverified=tuple(salvage.unverified), skipped=salvage.skipped, chained=True)
         with _temporary(file).open("wb") as stream:
             copy = McapFile(stream, file.name, default_distro())
             _copy(salvage, copy)
@@ -177,8 +198,18 @@ def _repair(file: Path) -> _Content:
     with mapped(_temporary(file)) as data:
         if not sealed(data):
             raise BagError(f"{file}: the repaired copy can't be read back; the original was left as it was")
-    damage = (*salvage.damage, *(str(loss) for loss in salvage.losses))
-    return _Content(copy.info, tuple(copy.topics), damage)
+    damage = [*salvage.damage, *(str(loss) for loss in salvage.losses)]
+    if salvage.unread or salvage.unknown:
+        damage.append("records that are not read were left out of the copy")
+    topics, kept = tuple(copy.topics), len([m for m in salvage.metadata if m.name not in WRITTEN_ANEW])
+    foreign = sum(salvage.counts[number] for number in salvage.channels.keys() - salvage.ros_channels.keys())
+    others = kept + len(salvage.attachments) + foreign
+    return _Content(copy.info, topics, tuple(damage), skipped=salvage.skipped, others=others, chained=salvage.chained)
+
+
+def _is_ours(index: Index) -> bool:
+    """Return True if an index shows nothing but ROS 2 channels and known records."""
+    return not index.unknown and all(is_ros(channel, index.schemas) for channel in index.channels.values())
 
 
 def _topics(
@@ -187,23 +218,27 @@ def _topics(
     return tuple(
         topic_info(channel.topic, schemas[channel.schema_id].name, channel.metadata, counts.get(number, 0))
         for number, channel in channels.items()
-        if channel.schema_id in schemas
     )
 
 
 def _copy(salvage: Salvage, copy: McapFile) -> None:
-    """Copies messages with their times, topics and types; rosbag2's own record is left to be written anew."""
+    """Copy messages with their times, topics and types; the records that repeat others are written anew."""
     channels = {}
     for number, channel in sorted(salvage.channels.items()):
-        found = salvage.schemas[channel.schema_id]
-        schema = Schema(found.name, found.encoding, found.data)
-        channels[number] = copy.add_topic(channel.topic, schema, channel.message_encoding, channel.metadata)
+        stated = salvage.schemas.get(channel.schema_id) if channel.schema_id else None
+        schema = None if stated is None else Schema(stated.name, stated.encoding, stated.data)
+        if schema is not None and is_ros(channel, salvage.schemas):
+            channels[number] = copy.add_topic(channel.topic, schema, channel.message_encoding, channel.metadata)
+        else:
+            channels[number] = copy.add_foreign(channel.topic, schema, channel.message_encoding, channel.metadata)
+    if (line := salvage.line) is not None:
+        copy.add_metadata(LINE_COPY, line.to_record())
     for message in salvage.messages():
         copy.add_message(
             channels[message.channel_id], message.data, message.log_time, message.publish_time, message.sequence
         )
     for record in salvage.metadata:
-        if record.name != RECORD_NAME:
+        if record.name not in WRITTEN_ANEW:
             copy.add_metadata(record.name, record.metadata)
     for attachment in salvage.attachments:
         copy.add_attachment(
@@ -212,16 +247,17 @@ def _copy(salvage: Salvage, copy: McapFile) -> None:
 
 
 def _require_states(path: Path, contents: list[_Content]) -> None:
-    """Raises BagError if a damaged recording has no message left, or of a line that was recorded not one state."""
+    """Raise BagError if a damaged bag has nothing left, or the recording of a line not one state."""
     topics = [topic for content in contents for topic in content.topics]
     left = {topic.name: topic.message_count for topic in topics if topic.message_count}
     ours = any(topic.type in STATE_TYPES for topic in topics)
     states = any(topic.type in STATE_TYPES and topic.message_count for topic in topics)
-    if not (states if ours else left):
+    if not (states if ours else left or any(content.others for content in contents)):
         what = f"only {sum(left.values())} messages of {', '.join(left)} and no state" if left else "not one message"
+        # Where record lengths lead to a proper end, other programs may read more.
+        advice = "" if any(content.chained for content in contents) else ": delete it to record there again"
         raise BagError(
-            f"{path}: holds {what} that can be read; nothing can be recovered, and nothing was changed: delete it to "
-            "record there again"
+            f"{path}: holds {what} that can be read; nothing can be recovered, and nothing was changed{advice}"
         )
 
 
@@ -284,7 +320,7 @@ def _refresh_metadata(folder: Path, contents: list[_Content]) -> list[Path] | No
 def _unusable(path: Path) -> str:
     """Why a bag can't be replayed or drawn, in words; empty if it can."""
     try:
-        with open_bag(path) as bag:
+        with open_bag(path, report=False) as bag:
             known = any(bag.counts.get(topic) for topic in STATES)
     except BagError as error:
         return str(error)

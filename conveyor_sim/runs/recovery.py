@@ -21,15 +21,18 @@ def recover_bag(bag: Path) -> None:
         click.echo(printable(sentence, SENTENCE))
     for phrase in report.unverified:
         click.echo(f"{printable(phrase, SENTENCE)}: has no checksum, so it can't be verified")
+    for sentence in report.skipped:
+        click.echo(printable(sentence, SENTENCE))
     what = f"{report.message_count} messages up to {report.end_ns * 1e-9:.2f} s"
+    skipping = ", apart from the parts that were skipped" if report.skipped else ""
     if not report.healthy:
         click.echo(f"{bag}: repaired, with {what}")
     elif report.unverified:
-        click.echo(f"{bag}: no damage was found, nothing to do ({what})")
+        click.echo(f"{bag}: no damage was found{skipping}, nothing to do ({what})")
     else:
-        click.echo(f"{bag}: is whole, every checksum is right, nothing to do ({what})")
+        click.echo(f"{bag}: is intact{skipping}, every checksum is right, nothing to do ({what})")
     for file in report.kept:
-        click.echo(f"the damaged original is kept as {file} and may be deleted")
+        click.echo(f"the damaged original is kept as {file}")
     if report.unusable and not report.healthy:
         raise BagError(f"{report.unusable}; other programs can read it, but it can't be replayed or drawn")
 

@@ -61,26 +61,24 @@ def test_a_bag_without_chunks_is_compared_to_its_end(folder: Path, tmp_path: Pat
     assert replay(written(folder, tmp_path / "flat", files, use_chunking=False)).compared == compared
 
 
-def test_messages_out_of_order_without_an_index_are_put_in_order(folder: Path, tmp_path: Path) -> None:
-    """As one flipped bit in a time makes them; rosbags reads them no more."""
+def test_messages_out_of_order_without_an_index_are_read_in_order(folder: Path, tmp_path: Path) -> None:
+    """The specification asks for no order."""
     bag = written(folder, tmp_path / "flat", use_chunking=False)
     with open_bag(bag) as opened:
         times = [time for _, time, _ in opened.raw()]
     file, early = bag / "flat_0.mcap", struct.pack("<Q", times[len(times) // 2])
     late = struct.pack("<Q", times[-1])
     file.write_bytes(file.read_bytes().replace(2 * early, late + early, 1))
-    assert "flat_0.mcap: messages outside of chunks are not in the order of their times" in recover(bag).damage
+    assert recover(bag).healthy
     with open_bag(bag) as opened:
         found = [time for _, time, _ in opened.raw()]
     assert found == sorted(found)
     assert len(found) == len(times)
-    assert recover(bag).healthy
 
 
-def test_a_bag_whose_messages_can_not_be_found_is_refused(folder: Path, tmp_path: Path) -> None:
-    bag = written(folder, tmp_path / "lost", index_types=IndexType.CHUNK | IndexType.ATTACHMENT | IndexType.METADATA)
-    with pytest.raises(BagError, match=r"of 1 messages can be read|holds no message"):
-        replay(bag)
+def test_a_bag_without_indexes_of_messages_is_read(folder: Path, tmp_path: Path) -> None:
+    bag = written(folder, tmp_path / "bare", index_types=IndexType.CHUNK | IndexType.ATTACHMENT | IndexType.METADATA)
+    assert replay(bag).compared == replay(folder).compared
 
 
 def test_a_recording_that_grows_is_not_repaired(folder: Path, scene: Scene, tmp_path: Path) -> None:

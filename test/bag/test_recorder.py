@@ -98,8 +98,8 @@ def test_metadata_tells_rosbag2_what_is_there(bag: Path) -> None:
 def test_file_repeats_the_metadata_and_is_compressed_in_chunks(bag: Path) -> None:
     with (bag / "small_0.mcap").open("rb") as file:
         reader = make_reader(file)
-        (record,) = reader.iter_metadata()
-        assert record.name == "rosbag2"
+        line, record = reader.iter_metadata()
+        assert (line.name, record.name) == ("conveyor_sim.line", "rosbag2")
         in_file = YAML(typ="safe").load(record.metadata["serialized_metadata"])
         summary = reader.get_summary()
     beside = YAML(typ="safe").load((bag / "metadata.yaml").read_text())

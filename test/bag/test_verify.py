@@ -150,6 +150,7 @@ def test_a_chunk_that_is_gone_with_the_index_is_not_passed_over_in_silence(folde
 def test_topics_that_a_lost_chunk_named_are_found_in_the_index(folder: Path) -> None:
     before = messages(folder)
     damage_chunk(folder, 0)  # the line is in it, and every topic's name
+    flip(folder, file_of(folder).read_bytes().index(b"conveyor_sim.line") + 200)  # the copy of the line
     result = CliRunner().invoke(main, ["recover", str(folder)])
     assert result.exit_code == 1
     assert "no message of type conveyor_msgs/msg/Line" in result.output
