@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import select
 import signal
 import subprocess
 import sys
@@ -17,9 +16,18 @@ from typing import Any
 from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
+from conveyor_sim.st.exchange import AnswerError, EndedError, exchange
 
 PATIENCE = 60.0
-"""s of wall time that a call may take, beyond which the watchdog ends it."""
+"""Wall time of a call from its request to the end of its answer, s; beyond it the watchdog ends the program."""
+
+MOST_BYTES = 65_536
+"""Length of an answer; each output value may add _VALUE_BYTES, a snapshot MOST_STATE_BYTES."""
+
+MOST_STATE_BYTES = 86_000_000
+"""Length of a snapshot's answer: 64 MB of state in base 64."""
+
+_VALUE_BYTES = 32
 
 _MOMENT = 1.0
 """s of wall time that the end of a program may take."""
@@ -60,6 +68,7 @@ class CompiledProgram:
             [sys.executable, "-m", "conveyor_sim.st.library_host", str(self._path.resolve())],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            bufsize=0,
         )
         self.close = weakref.finalize(self, _end, self._process)
         """Ends the process; so does the end of this object."""
@@ -104,21 +113,18 @@ class CompiledProgram:
         self._call("restore", data["state"])
 
     def _call(self, do: str, *given: Any) -> Any:
-        process = self._process
-        assert process.stdin is not None and process.stdout is not None
+        request = json.dumps({"do": do, "with": given}).encode() + b"\n"
+        most = MOST_BYTES + (MOST_STATE_BYTES if do == "snapshot" else _VALUE_BYTES * len(self._outs))
         try:
-            process.stdin.write(json.dumps({"do": do, "with": given}).encode() + b"\n")
-            process.stdin.flush()
-        except OSError:
-            raise ControlError(f"{self._path}: {self._ended()} before {do}, expected a program that goes on") from None
-        if not select.select([process.stdout], [], [], self._patience)[0]:
-            process.kill()
+            answer = _answer(exchange(self._process, request, self._patience, most))
+            if do == "scan":
+                _require_numbers(answer.get("answer", [0.0] * len(self._outs)), len(self._outs))
+        except EndedError:
+            raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer") from None
+        except AnswerError as error:
+            self._process.kill()
             self.close()
-            raise ControlError(f"{self._path}: watchdog: {do} took more than {self._patience:g} s, expected less")
-        line = process.stdout.readline()
-        if not line.endswith(b"\n"):
-            raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer")
-        answer = json.loads(line)
+            raise ControlError(f"{self._path}: watchdog: {do} {error}, expected one answer in time") from None
         if "error" in answer:
             raise ControlError(f"{self._path}: {answer['error']}")
         return answer["answer"]
@@ -126,6 +132,23 @@ class CompiledProgram:
     def _ended(self) -> str:
         code = self._process.wait()
         return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+
+
+def _answer(line: bytes) -> dict[str, Any]:
+    """Return an answer of `library_host`. Raises AnswerError."""
+    try:
+        answer = json.loads(line)
+    except (ValueError, RecursionError):
+        answer = None
+    if not isinstance(answer, dict) or not (isinstance(answer.get("error"), str) or "answer" in answer):
+        raise AnswerError("sent a line that is no answer")
+    return answer
+
+
+def _require_numbers(values: Any, count: int) -> None:
+    """Raise AnswerError unless these are the values of all outputs."""
+    if not isinstance(values, list) or len(values) != count or not all(type(value) is float for value in values):
+        raise AnswerError(f"sent a line without the values of {count} outputs")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
