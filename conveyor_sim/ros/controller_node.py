@@ -54,7 +54,9 @@ def run(stop: StopRequest) -> None:
             if line is not None:
                 kinds = dict(zip(line.tag_names, line.tag_kinds, strict=True))
                 named = ({name: kinds[name] for name in names} for names in (line.signal_names, line.command_names))
-                bind(controller, LineTags(*named))
+                ranges = zip(line.tag_min, line.tag_max, strict=True)
+                limits = dict(zip(line.tag_names, ranges, strict=True))
+                bind(controller, LineTags(*named, {name: limits[name] for name in line.command_names}))
                 for sentence in getattr(controller, "left_over", ()):
                     node.get_logger().info(printable(sentence, SENTENCE))
             return controller

@@ -32,7 +32,7 @@ class Controlled:
         image = simulation.process_image
         kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
         try:
-            bind(controller, LineTags(*kinds))
+            bind(controller, LineTags(*kinds, image.command_limits))
             declared = declared_alarms(controller)
             self._recorded = Recorded(controller, record)
         except ControlError as error:

@@ -17,6 +17,7 @@ from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
 from conveyor_sim.st.exchange import AnswerError, EndedError, exchange
+from conveyor_sim.support.rounded_limit import at_limit
 
 PATIENCE = 60.0
 """Wall time of a call from its request to the end of its answer, s; beyond it the watchdog ends the program."""
@@ -63,6 +64,7 @@ class CompiledProgram:
             raise ControlError(f"{path}: found no tags, expected a tag for each variable that is to have one")
         self._ins: list[str] = []
         self._outs: list[str] = []
+        self._limits: Mapping[str, tuple[float, float]] = {}
         self._shown: dict[str, float] = {}
         self._process = subprocess.Popen(
             [sys.executable, "-m", "conveyor_sim.st.library_host", str(self._path.resolve())],
@@ -86,6 +88,7 @@ class CompiledProgram:
             (self._outs if out else self._ins).append(tag)
             variables.append((name, int(out)))
         self._call("bind", variables)
+        self._limits = tags.limits
         self._names = {tag: f"{PREFIX}{name}" for name, tag in self._tags.items()}
         self._shown = dict.fromkeys(self._names.values(), 0.0)
 
@@ -93,7 +96,11 @@ class CompiledProgram:
         """Commands and alarms. Raises ControlError if the program stops, crashes, or does not end its scan."""
         values = [inputs[tag] for tag in self._ins]
         found = self._call("scan", round(inputs.time * _NS), values)
-        answer = dict(zip(self._outs, found, strict=True))
+        # A REAL comes as a double, but has no more digits for that.
+        answer = {
+            tag: at_limit(value, *self._limits[tag]) if tag in self._limits else value
+            for tag, value in zip(self._outs, found, strict=True)
+        }
         self._shown = {
             self._names[tag]: value for tag, value in (*zip(self._ins, values, strict=True), *answer.items())
         }

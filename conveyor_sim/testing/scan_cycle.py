@@ -78,7 +78,7 @@ class ScanCycle:
         self.close()
         image = self._simulation.process_image
         kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
-        bind(controller, LineTags(*kinds))
+        bind(controller, LineTags(*kinds, image.command_limits))
         self.recorded = Recorded(controller)
         self._controller = controller
         if declared := declared_alarms(controller):

@@ -128,6 +128,18 @@ def test_what_goes_wrong_in_it_fails_the_test_and_nothing_else(tmp_path: Path, b
     assert plant.simulation.tick == 10
 
 
+def test_a_real_at_a_limit_is_the_limit(tmp_path: Path) -> None:
+    """The program's variable has 32 bits, its place in the interface 64."""
+    text = SHIM.read_text()
+    assert text.count("data->TABLE_SPEED = 0.4;") == 1
+    made = built(tmp_path, "real", text.replace("data->TABLE_SPEED = 0.4;", "data->TABLE_SPEED = (float)0.6;"))
+    plant = Scenario(TABLE, overrides={"belts": {"table": {"speed_limits": [0.0, 0.6]}}})
+    plant.attach(CompiledProgram(made, TAGS))
+    plant.run_for(0.02)
+    names = plant.simulation.process_image.command_names
+    assert plant.simulation.line.read_back.values[names.index("belts/table/cmd_speed")] == 0.6
+
+
 def says(text: str) -> str:
     """C that writes to whatever way leads to the simulator, beside the standard streams."""
     text = text.replace('"', '\\"').replace("\n", "\\n")

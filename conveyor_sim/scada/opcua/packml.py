@@ -25,6 +25,7 @@ from conveyor_sim.scada.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.values import status_of
 from conveyor_sim.scada.source import Shown, TagSource
+from conveyor_sim.support.rounded_limit import at_limit, single
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
 NAMESPACE = "http://opcfoundation.org/UA/PackML/"
@@ -188,7 +189,9 @@ class PackMl:
             return _result(Codes.BadInvalidArgument)
         value = float(given[0])
         if name == "SetMachSpeed":
-            return _result(self._requests.write_together(client, [f"{machine}/rate"], [value / A_MINUTE]))
+            is_single = request.InputArguments[0].VariantType is ua.VariantType.Float
+            rate = _a_second(value, self._tags[f"{machine}/rate"], is_single)
+            return _result(self._requests.write_together(client, [f"{machine}/rate"], [rate]))
         if value not in self._tags[f"{machine}/mode"].texts:
             return _result(Codes.BadInvalidArgument)
         return _result(self._requests.operate(client, MODE, (machine,), (value,)))
@@ -237,6 +240,16 @@ class PackMl:
         if number in _STATES[_EXECUTE]:
             return {_BASE: _CLEARED, _MACHINE: _RUNNING, _EXECUTE: _STATES[_EXECUTE][State(number)]}
         return dict.fromkeys((_BASE, _MACHINE, _EXECUTE), none)
+
+
+def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
+    """Return a speed in packages a minute as a rate in 1/s; one that is a limit in its type is that limit."""
+
+    def there_and_back(limit: float) -> float:
+        a_minute = limit * A_MINUTE
+        return (single(a_minute) if is_single else a_minute) / A_MINUTE
+
+    return at_limit(speed / A_MINUTE, rate.low, rate.high, there_and_back)
 
 
 def _result(code: int) -> ua.CallMethodResult:

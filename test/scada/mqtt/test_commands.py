@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from conveyor_sim.line.inputs import DISOWN, OWN
 from conveyor_sim.scada.mqtt import link
+from conveyor_sim.scada.mqtt.line_metrics import number_of
 from conveyor_sim.scada.source import MOST_WAITING
 from test.scada.mqtt.kit import BOOLEAN, DOUBLE, LONG, SETPOINT, SPEED, Host, Payload, add_metric, properties_of
 
@@ -193,3 +195,19 @@ def test_a_controller_holds_nothing_without_the_broker(controlled: Line) -> None
     line.source.before_tick()
     line.simulation.advance()
     assert [row[1] for row in line.outcomes()] == [OWN, "set", DISOWN]
+
+
+def test_a_float_is_taken_for_a_double_and_a_limit_in_it_is_the_limit(controlled: Line) -> None:
+    tag = replace(next(tag for tag in controlled.source.about.tags if tag.name == SETPOINT), high=0.6)
+    payload = Payload()
+    for name, value in ((SETPOINT, 0.25), (SETPOINT, 0.6), (SETPOINT, 0.6000001)):
+        payload.metrics.add(name=name, datatype=9).float_value = value
+    metrics = Payload.FromString(payload.SerializeToString()).metrics
+    quarter, limit, beyond = (number_of(tag, metric) for metric in metrics)
+    assert (quarter, limit) == (0.25, 0.6) and beyond is not None and beyond > 0.6
+    one = Payload()
+    one.metrics.add(name=SETPOINT, datatype=9).float_value = 0.25
+    controlled.host.send_bytes("DCMD", one.SerializeToString())
+    controlled.until(lambda: controlled.node.status().writes == 1, "the setpoint")
+    controlled.advance()
+    assert controlled.outcomes()[-1][2:] == ((SETPOINT,), (0.25,), True)
