@@ -31,6 +31,10 @@ _ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 _TEXT, _NUMBER, _WHOLE = ua.VariantType.String, ua.VariantType.Double, ua.VariantType.UInt32
 
 
+_OF_ARGUMENT = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfRange: 1}
+"""Which argument a refusal is about: names come first, values behind them."""
+
+
 class Parameter(NamedTuple):
     """What a method is given."""
 
@@ -172,7 +176,11 @@ class Methods:
         return alarms is not None and id in alarms.id
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """What becomes of a call; None if it is of no method here."""
+        """Return what becomes of a call, which is counted; None if it is of no method here."""
+        result = self._call(client, request)
+        return None if result is None else self._requests.counted(result)
+
+    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
         if request.MethodId == _ACKNOWLEDGE:
             return self._acknowledge_event(client, request)
         owner, _, name = name_of(request.MethodId).rpartition("/")
@@ -185,7 +193,8 @@ class Methods:
         if target != owner and (owner != ALARM_STATES or alarm == target or not self.knows_alarm(alarm)):
             return _result(Codes.BadMethodInvalid)
         given = [] if request.InputArguments is None else list(request.InputArguments)
-        if method.operation and not self._requests.may(client, method.operation):
+        may = self._requests.may(client, method.operation) if method.operation else self._requests.may_control(client)
+        if not may:
             return _result(Codes.BadUserAccessDenied)
         if len(given) != len(method.parameters):
             few = len(given) < len(method.parameters)
@@ -225,7 +234,10 @@ class Methods:
             return _result(self._requests.operate(client, OWN, texts=tuple(arguments[0] or ())))
         names = (arguments[0],) if arguments and arguments[0] else ()
         values = tuple(float(value) for value in arguments[1:])
-        return _result(self._requests.operate(client, method.operation, names, values))
+        code = self._requests.operate(client, method.operation, names, values)
+        if code in _OF_ARGUMENT:
+            return _result(Codes.BadInvalidArgument, _of_argument(code, len(arguments)))
+        return _result(code)
 
     def _judge(self, parameter: Parameter, given: ua.Variant) -> int:
         values = given.Value if parameter.array else [given.Value]
@@ -245,6 +257,11 @@ class Methods:
 
     def _is(self, name: str, roles: Sequence[str]) -> bool:
         return name in self._tags and self._tags[name].role in roles
+
+
+def _of_argument(code: int, count: int) -> list[int]:
+    """Return the status codes of all arguments of a call, of which one is wrong (OPC 10000-4, 5.11.2)."""
+    return [code if place == _OF_ARGUMENT[code] else Codes.Good for place in range(count)]
 
 
 def _result(code: int, arguments: Sequence[int] = ()) -> ua.CallMethodResult:

@@ -15,7 +15,7 @@ from asyncua import Server, ua
 from asyncua.common.instantiate_util import instantiate
 from asyncua.crypto.permission_rules import User
 
-from conveyor_sim.line.inputs import MODE
+from conveyor_sim.line.inputs import MODE, SET
 from conveyor_sim.line.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scada.clock import Clock
@@ -174,7 +174,11 @@ class PackMl:
                     await self._nodes.write(f"{machine}/{NAME}.{name}", value, stamp, code)
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """What becomes of a call of a method of a machine; None if it is of none."""
+        """Return what becomes of a call of a method of a machine, which is counted; None if it is of none."""
+        result = self._call(client, request)
+        return None if result is None else self._requests.counted(result)
+
+    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
         machine, _, _ = name_of(request.ObjectId).partition(f"/{NAME}")
         if machine not in self._machines:
             return None
@@ -185,6 +189,8 @@ class PackMl:
             return _result(self._command(client, machine, _METHODS[method]))
         if name not in ("SetUnitMode", "SetMachSpeed"):
             return None
+        if not self._requests.may(client, SET if name == "SetMachSpeed" else MODE):
+            return _result(Codes.BadUserAccessDenied)
         if len(given) != 1 or not isinstance(given[0], int | float) or isinstance(given[0], bool):
             return _result(Codes.BadInvalidArgument)
         value = float(given[0])
@@ -192,12 +198,14 @@ class PackMl:
             is_single = request.InputArguments[0].VariantType is ua.VariantType.Float
             rate = _a_second(value, self._tags[f"{machine}/rate"], is_single)
             return _result(self._requests.write_together(client, [f"{machine}/rate"], [rate]))
-        if value not in self._tags[f"{machine}/mode"].texts:
+        if isinstance(given[0], float) or value not in self._tags[f"{machine}/mode"].texts:
             return _result(Codes.BadInvalidArgument)
         return _result(self._requests.operate(client, MODE, (machine,), (value,)))
 
     def _command(self, client: User, machine: str, command: Command) -> int:
         name, shown = f"{machine}/cntrl_cmd", self._source.shown.values
+        if not self._requests.may(client, SET):
+            return int(Codes.BadUserAccessDenied)
         if objection(command, int(shown[f"{machine}/state"])):
             return int(Codes.BadInvalidState)
         if shown.get(name) == command:  # it acts as it changes

@@ -83,7 +83,7 @@ def test_what_comes_in_one_message_acts_together_or_not_at_all(controlled: Line)
         ([(SPEED, DOUBLE, 0.1)], f"{SPEED}: can't be commanded, expected a metric that is not readOnly"),
         ([("no/such\x07", DOUBLE, 0.1)], "no/such\\x07: can't be commanded"),
         ([(SETPOINT, DOUBLE, 0.1), (MODE, INT32, MANUAL)], f"{MODE}: given with commands, expected modes in a message"),
-        ([(MODE, INT32, MANUAL)], f"{MODE}: given by a controller, expected one of operator, engineer, test"),
+        ([(MODE, INT32, MANUAL)], "mode: given by controller mqtt 127.0.0.1:"),
         ([], "0 metrics given, expected 1 to 1000"),
         ([(SETPOINT, DOUBLE, 0.1)] * 1001, "1001 metrics given, expected 1 to 1000"),
     ],
@@ -97,7 +97,7 @@ def test_what_can_not_be_is_refused_with_the_reason(controlled: Line, metrics: A
 
 def test_a_mode_that_there_is_not_is_refused(line: Line) -> None:
     line.host.set(MODE, 7, INT32)
-    assert line.refused(1).startswith(f"{MODE}: 7 given, expected one of 1 Automatic")
+    assert line.refused(1).startswith("belts/zone1: 7 given, expected 1 to 3")
 
 
 def test_the_edge_node_takes_nothing_but_the_request_for_births(line: Line) -> None:
@@ -211,3 +211,12 @@ def test_a_float_is_taken_for_a_double_and_a_limit_in_it_is_the_limit(controlled
     controlled.until(lambda: controlled.node.status().writes == 1, "the setpoint")
     controlled.advance()
     assert controlled.outcomes()[-1][2:] == ((SETPOINT,), (0.25,), True)
+
+
+def test_a_mode_that_is_not_for_operators_is_refused_at_once(line: Line) -> None:
+    line.host.set(MODE, 2, INT32)
+    assert line.refused(1) == "belts/zone1: Maintenance is not for operators, expected an engineer"
+    assert line.node.status().writes == 0
+    line.advance()
+    assert [row[1:] for row in line.outcomes()] == [("mode", ("belts/zone1",), (2.0,), False)]
+    assert line.host.values[MODE] == 1
