@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, covers, stops
 from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.receipt import Receipt, Refusal
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.scada.source import TagSource
+from conveyor_sim.scada.source import Control, TagSource
 
 TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
 """States of a run in which nothing that is given would ever act."""
 
 MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
 """Who may pause a run, have it go on, and so on."""
+
+
+CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 - 1.0), "speed": (0.0, 1e6)}
+"""Values that can be asked of any run: ticks; times real time, 0 for as fast as it goes."""
 
 
 def is_mode(tag: Tag) -> bool:

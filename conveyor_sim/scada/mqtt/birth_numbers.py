@@ -12,8 +12,9 @@ import json
 import logging
 import os
 import secrets
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from conveyor_sim.support.files import FileError, read_file, write_file
@@ -23,6 +24,8 @@ COUNT = 256
 
 _MOST_BYTES = 10_000
 _LOCK = "lock"
+_PATIENCE = 2.0
+"""Wall time to wait for another process that counts, s."""
 
 
 def state_folder() -> Path:
@@ -84,8 +87,18 @@ class BirthNumbers:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Let one process at a time count. A file system without locks does without."""
+    """Let one process at a time count; a file system without locks does without. Raises OSError for a held lock."""
     with (folder / _LOCK).open("ab") as stream:
-        with suppress(OSError):
-            fcntl.flock(stream, fcntl.LOCK_EX)
+        end = time.monotonic() + _PATIENCE
+        while True:
+            try:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                if time.monotonic() > end:  # another process holds it, and may be stopped
+                    raise OSError(f"{_LOCK} is held by another process") from error
+                time.sleep(_PATIENCE / 100.0)
+                continue
+            except OSError:
+                pass
+            break
         yield

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -31,8 +31,8 @@ _ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 _TEXT, _NUMBER, _WHOLE = ua.VariantType.String, ua.VariantType.Double, ua.VariantType.UInt32
 
 
-_OF_ARGUMENT = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfRange: 1}
-"""Which argument a refusal is about: names come first, values behind them."""
+_NAME_AND_VALUE: Mapping[int, int] = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfRange: 1}
+"""Place of the argument that a refusal is about, by its code: names come first, values behind them."""
 
 
 class Parameter(NamedTuple):
@@ -204,7 +204,8 @@ class Methods:
             return _result(Codes.BadInvalidArgument, codes)
         arguments = [value.Value for value in given]
         if method.control is not None:
-            return _result(self._requests.control(client, method.control, float(arguments[0]) if arguments else 0.0))
+            value = float(arguments[0]) if arguments else 0.0
+            return _of_arguments(self._requests.control(client, method.control, value), {Codes.BadOutOfRange: 0}, given)
         if owner == ALARM_STATES:
             return _result(self._requests.operate(client, method.operation, () if target == owner else (alarm,)))
         return self._operate(client, method, arguments)
@@ -231,13 +232,12 @@ class Methods:
                 return _result(Codes.BadInvalidArgument)
             return _result(self._requests.write_together(client, names, values))
         if method.operation == OWN:
-            return _result(self._requests.operate(client, OWN, texts=tuple(arguments[0] or ())))
+            code = self._requests.operate(client, OWN, texts=tuple(arguments[0] or ()))
+            return _of_arguments(code, _NAME_AND_VALUE, arguments)
         names = (arguments[0],) if arguments and arguments[0] else ()
         values = tuple(float(value) for value in arguments[1:])
         code = self._requests.operate(client, method.operation, names, values)
-        if code in _OF_ARGUMENT:
-            return _result(Codes.BadInvalidArgument, _of_argument(code, len(arguments)))
-        return _result(code)
+        return _of_arguments(code, _NAME_AND_VALUE, arguments)
 
     def _judge(self, parameter: Parameter, given: ua.Variant) -> int:
         values = given.Value if parameter.array else [given.Value]
@@ -259,9 +259,12 @@ class Methods:
         return name in self._tags and self._tags[name].role in roles
 
 
-def _of_argument(code: int, count: int) -> list[int]:
-    """Return the status codes of all arguments of a call, of which one is wrong (OPC 10000-4, 5.11.2)."""
-    return [code if place == _OF_ARGUMENT[code] else Codes.Good for place in range(count)]
+def _of_arguments(code: int, places: Mapping[int, int], arguments: Sequence[Any]) -> ua.CallMethodResult:
+    """Return the result of a call, which names the argument that a code is about (OPC 10000-4, 5.11.2)."""
+    if code not in places:
+        return _result(code)
+    codes = [code if place == places[code] else Codes.Good for place in range(len(arguments))]
+    return _result(Codes.BadInvalidArgument, codes)
 
 
 def _result(code: int, arguments: Sequence[int] = ()) -> ua.CallMethodResult:

@@ -5,6 +5,7 @@ Nothing here waits for a tick. What the line makes of it then is in the read-bac
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from conveyor_sim.line.authority import MAY
 from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.scada.hands import MAY_CONTROL, TAKES_NO_INPUT, is_mode, objection, refused_for_good
+from conveyor_sim.scada.hands import CONTROL_RANGES, MAY_CONTROL, TAKES_NO_INPUT, is_mode, objection, refused_for_good
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET
 from conveyor_sim.scada.opcua.nodes import name_of
 from conveyor_sim.scada.opcua.values import type_of
@@ -109,6 +110,9 @@ class Requests:
             return int(Codes.BadUserAccessDenied)
         if what not in self._source.controls:
             return int(Codes.BadNotSupported)
+        low, high = CONTROL_RANGES.get(what, (-math.inf, math.inf))
+        if not low <= value <= high:
+            return int(Codes.BadOutOfRange)
         refused = self._source.control(what, value, f"{_kind(client)} {_writer(client)}")
         return int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
 

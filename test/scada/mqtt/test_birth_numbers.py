@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import logging
 import os
@@ -71,6 +72,15 @@ def test_without_a_folder_they_begin_anywhere_with_one_remark(tmp_path: Path, ca
     assert len(caplog.records) == 1
     others = {numbers(folder=tmp_path / "file" / "folder").take() for _ in range(20)}
     assert len(others) > 1
+
+
+def test_a_lock_that_is_not_let_go_holds_up_nobody_for_long(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """As when the process that holds it is stopped."""
+    with (tmp_path / "lock").open("ab") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        with caplog.at_level(logging.WARNING):
+            assert 0 <= numbers(folder=tmp_path).take() < COUNT
+    assert "is held by another process" in caplog.text and not kept(tmp_path)
 
 
 def test_a_link_in_its_place_is_replaced_and_not_followed(tmp_path: Path) -> None:

@@ -260,6 +260,7 @@ def test_of_several_writes_each_is_judged_by_itself(line: Line) -> None:
         ("force", ("machines/filler/state", 99.0), (Codes.Good, Codes.BadOutOfRange)),
         ("inject", ("belts/zone1/trip", 0.5), (Codes.Good, Codes.BadOutOfRange)),
         ("reset_counters", ("belts/zone1",), (Codes.BadNodeIdUnknown,)),
+        ("shelve", ("alarm", -1.0), (Codes.BadNodeIdUnknown, Codes.Good)),
     ],
 )
 def test_an_argument_that_can_never_be_is_named(
