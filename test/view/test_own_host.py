@@ -58,7 +58,8 @@ def test_other_names_are_foreign(host: str) -> None:
     assert not is_own([host], "http")
 
 
-def test_there_is_one_header_of_each(host: str = "127.0.0.1") -> None:
+def test_there_is_one_header_of_each() -> None:
+    host = "127.0.0.1"
     assert not is_own([], "http") and not is_own([host, host], "http")
     origin = f"http://{host}"
     assert is_same_origin([origin], [host], "http")
