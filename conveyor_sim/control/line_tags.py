@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -12,6 +12,8 @@ class LineTags:
 
     signals: Mapping[str, str]
     commands: Mapping[str, str]
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Least and greatest value that the line takes, of commands; empty: not known."""
 
 
 def bind(controller: object, tags: LineTags) -> None:

@@ -1,6 +1,7 @@
 """Who may do what to a line: one table by operation, and one by mode for commands."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, WRITER_KINDS, Input, WriterKind
@@ -55,6 +56,51 @@ CNTRL_CMD = "/cntrl_cmd"
 
 OPERATORS_MODES = (AUTOMATIC, MANUAL)
 """Between which an operator may switch; engineers and tests between all."""
+
+
+MAY_SET: Mapping[str, tuple[int, ...]] = {
+    "operator": OPERATORS_MODES,
+    "engineer": tuple(MODES),
+    "test": tuple(MODES),
+}
+"""Modes by kind of writer: a device must be in one of them, and can be put into one of them."""
+
+MOST_PATTERNS = 1000
+"""Patterns of devices in one input."""
+
+
+def reserved_mode(kind: str, modes: Iterable[float]) -> float | None:
+    """Return the first of some modes that is not for a kind of writer; None if there is none."""
+    return next((mode for mode in modes if mode not in MAY_SET.get(kind, ())), None)
+
+
+def reserved(device: str, kind: str, mode: float) -> str:
+    """Return why a kind of writer can't put a device into such a mode, or out of it."""
+    return f"{device}: {MODES[int(mode)]} is not for {kind}s, expected an engineer"
+
+
+def covers(pattern: str, device: str, where: str) -> bool:
+    """Return True if a pattern fits a device, by its name or by its path. where: the line's place in the plant."""
+    return fnmatchcase(device, pattern) or fnmatchcase(f"{where}/{device}", pattern)
+
+
+def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: str) -> str:
+    """Return why devices can't be released by these patterns, "" if they can. devices: that take commands."""
+    if len(patterns) > MOST_PATTERNS:
+        return f"{len(patterns)} patterns given, expected {MOST_PATTERNS} at most"
+    for pattern in patterns:
+        if not any(covers(pattern, device, where) for device in devices):
+            some = ", ".join(list(devices)[:5]) or "none: there are none"
+            return f"{printable(pattern)}: fits no device that takes commands, expected such as {some}"
+    return ""
+
+
+def hand_over_problem(given: Input) -> str:
+    """Return why the line can't be taken or given up by such an input, whoever owns it; "" if it can."""
+    if given.names or given.values or (given.texts and given.operation == DISOWN):
+        expected = "texts alone, patterns of devices" if given.operation == OWN else "nothing beside its writer"
+        return f"{len(given.names)} names, {len(given.values)} values, {len(given.texts)} texts, expected {expected}"
+    return "" if given.writer else "no writer given, expected the name of a controller"
 
 
 def stops(name: str, value: float, kind: str) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -27,8 +26,7 @@ class Forcing:
 
     def __init__(self, signals: Sequence[Tag], note: Callable[..., None]) -> None:
         """signals: of the line. note: as EventLog.note."""
-        # Anything of its kind may be forced, also what the line itself would never show.
-        self._table = {tag.name: _unlimited(tag) if tag.kind in ("number", "count") else tag for tag in signals}
+        self._table = {tag.name: tag.without_limits() for tag in signals}
         self._place = {tag.name: place for place, tag in enumerate(signals)}
         self._note = note
         self.forces = []
@@ -94,7 +92,3 @@ class Forcing:
     def _take(self, forces: Mapping[str, tuple[str, float, str]]) -> None:
         self.forces = [forces[name] for name in sorted(forces, key=self._place.__getitem__)]
         self.wake()
-
-
-def _unlimited(tag: Tag) -> Tag:
-    return replace(tag, low=-math.inf, high=math.inf)

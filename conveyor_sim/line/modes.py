@@ -5,9 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import replace
-from fnmatch import fnmatchcase
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, OPERATORS_MODES, PEOPLE, stops, unauthorized, who
+from conveyor_sim.line.authority import (
+    AUTOMATIC,
+    IN_CONTROL,
+    MODES,
+    PEOPLE,
+    covers,
+    hand_over_problem,
+    pattern_problem,
+    reserved,
+    reserved_mode,
+    stops,
+    unauthorized,
+    who,
+)
 from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.inputs import DISOWN, MODE, OWN, SET, WRITER_KINDS, Input
@@ -17,8 +29,6 @@ from conveyor_sim.support.printable import SENTENCE, printable
 
 _REASONS = 3
 """Of as many devices a refusal says why."""
-
-_MOST_PATTERNS = 1000
 
 _HANDS = (MODE, OWN, DISOWN)
 """Operations that change hands."""
@@ -114,12 +124,7 @@ class Modes:
 
     def pattern_problem(self, patterns: Sequence[str]) -> str:
         """Why groups of devices can't be released by these patterns, "" if they can."""
-        if len(patterns) > _MOST_PATTERNS:
-            return f"{len(patterns)} patterns given, expected {_MOST_PATTERNS} at most"
-        for pattern in patterns:
-            if not any(self._fits(pattern, device) for device in self.modes):
-                return f"{printable(pattern)}: fits no device that takes commands, expected such as {_some(self.modes)}"
-        return ""
+        return pattern_problem(patterns, self.modes, self._where)
 
     def later(self) -> Modes:
         """As it will be once what waits has been applied."""
@@ -180,13 +185,8 @@ class Modes:
     def _problem(self, given: Input) -> str:
         if given.operation == MODE:
             return self._mode_problem(given)
-        if given.names or given.values or (given.texts and given.operation == DISOWN):
-            expected = "texts alone, patterns of devices" if given.operation == OWN else "nothing beside its writer"
-            return (
-                f"{len(given.names)} names, {len(given.values)} values, {len(given.texts)} texts, expected {expected}"
-            )
-        if not given.writer:
-            return "no writer given, expected the name of a controller"
+        if reason := hand_over_problem(given):
+            return reason
         if not self._is_free(given):
             return f"{self._owned}, expected its release"
         if given.operation == DISOWN:
@@ -199,9 +199,9 @@ class Modes:
         if reason := refusal(self._table, "device", given.names, given.values):
             return reason
         for device, value in zip(given.names, given.values, strict=True):
-            if given.writer_kind == "operator" and not {value, self.modes[device]} <= set(OPERATORS_MODES):
-                wrong = MODES[int(value)] if value not in OPERATORS_MODES else MODES[self.modes[device]]
-                return f"{device}: {wrong} is not for operators, expected an engineer"
+            wrong = reserved_mode(given.writer_kind, (value, self.modes[device]))
+            if wrong is not None:
+                return reserved(device, given.writer_kind, wrong)
             if value != self.modes[device] and (reason := self._devices[device].mode_objection()):
                 return f"{device}: {reason}"
         return ""
@@ -233,13 +233,12 @@ class Modes:
         self._look()
         return changed
 
-    def _fits(self, pattern: str, device: str) -> bool:
-        return fnmatchcase(device, pattern) or fnmatchcase(f"{self._where}/{device}", pattern)
-
     def _found_free(self) -> frozenset[str]:
         """The devices that the owner leaves to others."""
         patterns = self.released
-        return frozenset(device for device in self.modes if any(self._fits(pattern, device) for pattern in patterns))
+        return frozenset(
+            device for device in self.modes if any(covers(pattern, device, self._where) for pattern in patterns)
+        )
 
     def _look(self) -> None:
         self._values = [float(self.modes[tag.device]) for tag in self._tags]
@@ -254,7 +253,3 @@ def _of(given: Input, chosen: Sequence[int]) -> Input:
 def _tag(device: Device) -> Tag:
     tag = choice(f"{device.name}/mode", "status", "In whose hands it is.", MODES, AUTOMATIC)
     return replace(tag, device=device.name, device_class=device.tags[0].device_class)
-
-
-def _some(names: Sequence[str] | dict[str, int]) -> str:
-    return ", ".join(list(names)[:5]) or "none: there are none"

@@ -25,6 +25,11 @@ class ProcessImage:
             object.__setattr__(self, f"{table}s", chosen)
             object.__setattr__(self, f"{table}_names", tuple(tag.name for tag in chosen))
 
+    @property
+    def command_limits(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest value of each command, by name."""
+        return {tag.name: (tag.low, tag.high) for tag in self.commands}
+
 
 def of_roles(tags: Sequence[Tag], roles: Sequence[Role]) -> tuple[Tag, ...]:
     """Those of some roles, in their order."""

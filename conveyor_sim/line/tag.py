@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -65,6 +66,10 @@ class Tag:
     def of(self, attribute: str) -> Tag:
         """The same, of a signal whose value is an attribute of its device."""
         return replace(self, shows=attribute)
+
+    def without_limits(self) -> Tag:
+        """Return the same tag, to be forced to anything of its kind, also to what the line itself would never show."""
+        return replace(self, low=-math.inf, high=math.inf) if self.kind in ("number", "count") else self
 
     @property
     def unece(self) -> Unit:

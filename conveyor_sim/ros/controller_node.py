@@ -53,8 +53,12 @@ def run(stop: StopRequest) -> None:
             controller = load(given["controller"], parameters)
             if line is not None:
                 kinds = dict(zip(line.tag_names, line.tag_kinds, strict=True))
-                named = ({name: kinds[name] for name in names} for names in (line.signal_names, line.command_names))
-                bind(controller, LineTags(*named))
+                signals, commands = (
+                    {name: kinds[name] for name in names} for names in (line.signal_names, line.command_names)
+                )
+                ranges = zip(line.tag_min, line.tag_max, strict=True)
+                limits = dict(zip(line.tag_names, ranges, strict=True))
+                bind(controller, LineTags(signals, commands, {name: limits[name] for name in commands}))
                 for sentence in getattr(controller, "left_over", ()):
                     node.get_logger().info(printable(sentence, SENTENCE))
             return controller

@@ -30,9 +30,9 @@ class Controlled:
         self._answer: Mapping[str, float] = {}
         self._scanned = -1
         image = simulation.process_image
-        kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
+        signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
         try:
-            bind(controller, LineTags(*kinds))
+            bind(controller, LineTags(signals, commands, image.command_limits))
             declared = declared_alarms(controller)
             self._recorded = Recorded(controller, record)
         except ControlError as error:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from fnmatch import fnmatchcase
+from collections.abc import Mapping
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, stops
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, covers, stops
+from conveyor_sim.line.inputs import SET, Input, WriterKind
+from conveyor_sim.line.receipt import Receipt, Refusal
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.scada.source import TagSource
+from conveyor_sim.scada.source import Control, TagSource
 
 TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
 """States of a run in which nothing that is given would ever act."""
 
 MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
 """Who may pause a run, have it go on, and so on."""
+
+
+CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 - 1.0), "speed": (0.0, 1e6)}
+"""Values that can be asked of any run: ticks; times real time, 0 for as fast as it goes."""
 
 
 def is_mode(tag: Tag) -> bool:
@@ -32,7 +37,18 @@ def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, w
         return f"{device}: is in {MODES[mode]}"
     if kind != "controller" or shown.owner in ("", writer):
         return ""
-    names = (device, f"{source.about.where}/{device}")
-    if any(fnmatchcase(name, pattern) for name in names for pattern in shown.released):
+    if any(covers(pattern, device, source.about.where) for pattern in shown.released):
         return ""
     return f"{device}: the line is owned by controller {shown.owner}"
+
+
+def refused_for_good(source: TagSource, receipt: Receipt, given: Input) -> Refusal | None:
+    """Return why the line would refuse an input in every state; None if it might take it.
+
+    One that its writer could have given otherwise is handed on all the same: the line refuses it as a whole, on record.
+    """
+    refusal = receipt.refusal(given)
+    # Of commands the line may take a part, so they are not handed on.
+    if refusal is not None and refusal.cause != "operation" and given.operation != SET:
+        source.give(given)
+    return refusal

@@ -24,6 +24,7 @@ from conveyor_sim.scada.hands import is_mode
 from conveyor_sim.scada.handshake import TARGET, TICK
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.printable import printable
+from conveyor_sim.support.rounded_limit import at_limit, single
 
 Table = Literal["coil", "discrete input", "input register", "holding register"]
 """A client may write coils and holding registers."""
@@ -177,14 +178,20 @@ def encode(row: Row, value: float) -> list[int]:
 def decode(row: Row, words: Sequence[int]) -> float:
     """The value of a row's words, (words,), each 0 to 65535, or of its bit.
 
-    A float32 is read as the shortest number that it stands for: who writes 0.1 means 0.1, and not 0.10000000149.
+    A float32 is read as the shortest number that it stands for: who writes 0.1 means 0.1, and not 0.10000000149. One
+    that is a limit of the row, rounded to 32 bits, is read as that limit.
     """
     if row.type == "bool":
         return float(bool(words[0]))
     ordered = words if row.word_order == "big" else list(words)[::-1]
     packed = b"".join(int(word).to_bytes(2, "big") for word in ordered)
     (value,) = struct.unpack(_FORMATS[row.type], packed)
-    return float(str(np.float32(value))) if row.type == "float32" else float(value)
+    return at_limit(_shortest(value), row.low, row.high, _shortest) if row.type == "float32" else float(value)
+
+
+def _shortest(value: float) -> float:
+    """Return the shortest number that rounds to the same 32 bits."""
+    return float(str(np.float32(single(value))))
 
 
 def _row(tag: Tag, word_order: WordOrder) -> Row:

@@ -24,12 +24,12 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from conveyor_sim.line.authority import MAY, MODES
-from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.authority import MAY
 from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
-from conveyor_sim.scada.hands import objection
+from conveyor_sim.scada.hands import objection, refused_for_good
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET, TICK
 from conveyor_sim.scada.holding import Holding
 from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
@@ -62,6 +62,15 @@ _TABLE_OF: dict[int, Table] = {
     **dict.fromkeys((3, 6, 16, 22, 23), "holding register"),
 }
 """By function code; others are not served."""
+
+_EXCEPTIONS: Mapping[Cause, ExcCodes] = {
+    "operation": ExcCodes.ILLEGAL_FUNCTION,
+    "role": ExcCodes.ILLEGAL_VALUE,
+    "name": ExcCodes.ILLEGAL_ADDRESS,
+    "value": ExcCodes.ILLEGAL_VALUE,
+    "form": ExcCodes.ILLEGAL_VALUE,
+}
+"""Exception of an input that no state of the line would make good, by its cause."""
 
 _writer: ContextVar[str] = ContextVar("writer", default=MODBUS)
 """Whose request is being answered."""
@@ -276,6 +285,7 @@ class _Image:
 
     def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None) -> None:
         self._source, self._role = source, role
+        self._receipt = Receipt(source.about.tags, source.about.where)
         self.holding = Holding(source, MODBUS)
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
@@ -322,9 +332,10 @@ class _Image:
             return self._put_into_mode(names, numbers)
         # It has the last address, so it is the last that one request writes.
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
-        if names and refusal(self._commands, "command", names, numbers):
-            return ExcCodes.ILLEGAL_VALUE
         writer = _writer.get()
+        given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
+        if names and (refusal := refused_for_good(self._source, self._receipt, given)):
+            return _EXCEPTIONS[refusal.cause]
         commands = [self._commands[name] for name in names]
         if any(
             objection(self._source, tag, value, self._role, writer)
@@ -339,7 +350,6 @@ class _Image:
         # Whoever attached a PLC that goes in lockstep has said whose the line is.
         if self._role == "controller" and not in_lockstep and self.holding.take(writer):
             return ExcCodes.DEVICE_BUSY
-        given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
         if names and self._source.give(given):
             return ExcCodes.DEVICE_BUSY
         if target is None:
@@ -352,10 +362,10 @@ class _Image:
             return ExcCodes.ILLEGAL_FUNCTION
         if not all(name.endswith(SET_MODE) for name in names):
             return ExcCodes.ILLEGAL_ADDRESS
-        if not all(mode in MODES for mode in modes):
-            return ExcCodes.ILLEGAL_VALUE
         devices = tuple(name.removesuffix(SET_MODE) for name in names)
         given = Input(MODBUS, _writer.get(), self._role, MODE, devices, tuple(modes))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return _EXCEPTIONS[refusal.cause]
         return ExcCodes.DEVICE_BUSY if self._source.give(given) else None
 
 

@@ -1,8 +1,8 @@
 """What a schema can't see: names that refer to nothing, pairs of materials left out, times that don't fit together."""
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import combinations_with_replacement
+from collections.abc import Iterator
+from itertools import chain, combinations_with_replacement, islice
 
 from conveyor_sim.scene.belts import CurvedBelt
 from conveyor_sim.scene.check_accuracy import accuracy_problems
@@ -10,33 +10,35 @@ from conveyor_sim.scene.check_contacts import contact_problems
 from conveyor_sim.scene.check_limits import limit_problems
 from conveyor_sim.scene.check_shapes import shape_problems
 from conveyor_sim.scene.moving import movers_of
+from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.schema import Grid, Scene
 from conveyor_sim.scene.types import is_whole_nanoseconds, nanoseconds
-from conveyor_sim.scene.words import listed, shown
+from conveyor_sim.scene.words import listed, shown, some_of
 
 MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 """Integrators that move rails: the others take forces within a step, or solve for what a rail at rest exerts."""
 
 
 def problems_of(scene: Scene) -> list[Problem]:
-    """Everything that is wrong with a scene whose fields are each valid by themselves."""
-    return [
-        *_times(scene),
-        *accuracy_problems(scene),
-        *contact_problems(scene),
-        *_repeated("contacts", [tuple(sorted(contact.between)) for contact in scene.contacts]),
-        *_repeated("base", [base.between for base in scene.base]),
-        *_missing_contacts(scene),
-        *_missing_base(scene),
-        *_unknown_types(scene),
-        *_rail_names(scene),
-        *_devices(scene),
-        *_alarms(scene),
-        *_moving_rails(scene),
-        *limit_problems(scene),
-        *shape_problems(scene),
-    ]
+    """Return what is wrong with a scene whose fields are each valid by themselves: MOST_SAID + 1 problems at most."""
+    checks = (
+        _times,
+        accuracy_problems,
+        contact_problems,
+        _repeated,
+        _missing_contacts,
+        _missing_base,
+        _unknown_types,
+        _rail_names,
+        _devices,
+        _alarms,
+        _moving_rails,
+        limit_problems,
+        shape_problems,
+    )
+    # Each check begins only once those before it are exhausted.
+    return list(islice(chain.from_iterable(check(scene) for check in checks), MOST_SAID + 1))
 
 
 def _times(scene: Scene) -> Iterator[Problem]:
@@ -63,49 +65,62 @@ def _times(scene: Scene) -> Iterator[Problem]:
             )
 
 
-def _repeated(field: str, pairs: Sequence[tuple[str, ...]]) -> Iterator[Problem]:
-    for index, pair in enumerate(pairs):
-        first = pairs.index(pair)
-        if first < index:
-            yield Problem(
-                (field, index, "between"),
-                f"{shown(pair)} given, expected each pair once ({field}[{first}] is the same pair)",
-            )
+def _repeated(scene: Scene) -> Iterator[Problem]:
+    """Pairs of materials that are given twice."""
+    contacts = [tuple(sorted(contact.between)) for contact in scene.contacts]
+    for field, pairs in (("contacts", contacts), ("base", [base.between for base in scene.base])):
+        seen: dict[tuple[str, ...], int] = {}
+        for index, pair in enumerate(pairs):
+            if (first := seen.setdefault(pair, index)) < index:
+                yield Problem(
+                    (field, index, "between"),
+                    f"{shown(pair)} given, expected each pair once ({field}[{first}] is the same pair)",
+                )
 
 
 def _missing_contacts(scene: Scene) -> Iterator[Problem]:
     """Every pair of materials that can touch needs a contact."""
-    given = {frozenset(contact.between) for contact in scene.contacts}
-    wanted: dict[frozenset[str], str] = {}
+    known = {frozenset(contact.between) for contact in scene.contacts}
+    for pair, what in _touching(scene):
+        if pair not in known:
+            known.add(pair)
+            names = ", ".join(sorted(pair) if len(pair) == 2 else [*pair, *pair])
+            yield Problem(("contacts",), f"no entry for {what}, expected one with between: [{names}]")
+
+
+def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
+    """Yield pairs of materials that can touch, and what they are of."""
     bottles = _bottle_materials(scene)
     if _several_bottles(scene):
         for one, other in combinations_with_replacement(bottles, 2):
-            wanted.setdefault(frozenset((one, other)), f"bottle of {one} and bottle of {other}")
-    rails = {f"rail {name}": rail.material for name, rail in scene.rails.items()}
+            yield frozenset((one, other)), f"bottle of {one} and bottle of {other}"
+    first: dict[str, str] = {}
+    for name, rail in scene.rails.items():
+        first.setdefault(rail.material, f"rail {name}")
     for name, belt in scene.belts.items():
         if isinstance(belt, CurvedBelt) and belt.rails.material and (belt.rails.inner or belt.rails.outer):
-            rails[f"rails of belt {name}"] = belt.rails.material
-    rails |= {f"{path[0]}.{path[1]}": mover.material for path, mover in movers_of(scene)}
-    for what, material in rails.items():
+            first.setdefault(belt.rails.material, f"rails of belt {name}")
+    for path, mover in movers_of(scene):
+        first.setdefault(mover.material, f"{path[0]}.{path[1]}")
+    for material, what in first.items():
         for one in bottles:
-            wanted.setdefault(frozenset((one, material)), f"bottle of {one} and {what} of {material}")
-    for pair, what in wanted.items():
-        if pair not in given:
-            names = ", ".join(sorted(pair) if len(pair) == 2 else [*pair, *pair])
-            yield Problem(("contacts",), f"no entry for {what}, expected one with between: [{names}]")
+            yield frozenset((one, material)), f"bottle of {one} and {what} of {material}"
 
 
 def _missing_base(scene: Scene) -> Iterator[Problem]:
     """Every pair of bottle and belt materials needs a base friction."""
     known = {base.between for base in scene.base}
+    first: dict[str, str] = {}
     for name, belt in scene.belts.items():
+        first.setdefault(belt.material, name)
+    for material, name in first.items():
         for one in _bottle_materials(scene):
-            if (one, belt.material) not in known:
-                known.add((one, belt.material))
+            if (one, material) not in known:
+                known.add((one, material))
                 yield Problem(
                     ("base",),
-                    f"no entry for bottle of {one} on belt {name} of {belt.material}, "
-                    f"expected one with between: [{one}, {belt.material}]",
+                    f"no entry for bottle of {one} on belt {name} of {material}, "
+                    f"expected one with between: [{one}, {material}]",
                 )
 
 
@@ -125,9 +140,9 @@ def _unknown_types(scene: Scene) -> Iterator[Problem]:
             used.append((("bottles", index, "grid", "type"), entry.grid.type))
         else:
             used.append((("bottles", index, "type"), entry.type))
+    known = some_of(scene.bottle_types)
     for path, name in used:
         if name not in scene.bottle_types:
-            known = ", ".join(scene.bottle_types)
             yield Problem(path, f"{shown(name)} given, expected a name from bottle_types: {known}")
 
 

@@ -8,11 +8,12 @@ from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any
 
-from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from conveyor_sim.errors import SceneError
 from conveyor_sim.scene.checks import problems_of
+from conveyor_sim.scene.part import validated
+from conveyor_sim.scene.problem_count import MOST_SAID
 from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.schema import Origin, Scene
 from conveyor_sim.scene.tables import Beside, with_tables
@@ -59,10 +60,9 @@ def parse_scene(
     data, unread = with_tables(laid_over, beside)
     if unread:
         raise refused(unread, document, name, changes)
-    try:
-        scene = Scene.model_validate(data)
-    except ValidationError as error:
-        raise refused(untagged(error), document, name, changes) from None
+    scene = validated(Scene, data)
+    if isinstance(scene, tuple):
+        raise refused(scene[0], document, name, changes, scene[1])
     problems = problems_of(scene)
     if problems:
         raise refused(problems, document, name, changes)
@@ -120,16 +120,11 @@ def merged(data: Any, changes: Any) -> Any:
     return {**data, **{key: merged(data.get(key), change) for key, change in changes.items()}}
 
 
-def untagged(error: ValidationError) -> list[Problem]:
-    """The problems of a failed validation; kinds of belts, rails and bottles are left out of their paths."""
-    return [
-        Problem(tuple(part for part in item["loc"] if not str(part).startswith("(")), item["msg"])
-        for item in error.errors(include_url=False)
-    ]
+def refused(problems: list[Problem], document: Document, name: str, changes: Any, more: int = 0) -> SceneError:
+    """Return the error for what is wrong in a file, one line per problem, in the order of the file.
 
-
-def refused(problems: list[Problem], document: Document, name: str, changes: Any) -> SceneError:
-    """The error for what is wrong in a file, a line a problem, in the order of the file."""
+    more: problems that were counted, and have no words. Of a list beyond MOST_SAID the rest may be missing.
+    """
     lines = []
     for problem in problems:
         overridden = holds(changes, problem.path)
@@ -137,8 +132,10 @@ def refused(problems: list[Problem], document: Document, name: str, changes: Any
         path = f" {dotted(problem.path)}:" if problem.path else ""
         lines.append((0 if overridden else document.line_of(problem.path), f"{place}:{path} {problem.text}"))
     texts = [text for _, text in sorted(lines, key=lambda line: line[0])]
-    if len(texts) > _MOST_PROBLEMS:
-        texts[_MOST_PROBLEMS:] = [f"{name}: and {len(texts) - _MOST_PROBLEMS} more problems"]
+    rest = len(texts) - _MOST_PROBLEMS + more
+    if rest > 0:
+        at_least = "at least " if len(problems) > MOST_SAID else ""
+        texts[_MOST_PROBLEMS:] = [f"{name}: and {at_least}{rest} more problems"]
     return SceneError("\n".join(texts))
 
 

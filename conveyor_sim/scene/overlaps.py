@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from conveyor_sim.scene.geometry import Piece
 
 _MOST_CELLS = 1e6  # along one axis, so that the number of a cell fits 64 bits; coarser cells are only slower
+MOST_PAIRS = 1_000_000
+"""Pairs of circles that are looked for; a scene that has one is refused."""
+_AT_ONCE = 4_000_000  # pairs of neighbours that are compared in one step: some 200 MB
 # Half of a cell's neighbours: the other half sees the pair from its own side.
 _FORWARD = ((0, 0), (1, -1), (1, 0), (1, 1), (0, 1))
 
@@ -15,7 +18,10 @@ _FORWARD = ((0, 0), (1, -1), (1, 0), (1, 1), (0, 1))
 def overlapping(
     centres: NDArray[np.float64], radii: NDArray[np.float64], tolerance: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs (i, j), i < j, of circles (centres (n, 2), radii (n,), m) that overlap by more than the tolerance (m)."""
+    """Return pairs (i, j), i < j, of circles (centres (n, 2), radii (n,), m) that overlap by more than a tolerance (m).
+
+    Of more than MOST_PAIRS the others are left out: circles at one place have as many pairs as their number squared.
+    """
     if len(centres) < 2:
         return np.empty(0, np.intp), np.empty(0, np.intp)
     low = centres.min(axis=0)
@@ -25,15 +31,22 @@ def overlapping(
     cell = column * stride + row + 1
     order = np.argsort(cell, kind="stable")
     ordered = cell[order]
-    found = []
+    found, left = [], MOST_PAIRS
     for right, up in _FORWARD:
         wanted = ordered + right * stride + up
         begin = np.arange(len(cell)) + 1 if right == up == 0 else np.searchsorted(ordered, wanted, "left")
-        one, place = _ranges(begin, np.searchsorted(ordered, wanted, "right"))
-        i, j = order[one], order[place]
-        apart = np.hypot(*(centres[i] - centres[j]).T)
-        close = apart < radii[i] + radii[j] - tolerance
-        found.append(np.sort(np.column_stack([i[close], j[close]]), axis=1))
+        end = np.searchsorted(ordered, wanted, "right")
+        for first, last in _parts(end - begin):
+            one, place = _ranges(begin[first:last], end[first:last])
+            i, j = order[one + first], order[place]
+            apart = np.hypot(*(centres[i] - centres[j]).T)
+            close = apart < radii[i] + radii[j] - tolerance
+            found.append(np.sort(np.column_stack([i[close], j[close]]), axis=1))
+            left -= len(found[-1])
+            if left <= 0:
+                break
+        if left <= 0:
+            break
     pairs = np.vstack(found)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     return pairs[:, 0], pairs[:, 1]
@@ -60,6 +73,16 @@ def near_pieces(
         some = np.sort(some[(y >= low[index, 1]) & (y <= high[index, 1])])
         if len(some):
             yield index, some, pieces[index].distance(points[some])
+
+
+def _parts(counts: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+    """Yield parts [first, last) of a list whose counts come to about _AT_ONCE each, and at least one entry."""
+    ends, first = np.cumsum(counts), 0
+    while first < len(counts):
+        before = int(ends[first - 1]) if first else 0
+        last = max(first + 1, int(np.searchsorted(ends, before + _AT_ONCE, "right")))
+        yield first, last
+        first = last
 
 
 def _ranges(begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

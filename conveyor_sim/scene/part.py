@@ -5,7 +5,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Discriminator, ModelWrapValidatorHandler, ValidationError, model_validator
 
-from conveyor_sim.scene.problems import dotted
+from conveyor_sim.scene.problem_count import counting, present_count
+from conveyor_sim.scene.problems import Path, Problem, dotted
 from conveyor_sim.scene.words import in_words, listed
 
 
@@ -17,13 +18,38 @@ class Part(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _in_words(cls, data: Any, handler: ModelWrapValidatorHandler["Part"]) -> "Part":
+        count = present_count()
+        before = count.said if count is not None else 0
         try:
             return handler(data)
         except ValidationError as error:
-            raise in_words(cls, error) from None
+            if count is not None and count.is_full and count.said == before:
+                # All of it is its own, and only counted. The scene is refused for what was said before.
+                count.more += error.error_count()
+                return cls.model_construct()
+            raise in_words(cls, error, count) from None
 
 
 P = TypeVar("P", bound=Part)
+
+
+def validated(kind: type[P], data: object) -> P | tuple[list[Problem], int]:
+    """Return a part from the data of a file, or its problems in words and the number of those beyond MOST_SAID.
+
+    Names of kinds are left out of the paths.
+    """
+    with counting() as count:
+        try:
+            part = kind.model_validate(data)
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+            return [Problem(_untagged(item["loc"]), item["msg"]) for item in details], count.more
+    # Parts that were only counted are not valid, so they must not pass.
+    return kind.model_validate(data) if count.more else part
+
+
+def _untagged(path: Path) -> Path:
+    return tuple(part for part in path if not str(part).startswith("("))
 
 
 def part_from(kind: type[P], data: object) -> P | str:

@@ -7,10 +7,12 @@ from typing import Any
 
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.words import shown
-from conveyor_sim.support.files import MB, FileError, OutsideError, read_file
+from conveyor_sim.support.files import MB, FileError, OutsideError, in_mb, read_file
 
 _MOST_ROWS = 100_000
 _MOST_BYTES = 10 * MB
+_MOST_BYTES_TOGETHER = 100 * MB
+"""Bytes of all tables of a scene, which may name one file again and again."""
 _ROWS = "expected two numbers a line, overlap and force (m, N)"
 
 OUTSIDE = "the option --outside-tables, or the parameter outside_tables of the node, allows others"
@@ -36,13 +38,18 @@ def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
         return data, []
     problems: list[Problem] = []
     read: list[Any] = []
+    left = _MOST_BYTES_TOGETHER
     for index, contact in enumerate(contacts):
         path = contact.get("table") if isinstance(contact, dict) else None
         if not isinstance(path, str):
             read.append(contact)
             continue
         try:
-            read.append({**contact, "table": _points(path, beside)})
+            if left <= 0:
+                raise ValueError(f"expected tables of at most {in_mb(_MOST_BYTES_TOGETHER)} together")
+            content, is_inside = _content(path, beside)
+            left -= len(content)
+            read.append({**contact, "table": _points(content, is_inside)})
         except ValueError as error:
             problems.append(Problem(("contacts", index, "table"), f"{shown(path)} given, {error}"))
     if problems or all(one is other for one, other in zip(read, contacts, strict=True)):
@@ -50,11 +57,11 @@ def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
     return {**data, "contacts": read}, []
 
 
-def _points(path: str, beside: Beside | None) -> list[list[float]]:
-    """Points [overlap, force] of a CSV file. ValueError that says what is wrong."""
-    if beside is None:
-        raise ValueError("expected a list of points [overlap, force]: a scene that is no file has no files beside it")
-    content, is_inside = _content(path, beside)
+def _points(content: bytes, is_inside: bool) -> list[list[float]]:
+    """Return the points [overlap, force] of a CSV file. Raise ValueError that says what is wrong.
+
+    is_inside: the file lies in the scene's folder, so it may be quoted.
+    """
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -98,8 +105,13 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _content(path: str, beside: Beside) -> tuple[bytes, bool]:
-    """Of a file that a scene names, and whether it lies in the scene's folder. ValueError that says what is wrong."""
+def _content(path: str, beside: Beside | None) -> tuple[bytes, bool]:
+    """Return the content of a file that a scene names, and whether it lies in the scene's folder.
+
+    Raise ValueError that says why it can't be read.
+    """
+    if beside is None:
+        raise ValueError("expected a list of points [overlap, force]: a scene that is no file has no files beside it")
     try:
         return read_file(FilePath(path), _MOST_BYTES, beside.folder), True
     except OutsideError:

@@ -27,6 +27,8 @@ LEAST, MOST = 1e-20, 1e20  # in SI units; products and quotients of several quan
 
 XY = tuple[float, float]
 
+_LONGEST_ANGLE = 100
+"""Characters; the expression below takes a time that grows with the square of their number."""
 _ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad)\s*")
 
 
@@ -53,7 +55,7 @@ class Says(Holds):
 
 def parse_angle(value: Any) -> Any:
     """Angle in rad from a number (rad) or a text such as "90 deg" or "0.5 rad"; anything else is returned as it is."""
-    match = _ANGLE.fullmatch(value) if isinstance(value, str) else None
+    match = _ANGLE.fullmatch(value) if isinstance(value, str) and len(value) <= _LONGEST_ANGLE else None
     if match is None:
         return value
     number = float(match[1])

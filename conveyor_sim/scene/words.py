@@ -2,7 +2,8 @@
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from itertools import islice
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -10,14 +11,24 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from conveyor_sim.scene.problem_count import ProblemCount
 from conveyor_sim.scene.types import Holds
 
 _LONGEST_VALUE = 60
+_LONGEST_NAME = 100
+"""Characters of an unknown name for which a similar one is looked up; the time grows with its length."""
+_LISTED = 20
+"""Names of the scene's own that a sentence lists."""
 
 
 def shown(value: Any) -> str:
-    """The value of a field for an error: as YAML, cut short when it is long."""
-    return cut(in_yaml(value))
+    """Return the value of a field for an error: as YAML, cut short when it is long, without rendering the rest."""
+    text = ""
+    for piece in _pieces(value):
+        text += piece[: _LONGEST_VALUE + 1]
+        if len(text) > _LONGEST_VALUE:
+            break
+    return cut(text)
 
 
 def cut(text: str) -> str:
@@ -27,6 +38,26 @@ def cut(text: str) -> str:
 
 def in_yaml(value: Any) -> str:
     """The value as YAML would show it, on one line."""
+    return "".join(_pieces(value))
+
+
+def _pieces(value: Any) -> Iterator[str]:
+    """Yield the text of a value as YAML, in order."""
+    if isinstance(value, Mapping):
+        for index, (key, item) in enumerate(value.items()):
+            yield f"{', ' if index else '{'}{key}: "
+            yield from _pieces(item)
+        yield "}" if value else "{}"
+    elif isinstance(value, (list, tuple)):
+        for index, item in enumerate(value):
+            yield ", " if index else "["
+            yield from _pieces(item)
+        yield "]" if value else "[]"
+    else:
+        yield _scalar(value)
+
+
+def _scalar(value: Any) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -34,13 +65,13 @@ def in_yaml(value: Any) -> str:
     if isinstance(value, float):
         special = {math.inf: ".inf", -math.inf: "-.inf"}
         return ".nan" if math.isnan(value) else special.get(value, repr(value).removesuffix(".0"))
-    if isinstance(value, str):
-        return '"' + value.replace("\n", "\\n") + '"'
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{k}: {in_yaml(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(in_yaml(v) for v in value) + "]"
-    return str(value)
+    return '"' + value.replace("\n", "\\n") + '"' if isinstance(value, str) else str(value)
+
+
+def some_of(names: Collection[str]) -> str:
+    """Return the first names of many, and the number of the others."""
+    more = len(names) - _LISTED
+    return ", ".join(islice(names, _LISTED)) + (f" and {more} others" if more > 0 else "")
 
 
 def listed(words: list[str]) -> str:
@@ -91,9 +122,19 @@ def fields_of(model: type[BaseModel]) -> str:
     return "a mapping with the fields " + ", ".join(names)
 
 
-def in_words(model: type[BaseModel], error: ValidationError) -> ValidationError:
-    """The same problems, those of the model's own fields said in words (error type "said", which passes unchanged)."""
-    details = [_said(model, problem) for problem in error.errors(include_url=False)]
+def in_words(model: type[BaseModel], error: ValidationError, count: ProblemCount | None = None) -> ValidationError:
+    """The same problems, those of the model's own fields said in words (error type "said", which passes unchanged).
+
+    count: bounds how many are said; None: all are.
+    """
+    details: list[InitErrorDetails] = []
+    for problem in error.errors(include_url=False):
+        if count is not None and problem["type"] != "said":
+            if count.is_full:
+                count.more += 1
+                continue
+            count.said += 1
+        details.append(_said(model, problem))
     return ValidationError.from_exception_data(error.title, details)
 
 
@@ -131,7 +172,7 @@ def _sentence(model: type[BaseModel], problem: ErrorDetails) -> str:
 
 
 def _unknown(name: str, names: list[str]) -> str:
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(name, names, n=1) if len(name) <= _LONGEST_NAME else []
     return "no such field, " + (f"did you mean {close[0]}?" if close else "expected " + listed(names))
 
 

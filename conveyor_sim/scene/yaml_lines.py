@@ -76,10 +76,8 @@ class Document:
         return self._scalar(node)
 
     def _mapping(self, node: MappingNode, path: Path) -> dict[Any, Any]:
-        data: dict[Any, Any] = {}
-        for key_node, value_node in node.value:
-            if key_node.tag == _MERGE:
-                data = {**self._merged(value_node, path), **data}
+        taken_in = [self._merged(value, path) for key, value in node.value if key.tag == _MERGE]
+        data = _laid_over(taken_in)
         own: dict[Any, int] = {}
         for key_node, value_node in node.value:
             if key_node.tag == _MERGE:
@@ -96,13 +94,13 @@ class Document:
 
     def _merged(self, node: Node, path: Path) -> dict[Any, Any]:
         """What `<<` takes in: a mapping, or a list of them of which the first has the say."""
-        merged: dict[Any, Any] = {}
+        merged: list[dict[Any, Any]] = []
         for source in node.value if isinstance(node, SequenceNode) else [node]:
             data = self._build(source, (*path, "<<"))
             if not isinstance(data, dict):
                 raise self._error(node.start_mark.line + 1, f"{dotted(path)}: << takes in mappings only")
-            merged = {**data, **merged}
-        return merged
+            merged.append(data)
+        return _laid_over(merged)
 
     def _scalar(self, node: Node) -> Any:
         try:
@@ -116,6 +114,14 @@ class Document:
             text = str(node.value).encode(errors="backslashreplace").decode()
             raise self._error(line, f"a value that can't be read: {cut(text)}") from None
         return value if value is None or isinstance(value, (str, int, float)) else str(node.value)
+
+
+def _laid_over(mappings: list[dict[Any, Any]]) -> dict[Any, Any]:
+    """Return mappings as one, in which the first of a key decides; the last mapping's keys come first."""
+    data: dict[Any, Any] = {}
+    for mapping in reversed(mappings):
+        data.update(mapping)
+    return data
 
 
 def _one_line(error: MarkedYAMLError) -> str:

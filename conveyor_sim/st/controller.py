@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from conveyor_sim.st.compile import compile_file
 from conveyor_sim.st.errors import StructuredTextError
 from conveyor_sim.st.mapping import Addresses, Mapped, mapped, read_addresses
 from conveyor_sim.st.program import BUDGET, Program, python_value
+from conveyor_sim.st.types import TIME, Type
 from conveyor_sim.st.variables import Variable, load
+from conveyor_sim.support.rounded_limit import at_limit, single
 
 _NS = 1e9
 
@@ -48,12 +51,14 @@ class StructuredText:
         """Set by `bind`, before the first scan."""
         self._ins: list[tuple[Variable, str]] = []
         self._outs: list[tuple[Variable, str]] = []
+        self._limits: Mapping[str, tuple[float, float]] = {}
         self._forced: dict[str, Any] = {}
         self._checked = False
 
     def bind(self, tags: LineTags) -> None:
         """Find the tag of each variable. Raises StructuredTextError for a mapping that can't be."""
         self.mapping = mapped(self.program.compiled, tags, self._tags, self._addresses)
+        self._limits = tags.limits
         self._take()
 
     def _take(self) -> None:
@@ -87,7 +92,14 @@ class StructuredText:
         self._force()
         self.program.run(round(inputs.time * _NS))
         self._force()
-        return {tag: variable.number() for variable, tag in self._outs}
+        return {tag: self._given(variable, tag) for variable, tag in self._outs}
+
+    def _given(self, variable: Variable, tag: str) -> float:
+        """Return the value of an output; one that is a limit in the variable's type is that limit."""
+        value = variable.number()
+        if tag not in self._limits or (rounded := _rounding(variable.type)) is None:
+            return value
+        return at_limit(value, *self._limits[tag], rounded)
 
     def _check(self, length: int) -> None:
         """Tasks take whole scans. length: ns."""
@@ -152,6 +164,13 @@ class StructuredText:
         if found is None:
             raise StructuredTextError(f"{name}: no such variable in {self.program.compiled.file}")
         return found
+
+
+def _rounding(kind: Type) -> Callable[[float], float] | None:
+    """Return how a type rounds numbers; None: it has all that a limit can be."""
+    if kind.base == TIME:
+        return lambda limit: round(limit * _NS) * 1e-9 if abs(limit) < kind.base.high * 1e-9 else math.inf
+    return single if kind.base.name == "REAL" else None
 
 
 def _plain(name: str) -> str:

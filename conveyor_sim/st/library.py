@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import select
 import signal
 import subprocess
 import sys
@@ -17,9 +16,19 @@ from typing import Any
 from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.recorded import PREFIX, patterns
 from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
+from conveyor_sim.st.exchange import AnswerError, EndedError, exchange
+from conveyor_sim.support.rounded_limit import at_limit
 
 PATIENCE = 60.0
-"""s of wall time that a call may take, beyond which the watchdog ends it."""
+"""Wall time of a call from its request to the end of its answer, s; beyond it the watchdog ends the program."""
+
+MOST_BYTES = 65_536
+"""Length of an answer; each output value may add _VALUE_BYTES, a snapshot MOST_STATE_BYTES."""
+
+MOST_STATE_BYTES = 86_000_000
+"""Length of a snapshot's answer: 64 MB of state in base 64."""
+
+_VALUE_BYTES = 32
 
 _MOMENT = 1.0
 """s of wall time that the end of a program may take."""
@@ -55,11 +64,13 @@ class CompiledProgram:
             raise ControlError(f"{path}: found no tags, expected a tag for each variable that is to have one")
         self._ins: list[str] = []
         self._outs: list[str] = []
+        self._limits: Mapping[str, tuple[float, float]] = {}
         self._shown: dict[str, float] = {}
         self._process = subprocess.Popen(
             [sys.executable, "-m", "conveyor_sim.st.library_host", str(self._path.resolve())],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            bufsize=0,
         )
         self.close = weakref.finalize(self, _end, self._process)
         """Ends the process; so does the end of this object."""
@@ -77,6 +88,7 @@ class CompiledProgram:
             (self._outs if out else self._ins).append(tag)
             variables.append((name, int(out)))
         self._call("bind", variables)
+        self._limits = tags.limits
         self._names = {tag: f"{PREFIX}{name}" for name, tag in self._tags.items()}
         self._shown = dict.fromkeys(self._names.values(), 0.0)
 
@@ -84,7 +96,11 @@ class CompiledProgram:
         """Commands and alarms. Raises ControlError if the program stops, crashes, or does not end its scan."""
         values = [inputs[tag] for tag in self._ins]
         found = self._call("scan", round(inputs.time * _NS), values)
-        answer = dict(zip(self._outs, found, strict=True))
+        # A REAL comes as a double, but has no more digits for that.
+        answer = {
+            tag: at_limit(value, *self._limits[tag]) if tag in self._limits else value
+            for tag, value in zip(self._outs, found, strict=True)
+        }
         self._shown = {
             self._names[tag]: value for tag, value in (*zip(self._ins, values, strict=True), *answer.items())
         }
@@ -104,21 +120,18 @@ class CompiledProgram:
         self._call("restore", data["state"])
 
     def _call(self, do: str, *given: Any) -> Any:
-        process = self._process
-        assert process.stdin is not None and process.stdout is not None
+        request = json.dumps({"do": do, "with": given}).encode() + b"\n"
+        most = MOST_BYTES + (MOST_STATE_BYTES if do == "snapshot" else _VALUE_BYTES * len(self._outs))
         try:
-            process.stdin.write(json.dumps({"do": do, "with": given}).encode() + b"\n")
-            process.stdin.flush()
-        except OSError:
-            raise ControlError(f"{self._path}: {self._ended()} before {do}, expected a program that goes on") from None
-        if not select.select([process.stdout], [], [], self._patience)[0]:
-            process.kill()
+            answer = _answer(exchange(self._process, request, self._patience, most))
+            if do == "scan":
+                _require_numbers(answer.get("answer", [0.0] * len(self._outs)), len(self._outs))
+        except EndedError:
+            raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer") from None
+        except AnswerError as error:
+            self._process.kill()
             self.close()
-            raise ControlError(f"{self._path}: watchdog: {do} took more than {self._patience:g} s, expected less")
-        line = process.stdout.readline()
-        if not line.endswith(b"\n"):
-            raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer")
-        answer = json.loads(line)
+            raise ControlError(f"{self._path}: watchdog: {do} {error}, expected one answer in time") from None
         if "error" in answer:
             raise ControlError(f"{self._path}: {answer['error']}")
         return answer["answer"]
@@ -126,6 +139,23 @@ class CompiledProgram:
     def _ended(self) -> str:
         code = self._process.wait()
         return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+
+
+def _answer(line: bytes) -> dict[str, Any]:
+    """Return an answer of `library_host`. Raises AnswerError."""
+    try:
+        answer = json.loads(line)
+    except (ValueError, RecursionError):
+        answer = None
+    if not isinstance(answer, dict) or not (isinstance(answer.get("error"), str) or "answer" in answer):
+        raise AnswerError("sent a line that is no answer")
+    return answer
+
+
+def _require_numbers(values: Any, count: int) -> None:
+    """Raise AnswerError unless these are the values of all outputs."""
+    if not isinstance(values, list) or len(values) != count or not all(type(value) is float for value in values):
+        raise AnswerError(f"sent a line without the values of {count} outputs")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

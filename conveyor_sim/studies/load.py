@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Any
-
-from pydantic import ValidationError
 
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import load_scene
-from conveyor_sim.scene.load import refused, untagged
+from conveyor_sim.scene.load import refused
+from conveyor_sim.scene.part import validated
 from conveyor_sim.scene.problems import Problem
 from conveyor_sim.scene.yaml_lines import LONGEST_TEXT, Document
 from conveyor_sim.studies.code import digest_of, files_of, function, located
@@ -83,11 +81,10 @@ def parse_study(text: str, name: str = "<text>", folder: Path | None = None) -> 
 
 
 def _study(document: Document, name: str) -> Study:
-    data: Any = document.data
-    try:
-        return Study.model_validate(data)
-    except ValidationError as error:
-        raise refused(untagged(error), document, name, {}) from None
+    study = validated(Study, document.data)
+    if isinstance(study, tuple):
+        raise refused(study[0], document, name, {}, study[1])
+    return study
 
 
 def _metric_problems(study: Study, folder: Path) -> list[Problem]:

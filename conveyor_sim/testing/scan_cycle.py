@@ -77,8 +77,8 @@ class ScanCycle:
         """Have a controller scan, in place of what did."""
         self.close()
         image = self._simulation.process_image
-        kinds = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
-        bind(controller, LineTags(*kinds))
+        signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, image.commands))
+        bind(controller, LineTags(signals, commands, image.command_limits))
         self.recorded = Recorded(controller)
         self._controller = controller
         if declared := declared_alarms(controller):

@@ -19,6 +19,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.printable import SENTENCE, printable
 from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.view.difference import Comparison
+from conveyor_sim.view.own_host import is_own
 from conveyor_sim.view.recording import Detail, Recording, text
 
 ADDRESS = "127.0.0.1"
@@ -139,8 +140,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         path = urlsplit(self.path).path.removeprefix("/") or "index.html"
-        # A page of somebody else's, whose name has been made to lead here, asks for that name.
-        if self.headers.get("Host", "").rpartition(":")[0] not in (ADDRESS, "localhost"):
+        if not is_own(self.headers.get_all("Host", []), "http"):
             self._send(HTTPStatus.FORBIDDEN, b"expected to be asked for as 127.0.0.1", "text/plain")
         elif path.startswith("data/"):
             self._send_part(path.removeprefix("data/"))

@@ -215,3 +215,12 @@ def test_no_file_and_no_text_are_refused(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     with pytest.raises(MapError, match="holds no tag, expected a Modbus map"):
         read_map(tmp_path / "empty.csv")
+
+
+@pytest.mark.parametrize("high", [0.123456789, 0.6, 1 / 3])
+def test_a_float_at_a_limit_is_the_limit(high: float) -> None:
+    row = modbus_map([replace(SPEED, high=high)])[0]
+    assert decode(row, encode(row, high)) == high
+    above = float(np.nextafter(np.float32(high), np.float32(1.0)))
+    assert decode(row, encode(row, above)) > high
+    assert decode(row, encode(row, 0.1)) == 0.1

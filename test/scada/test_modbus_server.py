@@ -318,3 +318,26 @@ def test_mbpoll_reads_and_writes(line: Line) -> None:
     assert line.read(SPEED) == pytest.approx(0.125)
     refused = subprocess.run([*common, "99"], capture_output=True, text=True, timeout=60)
     assert "Illegal data value" in refused.stderr
+
+
+def test_a_mode_that_is_not_for_the_role_gets_an_exception(line: Line) -> None:
+    """And is on record; of one request all is refused."""
+    first, second = line.rows["belts/zone1/set_mode"], line.rows["belts/zone2/set_mode"]
+    assert second.address == first.address + 1
+    before = line.server.status()
+    for modes in ([2], [3, 2], [9], [0]):
+        assert line.client.write_registers(first.address, modes).exception_code == ILLEGAL_VALUE
+    assert line.client.write_register(first.address, 2).exception_code == ILLEGAL_VALUE
+    after = line.server.status()
+    assert (after.writes - before.writes, after.refused - before.refused) == (0, 5)
+    line.advance()
+    assert [one.accepted for one in line.simulation.take_outcomes()] == [False] * 5
+    assert line.read("belts/zone1/set_mode") == line.read("belts/zone2/set_mode") == 1
+
+
+@controller
+def test_a_controller_sets_no_modes(line: Line) -> None:
+    address = line.rows["belts/zone1/set_mode"].address
+    assert line.client.write_register(address, 3).exception_code == ILLEGAL_FUNCTION
+    line.advance()
+    assert line.simulation.take_outcomes() == []

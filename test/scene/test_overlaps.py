@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conveyor_sim.scene.geometry import ArcPiece, Piece, SegmentPiece
-from conveyor_sim.scene.overlaps import near_pieces, overlapping
+from conveyor_sim.scene.overlaps import MOST_PAIRS, near_pieces, overlapping
 from conveyor_sim.scene.polygons import why_not_simple
 
 
@@ -85,3 +85,23 @@ def test_simple_polygons(corners: tuple[tuple[float, float], ...]) -> None:
 )
 def test_polygons_that_are_not_simple(corners: tuple[tuple[float, float], ...], reason: str) -> None:
     assert why_not_simple(corners) == reason
+
+
+def test_circles_at_one_place_have_no_more_pairs_than_are_looked_for() -> None:
+    """20 000 have 200 million pairs, which take 10 GB."""
+    count = 20_000
+    first, second = overlapping(np.zeros((count, 2)), np.full(count, 0.05), 1e-9)
+    assert MOST_PAIRS <= len(first) < 6 * MOST_PAIRS
+    assert (first < second).all()
+
+
+def test_many_neighbours_are_compared_in_parts() -> None:
+    """One large circle makes cells that hold all the small ones."""
+    random = np.random.default_rng(1)
+    centres, radii = random.uniform(0.0, 1.0, (4000, 2)), np.full(4000, 0.002)
+    centres[0], radii[0] = (5.0, 5.0), 1.0
+    first, second = overlapping(centres, radii, 1e-9)
+    apart = np.hypot(*(centres[:, None] - centres[None, :]).transpose(2, 0, 1))
+    one, other = np.nonzero(np.triu(apart < radii[:, None] + radii[None, :] - 1e-9, 1))
+    assert len(one) > 50
+    assert np.array_equal(first, one) and np.array_equal(second, other)

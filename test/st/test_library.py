@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
@@ -39,12 +41,14 @@ def built(folder: Path, name: str = "table", text: str | None = None) -> Path:
     return made
 
 
-def broken(folder: Path, body: str) -> CompiledProgram:
+def broken(folder: Path, body: str, patience: float = 5.0) -> CompiledProgram:
     """One whose scan does something else from the tenth on."""
     text = SHIM.read_text()
     assert text.count(BODY) == 1
-    text = "#include <threads.h>\n" + text.replace(BODY, f"{BODY} if (time_ns >= 100000000) {{ {body} }}")
-    return CompiledProgram(built(folder, "broken", text), TAGS, patience=5.0)
+    text = "#include <threads.h>\n#include <unistd.h>\n" + text.replace(
+        BODY, f"{BODY} if (time_ns >= 100000000) {{ {body} }}"
+    )
+    return CompiledProgram(built(folder, "broken", text), TAGS, patience=patience)
 
 
 def test_the_worked_shim_does_what_the_program_does(tmp_path: Path) -> None:
@@ -122,6 +126,61 @@ def test_what_goes_wrong_in_it_fails_the_test_and_nothing_else(tmp_path: Path, b
     with pytest.raises(ControlError, match=text):
         plant.run_for(0.2)
     assert plant.simulation.tick == 10
+
+
+def test_a_real_at_a_limit_is_the_limit(tmp_path: Path) -> None:
+    """The program's variable has 32 bits, its place in the interface 64."""
+    text = SHIM.read_text()
+    assert text.count("data->TABLE_SPEED = 0.4;") == 1
+    made = built(tmp_path, "real", text.replace("data->TABLE_SPEED = 0.4;", "data->TABLE_SPEED = (float)0.6;"))
+    plant = Scenario(TABLE, overrides={"belts": {"table": {"speed_limits": [0.0, 0.6]}}})
+    plant.attach(CompiledProgram(made, TAGS))
+    plant.run_for(0.02)
+    names = plant.simulation.process_image.command_names
+    assert plant.simulation.line.read_back.values[names.index("belts/table/cmd_speed")] == 0.6
+
+
+def says(text: str) -> str:
+    """C that writes to whatever way leads to the simulator, beside the standard streams."""
+    text = text.replace('"', '\\"').replace("\n", "\\n")
+    return f'for (int way = 3; way < 10; way++) if (write(way, "{text}", sizeof "{text}" - 1) < 0) {{}}'
+
+
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        # A byte now and then: each would start a patience of its own.
+        (
+            "for (;;) { " + says("[") + " thrd_sleep(&(struct timespec){.tv_nsec = 50000000}, 0); }",
+            "took more than 1 s",
+        ),
+        ("for (;;) { " + says("[" * 1000) + " }", "sent more than 65632 bytes"),
+        (says("[]\n7\n"), "sent what was not asked for"),
+        (says("[]\n") + " exit(0);", "sent a line that is no answer"),
+        (says("{\n") + " exit(0);", "sent a line that is no answer"),
+        (says("[" * 60000 + "\n") + " exit(0);", "sent a line that is no answer"),
+        (says('{"answer": [1.0]}\n') + " exit(0);", "sent a line without the values of 3 outputs"),
+        (says('{"answer": [1.0, "2", 3.0]}\n') + " exit(0);", "sent a line without the values of 3 outputs"),
+        (says('{"answer": ') + " exit(0);", "ended with code 0 in scan"),
+    ],
+    ids=["slow", "endless", "two", "list", "no JSON", "deep", "few", "no number", "half"],
+)
+def test_patience_and_length_bound_the_whole_answer(tmp_path: Path, body: str, text: str) -> None:
+    program = broken(tmp_path, body, patience=1.0)
+    plant = Scenario(TABLE)
+    plant.attach(program)
+    with pytest.raises(ControlError, match=text):
+        plant.run_for(0.2)
+    assert program._process.poll() is not None
+
+
+def test_a_program_that_does_not_read_is_ended_too(tmp_path: Path) -> None:
+    """Its state is more than a pipe holds; it is stopped before it reads."""
+    program = CompiledProgram(built(tmp_path), TAGS, patience=1.0)
+    os.kill(program._process.pid, signal.SIGSTOP)
+    with pytest.raises(ControlError, match="watchdog: restore took more than 1 s"):
+        program.restore({"state": "A" * 1_000_000})
+    assert program._process.poll() is not None
 
 
 def test_what_is_no_library_is_refused(tmp_path: Path) -> None:

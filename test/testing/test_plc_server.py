@@ -313,6 +313,22 @@ def test_what_the_plc_calls_bad_is_no_command(free: FreeRunning) -> None:
 
 
 @pytest.mark.parametrize("plc", ["opcua"], indirect=True)
+def test_a_float_at_a_limit_is_the_limit(plc: Plc) -> None:
+    """A REAL of 0.6 is 0.60000002384 on its way; a Double of as much is beyond the limit."""
+    limits = {"belts": {"zone1": {"speed_limits": [0.0, 0.6]}}}
+    plc.thread.run(plc.made.halt())
+    with Scenario(LINE, overrides=limits) as plant, ServerThread() as thread:
+        free = FreeRunning(plant, plc, thread)
+        plc.thread.run(plc.made._write("speed", 0.6, "Float"))
+        place = plant.simulation.process_image.command_names.index(SETPOINT)
+        free.until(lambda: plant.simulation.line.read_back.values[place] == 0.6)
+        assert free.face.status().refused == 0
+        plc.thread.run(plc.made._write("speed", 0.6000001, "Float"))
+        free.until(lambda: free.face.status().refused == 1)
+        free.stop()
+
+
+@pytest.mark.parametrize("plc", ["opcua"], indirect=True)
 def test_a_command_out_of_range_is_refused_once_and_alone(free: FreeRunning) -> None:
     made = free.plc.made
 

@@ -91,6 +91,11 @@ def test_pages_of_others_are_refused(live: Live) -> None:
     assert run(status(Origin=f"http://evil.example:{live.port}", Host=f"evil.example:{live.port}")) == 403
     assert run(page_of(f"localhost:{live.port}")) == 200
     assert run(page_of(f"evil.example:{live.port}")) == 403
+    for host in ("127.0.0.1", "127.0.0.1:80", "LocalHost", "[::1]", "localhost."):
+        assert run(page_of(host)) == 200  # browsers leave out port 80
+        assert run(status(Origin=f"http://{host.removesuffix(':80')}", Host=host)) == 101
+        assert run(status(Origin=f"http://{host}:8081", Host=host)) == 403
+    assert run(page_of("localhost.evil.example")) == 403
 
 
 def test_files_outside_the_page_are_not_there(live: Live) -> None:

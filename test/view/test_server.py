@@ -85,6 +85,20 @@ def test_it_listens_on_this_machine_only_and_lets_in_no_other_page(server: Recor
     assert get(server, "/data/head", Host="evil.example")[0] == 403
 
 
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.1:80", "localhost", "LOCALHOST.", "[::1]"])
+def test_a_browser_may_leave_out_the_default_port(server: RecordingServer, host: str) -> None:
+    """As it does where the server listens on port 80."""
+    assert get(server, "/data/head", Host=host)[0] == 200
+    assert get(server, "/data/head", Host=f"{host}.evil.example")[0] == 403
+
+
+def test_two_names_at_once_are_none(server: RecordingServer) -> None:
+    parts = urlsplit(server.url)
+    with socket.create_connection(("127.0.0.1", parts.port or 0), timeout=60) as client:
+        client.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n")
+        assert client.recv(100).split()[1] == b"403"
+
+
 def test_a_port_that_is_taken_is_said_in_one_sentence(server: RecordingServer, bag: Path) -> None:
     taken = urlsplit(server.url).port
     assert taken is not None

@@ -80,19 +80,26 @@ OPERATIONS = {
 """By name."""
 
 
-def problem(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[float]) -> str:
-    """Why it can't be done, "" if it can. ids: with or without `alarms/`; values: of `shelve`, s for each, 0 or none at
-    all: until the condition ends next.
-    """
-    operation, seen = OPERATIONS[name], set[str]()
+def argument_problem(name: str, ids: Sequence[str], values: Sequence[float]) -> str:
+    """Return why it can't be done with such arguments, whatever the alarms are; "" if it can. As `problem`."""
     if values and (name != "shelve" or len(values) != len(ids)):
         expected = f"as many as names ({len(ids)}), or none" if name == "shelve" else "none"
         return f"{len(values)} values given, expected {expected}"
     for value in values:
         if not 0.0 <= value <= LONGEST_DELAY:
             return f"{value:g} given, expected 0 to {LONGEST_DELAY} s, for how long it is shelved"
-    if not ids and not operation.all_of_them:
+    if not ids and not OPERATIONS[name].all_of_them:
         return "no name given, expected the id of an alarm"
+    return ""
+
+
+def problem(alarms: Alarms, name: str, ids: Sequence[str], values: Sequence[float]) -> str:
+    """Why it can't be done, "" if it can. ids: with or without `alarms/`; values: of `shelve`, s for each, 0 or none at
+    all: until the condition ends next.
+    """
+    if reason := argument_problem(name, ids, values):
+        return reason
+    operation, seen = OPERATIONS[name], set[str]()
     for id in _bare(ids):
         if id not in alarms:
             return f"{printable(id)}: no such alarm, expected {_listed(alarms)}"

@@ -15,6 +15,7 @@ from asyncua.ua.uaerrors import UaError
 from conveyor_sim.scada.attach.link import PATIENCE, LinkError
 from conveyor_sim.scada.attach.tag_map import Mapped, TagMapError
 from conveyor_sim.support.printable import printable
+from conveyor_sim.support.rounded_limit import at_limit
 
 T = TypeVar("T")
 
@@ -79,7 +80,9 @@ class OpcUaLink:
         for name, data in zip(names, await self._ask(client.read_attributes(nodes)), strict=True):
             if (bad := _problem(data)) is not None:
                 raise LinkError(f"{self._url}: {printable(self._mapped[name].theirs)} ({name}) is {bad}")
-            found[name] = float(data.Value.Value)
+            value, tag = float(data.Value.Value), self._mapped[name].tag
+            is_single = data.Value.VariantType is ua.VariantType.Float
+            found[name] = at_limit(value, tag.low, tag.high) if is_single else value
         return found
 
     async def close(self) -> None:

@@ -10,11 +10,10 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from conveyor_sim.line.authority import MAY, MODES
-from conveyor_sim.line.commands import refusal
 from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.scada.hands import TAKES_NO_INPUT, is_mode, objection
+from conveyor_sim.scada.hands import TAKES_NO_INPUT, is_mode, objection, refused_for_good
 from conveyor_sim.scada.holding import Holding
 from conveyor_sim.scada.mqtt.line_metrics import number_of
 from conveyor_sim.scada.mqtt.payload import decoded
@@ -38,6 +37,7 @@ class Commands:
         """role: in which they command; None: they may not. broker: its address, which inputs are recorded under."""
         self._source, self._role, self._silence = source, role, silence
         self._writer = f"{MQTT} {broker}"
+        self._receipt = Receipt(source.about.tags, source.about.where)
         self._holding = Holding(source, MQTT)
         self._last = 0.0  # s of wall time, of the last command that was taken
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
@@ -119,8 +119,9 @@ class Commands:
         return self._set_modes(role, names, numbers) if modes else self._set(role, names, numbers)
 
     def _set(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
-        if reason := refusal(self._commands, "command", names, numbers):
-            return reason
+        given = Input(MQTT, self._writer, role, SET, tuple(names), tuple(numbers))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return refusal.reason
         for name, number in zip(names, numbers, strict=True):
             if reason := objection(self._source, self._commands[name], number, role, self._writer):
                 return reason
@@ -129,13 +130,11 @@ class Commands:
             if reason := self._holding.take(self._writer):
                 return reason
             self._last = time.monotonic()
-        return self._source.give(Input(MQTT, self._writer, role, SET, tuple(names), tuple(numbers)))
+        return self._source.give(given)
 
     def _set_modes(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
-        if role not in MAY[MODE].writers:
-            return f"{names[0]}: given by a {role}, expected one of {', '.join(MAY[MODE].writers)}"
-        for name, number in zip(names, numbers, strict=True):
-            if number not in MODES:
-                return f"{name}: {number:g} given, expected one of {self._modes[name].listed_texts}"
         devices = tuple(self._modes[name].device for name in names)
-        return self._source.give(Input(MQTT, self._writer, role, MODE, devices, tuple(numbers)))
+        given = Input(MQTT, self._writer, role, MODE, devices, tuple(numbers))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return refusal.reason
+        return self._source.give(given)

@@ -19,6 +19,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.face import FaceError, Stamps, Status
+from conveyor_sim.scada.mqtt.birth_numbers import BirthNumbers
 from conveyor_sim.scada.mqtt.broker import Broker
 from conveyor_sim.scada.mqtt.commands import SILENCE, Commands
 from conveyor_sim.scada.mqtt.hosts import PrimaryHost
@@ -37,7 +38,6 @@ BIRTHS_EVERY = 1.0
 """s of wall time from births to the next that hosts ask for, at least; in between nothing else is sent either."""
 
 _LOOK = 0.5  # s of wall time between two looks at what nobody tells of
-_LAST_BIRTH = 256  # numbers of connections
 
 
 class EdgeNode:
@@ -58,7 +58,8 @@ class EdgeNode:
         self._names = Names(*broker.named(source.about))
         self._commands = Commands(source, role, f"{broker.host}:{broker.port}", silence)
         self._line = LineMetrics(source.about, Clock(source.about, stamps), writes=role is not None)
-        self._number = 0  # of the next connection
+        self._numbers = BirthNumbers(broker.address, self._names.group, self._names.node)
+        self._births = 0  # number of the present connection
         self._version = NEWEST
         self._link: Link | None = None
         self._state = "not connected"
@@ -128,12 +129,16 @@ class EdgeNode:
             self._wake.set()
 
     async def _connect(self) -> Link:
-        """A connection with the next number. Raises LinkError, FaceError."""
+        """A connection with the next number, by the newest version of MQTT that the broker takes.
+
+        Raises LinkError, FaceError.
+        """
+        version = self._version
         while True:
-            number, self._number = self._number, (self._number + 1) % _LAST_BIRTH
+            number = await asyncio.to_thread(self._numbers.take)
             last_words = death(number)
             will = Message(self._names.of("NDEATH"), last_words, len(last_words), False)
-            link = Link(self._broker, self._name, will, self._version, self._notice)
+            link = Link(self._broker, self._name, will, version, self._notice)
             opening = asyncio.ensure_future(asyncio.to_thread(link.open))
             try:
                 await asyncio.shield(opening)
@@ -143,10 +148,11 @@ class EdgeNode:
                     await asyncio.to_thread(link.close)
                 raise
             except TooNewError:
-                if self._version == OLDEST:
+                if version == OLDEST:
                     raise
-                self._version = OLDEST
+                version = OLDEST
                 continue
+            self._version = version  # of the next connections: only one that has worked
             self._births = number
             self._state = "connected"
             return link

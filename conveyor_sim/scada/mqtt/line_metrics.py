@@ -27,6 +27,7 @@ from conveyor_sim.scada.mqtt.payload import (
     whole,
 )
 from conveyor_sim.scada.source import About, Shown
+from conveyor_sim.support.rounded_limit import at_limit
 
 FORCED = "forced"
 """Key of the property of a signal that reads otherwise than it is; it is left out where that is not so."""
@@ -35,7 +36,7 @@ TIME = "run/time"
 """Metric: simulated time, s."""
 
 _KINDS = {"bool": BOOLEAN, "count": INT64, "enumeration": INT32, "number": DOUBLE}
-_TAKEN = {BOOLEAN: ("boolean_value",), DOUBLE: ("double_value",)}
+_TAKEN = {BOOLEAN: ("boolean_value",), DOUBLE: ("double_value", "float_value")}
 _WHOLE = ("int_value", "long_value")
 
 
@@ -56,12 +57,17 @@ def milliseconds(date: datetime) -> int:
 
 
 def number_of(tag: Tag, metric: Any) -> float | None:
-    """The value that a metric gives a tag; None if it has none of the tag's type."""
+    """Return the value that a metric gives a tag; None if it has none of the tag's type.
+
+    A Double may come as a Float, in which a limit has fewer digits.
+    """
     kind = _KINDS[tag.kind]
     field = metric.WhichOneof("value")
     if metric.is_null or field not in _TAKEN.get(kind, _WHOLE):
         return None
     value = getattr(metric, field)
+    if field == "float_value":
+        return at_limit(float(value), tag.low, tag.high)
     return float(whole(field, value) if kind in (INT32, INT64) else value)
 
 

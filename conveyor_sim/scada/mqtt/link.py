@@ -49,7 +49,7 @@ class LinkError(ConveyorError):
 
 
 class TooNewError(LinkError):
-    """The broker does not know that version of MQTT."""
+    """The broker does not know that version of MQTT: it says so, or closes the connection instead of an answer."""
 
 
 class Message(NamedTuple):
@@ -92,6 +92,7 @@ class Link:
         self._arrived: deque[Message] = deque()
         self._decided, self._lost, self._over = threading.Event(), threading.Event(), threading.Event()
         self._refusal = ""
+        self._answered = False  # by an acknowledgement, whatever it says
         self._published = self._sent = 0
         self.dropped = 0
         """Messages so far that came too fast."""
@@ -129,10 +130,12 @@ class Link:
         decided = self._decided.wait(PATIENCE)
         if decided and not self._refusal and not self.lost:
             return
+        lost = self.lost
         self.close()
-        reason = self._refusal or self.lost or f"no answer within {PATIENCE:g} s"
+        reason = self._refusal or lost or f"no answer within {PATIENCE:g} s"
         sentence = f"{where}: refuses the connection ({reason}), expected an MQTT broker that takes {self._whom}"
-        raise TooNewError(sentence) if self._refusal == _TOO_NEW else LinkError(sentence)
+        closed = self._is_new and not self._answered and bool(lost)
+        raise TooNewError(sentence) if closed or self._refusal == _TOO_NEW else LinkError(sentence)
 
     @property
     def full(self) -> bool:
@@ -176,6 +179,7 @@ class Link:
     # By the library's thread
 
     def _on_connect(self, client: Any, userdata: Any, flags: Any, reason: ReasonCode, properties: Any) -> None:
+        self._answered = True
         if reason.is_failure:
             self._refusal = str(reason)
         self._decided.set()

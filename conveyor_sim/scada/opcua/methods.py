@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -29,6 +29,10 @@ _MOST = 1000
 _ACKNOWLEDGE = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 
 _TEXT, _NUMBER, _WHOLE = ua.VariantType.String, ua.VariantType.Double, ua.VariantType.UInt32
+
+
+_NAME_AND_VALUE: Mapping[int, int] = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfRange: 1}
+"""Place of the argument that a refusal is about, by its code: names come first, values behind them."""
 
 
 class Parameter(NamedTuple):
@@ -172,7 +176,11 @@ class Methods:
         return alarms is not None and id in alarms.id
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """What becomes of a call; None if it is of no method here."""
+        """Return what becomes of a call, which is counted; None if it is of no method here."""
+        result = self._call(client, request)
+        return None if result is None else self._requests.counted(result)
+
+    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
         if request.MethodId == _ACKNOWLEDGE:
             return self._acknowledge_event(client, request)
         owner, _, name = name_of(request.MethodId).rpartition("/")
@@ -185,7 +193,8 @@ class Methods:
         if target != owner and (owner != ALARM_STATES or alarm == target or not self.knows_alarm(alarm)):
             return _result(Codes.BadMethodInvalid)
         given = [] if request.InputArguments is None else list(request.InputArguments)
-        if method.operation and not self._requests.may(client, method.operation):
+        may = self._requests.may(client, method.operation) if method.operation else self._requests.may_control(client)
+        if not may:
             return _result(Codes.BadUserAccessDenied)
         if len(given) != len(method.parameters):
             few = len(given) < len(method.parameters)
@@ -195,7 +204,8 @@ class Methods:
             return _result(Codes.BadInvalidArgument, codes)
         arguments = [value.Value for value in given]
         if method.control is not None:
-            return _result(self._requests.control(client, method.control, float(arguments[0]) if arguments else 0.0))
+            value = float(arguments[0]) if arguments else 0.0
+            return _of_arguments(self._requests.control(client, method.control, value), {Codes.BadOutOfRange: 0}, given)
         if owner == ALARM_STATES:
             return _result(self._requests.operate(client, method.operation, () if target == owner else (alarm,)))
         return self._operate(client, method, arguments)
@@ -222,10 +232,12 @@ class Methods:
                 return _result(Codes.BadInvalidArgument)
             return _result(self._requests.write_together(client, names, values))
         if method.operation == OWN:
-            return _result(self._requests.operate(client, OWN, texts=tuple(arguments[0] or ())))
+            code = self._requests.operate(client, OWN, texts=tuple(arguments[0] or ()))
+            return _of_arguments(code, _NAME_AND_VALUE, arguments)
         names = (arguments[0],) if arguments and arguments[0] else ()
         values = tuple(float(value) for value in arguments[1:])
-        return _result(self._requests.operate(client, method.operation, names, values))
+        code = self._requests.operate(client, method.operation, names, values)
+        return _of_arguments(code, _NAME_AND_VALUE, arguments)
 
     def _judge(self, parameter: Parameter, given: ua.Variant) -> int:
         values = given.Value if parameter.array else [given.Value]
@@ -245,6 +257,14 @@ class Methods:
 
     def _is(self, name: str, roles: Sequence[str]) -> bool:
         return name in self._tags and self._tags[name].role in roles
+
+
+def _of_arguments(code: int, places: Mapping[int, int], arguments: Sequence[Any]) -> ua.CallMethodResult:
+    """Return the result of a call, which names the argument that a code is about (OPC 10000-4, 5.11.2)."""
+    if code not in places:
+        return _result(code)
+    codes = [code if place == places[code] else Codes.Good for place in range(len(arguments))]
+    return _result(Codes.BadInvalidArgument, codes)
 
 
 def _result(code: int, arguments: Sequence[int] = ()) -> ua.CallMethodResult:

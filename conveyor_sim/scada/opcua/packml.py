@@ -15,7 +15,7 @@ from asyncua import Server, ua
 from asyncua.common.instantiate_util import instantiate
 from asyncua.crypto.permission_rules import User
 
-from conveyor_sim.line.inputs import MODE
+from conveyor_sim.line.inputs import MODE, SET
 from conveyor_sim.line.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.scada.clock import Clock
@@ -25,6 +25,7 @@ from conveyor_sim.scada.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.values import status_of
 from conveyor_sim.scada.source import Shown, TagSource
+from conveyor_sim.support.rounded_limit import at_limit, single
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
 NAMESPACE = "http://opcfoundation.org/UA/PackML/"
@@ -173,7 +174,11 @@ class PackMl:
                     await self._nodes.write(f"{machine}/{NAME}.{name}", value, stamp, code)
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """What becomes of a call of a method of a machine; None if it is of none."""
+        """Return what becomes of a call of a method of a machine, which is counted; None if it is of none."""
+        result = self._call(client, request)
+        return None if result is None else self._requests.counted(result)
+
+    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
         machine, _, _ = name_of(request.ObjectId).partition(f"/{NAME}")
         if machine not in self._machines:
             return None
@@ -184,17 +189,23 @@ class PackMl:
             return _result(self._command(client, machine, _METHODS[method]))
         if name not in ("SetUnitMode", "SetMachSpeed"):
             return None
+        if not self._requests.may(client, SET if name == "SetMachSpeed" else MODE):
+            return _result(Codes.BadUserAccessDenied)
         if len(given) != 1 or not isinstance(given[0], int | float) or isinstance(given[0], bool):
             return _result(Codes.BadInvalidArgument)
         value = float(given[0])
         if name == "SetMachSpeed":
-            return _result(self._requests.write_together(client, [f"{machine}/rate"], [value / A_MINUTE]))
-        if value not in self._tags[f"{machine}/mode"].texts:
+            is_single = request.InputArguments[0].VariantType is ua.VariantType.Float
+            rate = _a_second(value, self._tags[f"{machine}/rate"], is_single)
+            return _result(self._requests.write_together(client, [f"{machine}/rate"], [rate]))
+        if isinstance(given[0], float) or value not in self._tags[f"{machine}/mode"].texts:
             return _result(Codes.BadInvalidArgument)
         return _result(self._requests.operate(client, MODE, (machine,), (value,)))
 
     def _command(self, client: User, machine: str, command: Command) -> int:
         name, shown = f"{machine}/cntrl_cmd", self._source.shown.values
+        if not self._requests.may(client, SET):
+            return int(Codes.BadUserAccessDenied)
         if objection(command, int(shown[f"{machine}/state"])):
             return int(Codes.BadInvalidState)
         if shown.get(name) == command:  # it acts as it changes
@@ -237,6 +248,16 @@ class PackMl:
         if number in _STATES[_EXECUTE]:
             return {_BASE: _CLEARED, _MACHINE: _RUNNING, _EXECUTE: _STATES[_EXECUTE][State(number)]}
         return dict.fromkeys((_BASE, _MACHINE, _EXECUTE), none)
+
+
+def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
+    """Return a speed in packages a minute as a rate in 1/s; one that is a limit in its type is that limit."""
+
+    def there_and_back(limit: float) -> float:
+        a_minute = limit * A_MINUTE
+        return (single(a_minute) if is_single else a_minute) / A_MINUTE
+
+    return at_limit(speed / A_MINUTE, rate.low, rate.high, there_and_back)
 
 
 def _result(code: int) -> ua.CallMethodResult:

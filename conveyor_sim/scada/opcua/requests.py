@@ -5,23 +5,33 @@ Nothing here waits for a tick. What the line makes of it then is in the read-bac
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from asyncua import ua
 from asyncua.crypto.permission_rules import User, UserRole
 
-from conveyor_sim.line.authority import MAY, MODES
-from conveyor_sim.line.commands import refusal
+from conveyor_sim.line.authority import MAY
 from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.scada.hands import MAY_CONTROL, TAKES_NO_INPUT, is_mode, objection
+from conveyor_sim.scada.hands import CONTROL_RANGES, MAY_CONTROL, TAKES_NO_INPUT, is_mode, objection, refused_for_good
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET
 from conveyor_sim.scada.opcua.nodes import name_of
 from conveyor_sim.scada.opcua.values import type_of
 from conveyor_sim.scada.source import OPCUA, Control, TagSource
 
 Codes = ua.StatusCodes
+
+CODES: Mapping[Cause, int] = {
+    "operation": Codes.BadUserAccessDenied,
+    "role": Codes.BadUserAccessDenied,
+    "name": Codes.BadNodeIdUnknown,
+    "value": Codes.BadOutOfRange,
+    "form": Codes.BadInvalidArgument,
+}
+"""Status code of an input that no state of the line would make good, by its cause."""
 
 
 @dataclass
@@ -47,6 +57,7 @@ class Requests:
 
     def __init__(self, source: TagSource) -> None:
         self._source = source
+        self._receipt = Receipt(source.about.tags, source.about.where)
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
         self.writes = self.refused = 0
@@ -76,13 +87,11 @@ class Requests:
         return [ua.StatusCode(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
-        """Give commands as one input, all or none; a status code. Names are of commands, each once."""
+        """Give commands as one input, all or none; a status code, not counted. Names are of commands, each once."""
         tags = [self._commands[name] for name in names]
         codes = [self._judge_number(client, tag, value) for tag, value in zip(tags, values, strict=True)]
         bad = next((code for code in codes if code != Codes.Good), None)
-        code = self._give(client, SET, tuple(names), tuple(values), ()) if bad is None else bad
-        self._count(code)
-        return code
+        return self._give(client, SET, tuple(names), tuple(values), ()) if bad is None else bad
 
     def operate(
         self,
@@ -92,30 +101,34 @@ class Requests:
         values: tuple[float, ...] = (),
         texts: tuple[str, ...] = (),
     ) -> int:
-        """Give the line something to do; a status code. Arguments were checked."""
-        code = self._give(client, operation, names, values, texts)
-        self._count(code)
-        return code
+        """Give the line something to do; a status code, not counted."""
+        return self._give(client, operation, names, values, texts)
 
     def control(self, client: User, what: Control, value: float) -> int:
-        """Ask something of the run; a status code."""
-        if _kind(client) not in MAY_CONTROL:
-            code = int(Codes.BadUserAccessDenied)
-        elif what not in self._source.controls:
-            code = int(Codes.BadNotSupported)
-        else:
-            refused = self._source.control(what, value, f"{_kind(client)} {_writer(client)}")
-            code = int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
-        self._count(code)
-        return code
+        """Ask something of the run; a status code, not counted."""
+        if not self.may_control(client):
+            return int(Codes.BadUserAccessDenied)
+        if what not in self._source.controls:
+            return int(Codes.BadNotSupported)
+        low, high = CONTROL_RANGES.get(what, (-math.inf, math.inf))
+        if not low <= value <= high:
+            return int(Codes.BadOutOfRange)
+        refused = self._source.control(what, value, f"{_kind(client)} {_writer(client)}")
+        return int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
+
+    def may_control(self, client: User) -> bool:
+        """Return True if this client may ask something of the run."""
+        return _kind(client) in MAY_CONTROL
 
     def may(self, client: User, operation: str) -> bool:
         """Whether this client may ever do that."""
         return operation in MAY and _kind(client) in MAY[operation].writers
 
-    def _count(self, code: int) -> None:
-        good = code == Codes.GoodCompletesAsynchronously
+    def counted(self, result: ua.CallMethodResult) -> ua.CallMethodResult:
+        """Count a call by its result, which is returned."""
+        good = result.StatusCode.value == Codes.GoodCompletesAsynchronously
         self.writes, self.refused = self.writes + good, self.refused + (not good)
+        return result
 
     def _go_on(self, client: User, value: ua.WriteValue) -> int:
         """Have a line in lockstep go on up to a tick."""
@@ -135,9 +148,7 @@ class Requests:
         tag = self._modes[name_of(value.NodeId)]
         if (code := _judge_form(value, type_of(tag))) != Codes.Good:
             return code
-        if (mode := value.Value.Value.Value) not in MODES:
-            return int(Codes.BadOutOfRange)
-        return self._give(client, MODE, (tag.device,), (float(mode),), ())
+        return self._give(client, MODE, (tag.device,), (float(value.Value.Value.Value),), ())
 
     def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
         """Whether a value can be given, and as what number."""
@@ -152,10 +163,13 @@ class Requests:
         return self._judge_number(client, tag, number), number
 
     def _judge_number(self, client: User, tag: Tag, number: float) -> int:
-        if refusal(self._commands, "command", [tag.name], [number]):
-            return Codes.BadOutOfRange
-        kind = _kind(client)
-        if kind is None or objection(self._source, tag, number, kind, _writer(client)):
+        kind, writer = _kind(client), _writer(client)
+        if kind is None:
+            return Codes.BadUserAccessDenied
+        given = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return CODES[refusal.cause]
+        if objection(self._source, tag, number, kind, writer):
             return Codes.BadInvalidState
         return Codes.Good
 
@@ -173,10 +187,12 @@ class Requests:
         kind = _kind(client)
         if kind is None or not self.may(client, operation):
             return Codes.BadUserAccessDenied
+        given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return CODES[refusal.cause]
         shown = self._source.shown
         if shown.lost or shown.run.state in TAKES_NO_INPUT:
             return Codes.BadInvalidState
-        given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
         return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
 
 

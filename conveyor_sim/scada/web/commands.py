@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from conveyor_sim.line.authority import MAY, unauthorized
-from conveyor_sim.line.commands import refusal
-from conveyor_sim.line.inputs import DECLARE, INJECT, SET, Input, WriterKind
+from conveyor_sim.line.inputs import DECLARE, SET, Input, WriterKind
+from conveyor_sim.line.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.scada.hands import MAY_CONTROL, TAKES_NO_INPUT, objection
+from conveyor_sim.scada.hands import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
 from conveyor_sim.scada.source import WEB
 from conveyor_sim.scada.users import Role
 from conveyor_sim.scada.view import PictureSource
@@ -52,7 +52,7 @@ class Commands:
         self._source = source
         tags = source.about.tags
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role in COMMANDS}
-        self._faults: Mapping[str, Tag] = {tag.name: tag for tag in tags if tag.role == "fault"}
+        self._receipt = Receipt(tags, source.about.where)
         self.controls = source.controls - {"target"}  # how far a line in lockstep goes is its controller's affair
         """What can be asked of the run from a page."""
         self.writes = self.refused = 0
@@ -91,6 +91,8 @@ class Commands:
     def _give(self, given: Input) -> str:
         if reason := unauthorized(given, OPERATIONS):
             return reason
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return refusal.reason
         shown = self._source.shown
         if shown.lost:
             return shown.lost
@@ -98,14 +100,10 @@ class Commands:
             return f"the run is {shown.run.text}, expected one that goes on"
         if given.operation == SET and (reason := self._objection(given)):
             return reason
-        if given.operation == INJECT and (reason := refusal(self._faults, "fault", given.names, given.values)):
-            return reason
         return self._source.give(given)
 
     def _objection(self, given: Input) -> str:
         """Why commands are refused, as the line was last."""
-        if reason := refusal(self._commands, "command", given.names, given.values):
-            return reason
         if unknown := [name for name in given.names if name not in self._commands]:
             return f"{unknown[0]}: expected a command"
         kind: Any = given.writer_kind

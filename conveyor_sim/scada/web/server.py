@@ -9,7 +9,6 @@ import ssl
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
-from urllib.parse import urlsplit
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
@@ -21,6 +20,7 @@ from conveyor_sim.scada.web.commands import NOBODY, Commands, Person
 from conveyor_sim.scada.web.feed import Feed, text_message
 from conveyor_sim.scada.web.viewer import Viewer
 from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
+from conveyor_sim.view.own_host import is_own, is_same_origin
 
 MOST_VIEWERS = 64
 """Pages that look at once; one more is told so."""
@@ -47,9 +47,6 @@ HEARTBEAT = 20.0
 
 CLOSING = 2.0
 """s of wall time in which a page may say that it has heard of the end."""
-
-_NAMES = (HERE, "localhost", "[::1]")
-"""Of this machine, for itself."""
 
 _LIVE = '<meta name="line" content="live">'
 """In the page: by it the page knows that it shows a line that runs."""
@@ -98,7 +95,11 @@ class WebServer:
         """Where the page is."""
         host, port = self._at
         where = f"[{host}]" if ":" in host else host
-        return f"http{'s' if self._secured else ''}://{where}:{port if self._listening is None else self.port}/"
+        return f"{self._scheme}://{where}:{port if self._listening is None else self.port}/"
+
+    @property
+    def _scheme(self) -> str:
+        return "https" if self._secured else "http"
 
     def status(self) -> Status:
         """Pages that look; what was passed on to the line for them, and what was not."""
@@ -158,9 +159,8 @@ class WebServer:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse who asks by a name that is not ours: a page of somebody else's, whose name was made to lead here."""
-        name = request.host.rpartition(":")[0] if request.host.rpartition("]")[2] else request.host
-        if self._at[0] == HERE and name not in _NAMES:
+        """Refuse a request by a name that is not this machine's, while no other machine is served."""
+        if self._at[0] == HERE and not is_own(request.headers.getall("Host", []), self._scheme):
             return web.Response(status=403, text=f"expected to be asked for as {HERE}", headers=HEADERS)
         return await handler(request)
 
@@ -175,8 +175,8 @@ class WebServer:
         return web.Response(text=content, content_type=kind, charset="utf-8", headers=HEADERS)
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
-        origin = urlsplit(request.headers.get("Origin", ""))
-        if (origin.scheme, origin.netloc) != ("https" if self._secured else "http", request.host):
+        headers = request.headers
+        if not is_same_origin(headers.getall("Origin", []), headers.getall("Host", []), self._scheme):
             return web.Response(status=403, text="expected a page of this server", headers=HEADERS)
         if len(self._sockets) >= MOST_VIEWERS:
             return web.Response(status=503, text=f"{MOST_VIEWERS} pages look already", headers=HEADERS)

@@ -12,7 +12,7 @@ from conveyor_sim.scene.part import Part
 from conveyor_sim.scene.polygons import why_not_simple
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import TOUCH, XY
-from conveyor_sim.scene.words import shown
+from conveyor_sim.scene.words import shown, some_of
 
 Others = Mapping[str, Mapping[str, Any]]
 """What else there is in a scene: parts by the name of their field (`zones`), then by their own."""
@@ -128,5 +128,5 @@ def name_problems(path: Path, name: str | None, field: str, others: Others) -> I
     """A name that is given and that no part of a field has."""
     known = others[field]
     if name is not None and name not in known:
-        listed = ", ".join(known) or "none: there are none"
+        listed = some_of(known) or "none: there are none"
         yield Problem(path, f"{shown(name)} given, expected a name from {field}: {listed}")

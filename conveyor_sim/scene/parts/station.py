@@ -10,7 +10,7 @@ from conveyor_sim.scene.parts.device_part import Giver, Mark, Others
 from conveyor_sim.scene.parts.machine import TakingPart
 from conveyor_sim.scene.problems import Path, Problem
 from conveyor_sim.scene.types import Angle, Count, Holds, Name, NotNegative, Number, Point, Share, quantity
-from conveyor_sim.scene.words import listed, shown
+from conveyor_sim.scene.words import shown, some_of
 
 BAD = "bad"
 """The attribute that inspections, rejects and sinks know: 0 or 1."""
@@ -104,5 +104,5 @@ class Station(TakingPart, Giver):
         for name, test in self.tests.items():
             yield from test.problems((*path, "tests", name))
             if name not in known:
-                text = f"no station sets {shown(name)}, expected {listed(known)}"
+                text = f"no station sets {shown(name)}, expected {some_of(known)}"
                 yield Problem((*path, "tests", name), text)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from conveyor_sim.line.inputs import DISOWN, OWN
 from conveyor_sim.scada.mqtt import link
+from conveyor_sim.scada.mqtt.line_metrics import number_of
 from conveyor_sim.scada.source import MOST_WAITING
 from test.scada.mqtt.kit import BOOLEAN, DOUBLE, LONG, SETPOINT, SPEED, Host, Payload, add_metric, properties_of
 
@@ -81,7 +83,7 @@ def test_what_comes_in_one_message_acts_together_or_not_at_all(controlled: Line)
         ([(SPEED, DOUBLE, 0.1)], f"{SPEED}: can't be commanded, expected a metric that is not readOnly"),
         ([("no/such\x07", DOUBLE, 0.1)], "no/such\\x07: can't be commanded"),
         ([(SETPOINT, DOUBLE, 0.1), (MODE, INT32, MANUAL)], f"{MODE}: given with commands, expected modes in a message"),
-        ([(MODE, INT32, MANUAL)], f"{MODE}: given by a controller, expected one of operator, engineer, test"),
+        ([(MODE, INT32, MANUAL)], "mode: given by controller mqtt 127.0.0.1:"),
         ([], "0 metrics given, expected 1 to 1000"),
         ([(SETPOINT, DOUBLE, 0.1)] * 1001, "1001 metrics given, expected 1 to 1000"),
     ],
@@ -95,7 +97,7 @@ def test_what_can_not_be_is_refused_with_the_reason(controlled: Line, metrics: A
 
 def test_a_mode_that_there_is_not_is_refused(line: Line) -> None:
     line.host.set(MODE, 7, INT32)
-    assert line.refused(1).startswith(f"{MODE}: 7 given, expected one of 1 Automatic")
+    assert line.refused(1).startswith("belts/zone1: 7 given, expected 1 to 3")
 
 
 def test_the_edge_node_takes_nothing_but_the_request_for_births(line: Line) -> None:
@@ -193,3 +195,28 @@ def test_a_controller_holds_nothing_without_the_broker(controlled: Line) -> None
     line.source.before_tick()
     line.simulation.advance()
     assert [row[1] for row in line.outcomes()] == [OWN, "set", DISOWN]
+
+
+def test_a_float_is_taken_for_a_double_and_a_limit_in_it_is_the_limit(controlled: Line) -> None:
+    tag = replace(next(tag for tag in controlled.source.about.tags if tag.name == SETPOINT), high=0.6)
+    payload = Payload()
+    for name, value in ((SETPOINT, 0.25), (SETPOINT, 0.6), (SETPOINT, 0.6000001)):
+        payload.metrics.add(name=name, datatype=9).float_value = value
+    metrics = Payload.FromString(payload.SerializeToString()).metrics
+    quarter, limit, beyond = (number_of(tag, metric) for metric in metrics)
+    assert (quarter, limit) == (0.25, 0.6) and beyond is not None and beyond > 0.6
+    one = Payload()
+    one.metrics.add(name=SETPOINT, datatype=9).float_value = 0.25
+    controlled.host.send_bytes("DCMD", one.SerializeToString())
+    controlled.until(lambda: controlled.node.status().writes == 1, "the setpoint")
+    controlled.advance()
+    assert controlled.outcomes()[-1][2:] == ((SETPOINT,), (0.25,), True)
+
+
+def test_a_mode_that_is_not_for_operators_is_refused_at_once(line: Line) -> None:
+    line.host.set(MODE, 2, INT32)
+    assert line.refused(1) == "belts/zone1: Maintenance is not for operators, expected an engineer"
+    assert line.node.status().writes == 0
+    line.advance()
+    assert [row[1:] for row in line.outcomes()] == [("mode", ("belts/zone1",), (2.0,), False)]
+    assert line.host.values[MODE] == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import shutil
 import socket
+import struct
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
@@ -35,8 +36,9 @@ WORD = "open sesame"
 class OldBroker:
     """A broker that knows MQTT 3.1.1 and no later: it refuses what is newer, and hands all else to mosquitto."""
 
-    def __init__(self, port: int) -> None:
-        self._to = port
+    def __init__(self, port: int, answer: bytes = b"\x20\x02\x00\x01", reset: bool = False) -> None:
+        """answer: to what is newer, before the connection is closed. reset: it is closed by RST."""
+        self._to, self.answer, self.reset = port, answer, reset
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._server.getsockname()[1])
         self.refused = 0
@@ -56,7 +58,9 @@ class OldBroker:
         at = first.index(b"MQTT") + 4
         if first[at] > 4:
             self.refused += 1
-            client.sendall(b"\x20\x02\x00\x01")
+            client.sendall(self.answer)
+            if self.reset:
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             client.close()
             return
         broker = socket.create_connection(("127.0.0.1", self._to))
@@ -95,6 +99,44 @@ def test_a_broker_that_knows_no_newer_version_is_spoken_to_in_its_own(
     line.stop()
     line.until(lambda: not line.host.alive["node"], "a death")
     assert line.host.last("NDEATH").value("bdSeq") == 1
+
+
+@pytest.mark.parametrize(
+    ("answer", "reset"),
+    [(b"", False), (b"", True), (b"\x20\x03\x00\x84\x00", False), (b"\x00" * 8, False), (b"\x20\x02", False)],
+    ids=["closed", "reset", "refused by MQTT 5", "no MQTT", "half an answer"],
+)
+def test_a_broker_that_closes_on_a_newer_version_is_spoken_to_in_its_own(
+    serve: Callable[..., Line], old_broker: OldBroker, answer: bytes, reset: bool
+) -> None:
+    old_broker.answer, old_broker.reset = answer, reset
+    line = serve(port=old_broker.port)
+    assert old_broker.refused == 1 and line.host.last("NBIRTH").value("bdSeq") == 1
+    assert line.node.status().state == "connected"
+    line.stop()
+    line.until(lambda: not line.host.alive["node"], "a death")
+
+
+def test_a_broker_that_closes_on_all_versions_refuses_the_connection() -> None:
+    """And each next try begins with the newest again."""
+    versions: list[int] = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def close_all() -> None:
+            with suppress(OSError):
+                while True:
+                    client, _ = server.accept()
+                    first = client.recv(65536)
+                    if b"MQTT" in first:  # else somebody looks whether anything listens
+                        versions.append(first[first.index(b"MQTT") + 4])
+                    client.close()
+
+        threading.Thread(target=close_all, daemon=True).start()
+        url = f"mqtt://127.0.0.1:{server.getsockname()[1]}"
+        for _ in range(2):
+            with pytest.raises(FaceError, match="refuses the connection"):
+                serving(url)
+    assert versions == [5, 4, 5, 4]
 
 
 def source() -> Stepped:

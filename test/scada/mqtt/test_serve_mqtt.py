@@ -69,7 +69,20 @@ def test_a_recording_is_read_only_and_a_server_that_is_killed_is_dead_at_once(
     until(lambda: host.values["commands/refused"] == 1, "a refusal")
     second.end(signal.SIGKILL)
     until(lambda: not host.alive["node"], "its last will")
-    assert host.last("NDEATH").value("bdSeq") == 0
+    assert host.last("NDEATH").value("bdSeq") == 1
+
+
+def test_the_will_of_a_process_that_was_killed_is_not_of_the_next_one(
+    command: Callable[..., Served], broker: Mosquitto, host: Host
+) -> None:
+    births: list[int] = []
+    for number in range(3):
+        served = command(SCENE, "--mqtt", broker.url)
+        until(lambda: host.alive["line"], "births")
+        births.append(host.last("NBIRTH").value("bdSeq"))
+        served.end(signal.SIGKILL)
+        until(lambda: not host.alive["node"], "its last will")
+        assert host.last("NDEATH").value("bdSeq") == births[-1] == number
 
 
 @pytest.mark.parametrize(

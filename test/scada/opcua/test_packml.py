@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from asyncua import ua
 
 from conveyor_sim.line.alarms.alarm import AlarmState
 from conveyor_sim.line.packml import Command, State
-from conveyor_sim.scada.opcua.packml import NAMESPACE, NODESET
+from conveyor_sim.line.tag import number
+from conveyor_sim.scada.opcua.packml import NAMESPACE, NODESET, _a_second
 from test.scada.opcua.conftest import refused
 
 if TYPE_CHECKING:
@@ -142,3 +144,29 @@ def test_mode_and_speed_are_set_by_methods(line: Line) -> None:
         line.node(OBJECT, engineer).call_method(f"{index}:SetUnitMode", ua.Variant(9, ua.VariantType.Int32))
     line.advance()
     assert line.read(f"{OBJECT}.Status.UnitModeCurrent") == line.read("machines/filler/mode") == 2
+
+
+def test_a_role_is_judged_before_the_state(line: Line) -> None:
+    operator, viewer = line.client("operator"), line.client("viewer")
+    index, before = operator.get_namespace_index(NAMESPACE), line.server.status()
+    with refused(Codes.BadUserAccessDenied):
+        line.node(OBJECT, operator).call_method(f"{index}:SetUnitMode", ua.Variant(2, ua.VariantType.Int32))
+    with refused(Codes.BadInvalidArgument):
+        line.node(OBJECT, operator).call_method(f"{index}:SetUnitMode", ua.Variant(3.0, ua.VariantType.Double))
+    with refused(Codes.BadUserAccessDenied):
+        line.node(OBJECT, viewer).call_method(f"{index}:SetMachSpeed", ua.Variant(30.0, ua.VariantType.Float))
+    with refused(Codes.BadUserAccessDenied):
+        call(viewer, "Hold")
+    assert line.server.status().refused - before.refused == 4
+    line.advance()
+    assert line.read("machines/filler/mode") == 1
+    assert [row[4] for row in line.outcomes()] == [False]
+
+
+def test_a_speed_at_its_limit_is_the_limit() -> None:
+    rate = number("machines/m/rate", "setpoint", "", "1/s", 0.0, 1.234567891)
+    in_float = float(np.float32(rate.high * 60.0))
+    assert _a_second(in_float, rate, True) == rate.high
+    assert _a_second(rate.high * 60.0, rate, False) == rate.high
+    assert _a_second(in_float, rate, False) != rate.high
+    assert _a_second(30.0, rate, True) == 0.5

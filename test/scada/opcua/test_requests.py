@@ -210,3 +210,69 @@ def test_an_operator_stops_a_machine_in_automatic_and_does_nothing_else(line: Li
     line.advance()
     assert line.outcomes() == [("opcua operator", "set", ("machines/filler/cntrl_cmd",), (3.0,), True)]
     assert line.read("machines/filler/state") == 2
+
+
+def refused_events(line: Line) -> list[tuple[str, float]]:
+    return [(event.name, event.value) for event in line.source.events(0)[1] if event.kind == "command_refused"]
+
+
+def test_a_mode_that_is_not_for_a_role_is_refused_at_once_and_on_record(line: Line) -> None:
+    operator, before = line.client("operator"), line.server.status()
+    maintenance = ua.Variant(2, ua.VariantType.UInt32)
+    with refused(Codes.BadUserAccessDenied):
+        line.node("belts/zone1/mode", operator).write_value(maintenance)
+    with refused(Codes.BadUserAccessDenied):
+        line.node("line", operator).call_method("2:set_mode", "belts/zone1", maintenance)
+    after = line.server.status()
+    assert (after.writes - before.writes, after.refused - before.refused) == (0, 2)
+    line.advance()
+    assert line.read("belts/zone1/mode") == 1
+    assert [(row[:3], row[4]) for row in line.outcomes()] == [(("opcua operator", "mode", ("belts/zone1",)), False)] * 2
+    assert refused_events(line)[-2:] == [("belts/zone1", 2.0)] * 2
+
+
+def test_of_several_writes_each_is_judged_by_itself(line: Line) -> None:
+    operator = line.client("operator")
+    values = [
+        ua.WriteValue(
+            ua.NodeId(f"belts/zone{zone}/mode", 2),
+            ua.AttributeIds.Value,
+            Value=ua.DataValue(ua.Variant(mode, ua.VariantType.UInt32)),
+        )
+        for zone, mode in ((1, 3), (2, 2), (3, 9))
+    ]
+    codes = operator.tloop.post(operator.aio_obj.uaclient.write(ua.WriteParameters(values)))
+    assert [code.value for code in codes] == [
+        Codes.GoodCompletesAsynchronously,
+        Codes.BadUserAccessDenied,
+        Codes.BadOutOfRange,
+    ]
+    line.advance()
+    assert [line.read(f"belts/zone{zone}/mode") for zone in (1, 2, 3)] == [3, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("method", "arguments", "codes"),
+    [
+        ("set_mode", ("belts/zone1", ua.Variant(9, ua.VariantType.UInt32)), (Codes.Good, Codes.BadOutOfRange)),
+        ("set_mode", ("photo_eyes/full1", ua.Variant(3, ua.VariantType.UInt32)), (Codes.BadNodeIdUnknown, Codes.Good)),
+        ("force", ("photo_eyes/full1/blocked", 0.5), (Codes.Good, Codes.BadOutOfRange)),
+        ("force", ("machines/filler/state", 99.0), (Codes.Good, Codes.BadOutOfRange)),
+        ("inject", ("belts/zone1/trip", 0.5), (Codes.Good, Codes.BadOutOfRange)),
+        ("reset_counters", ("belts/zone1",), (Codes.BadNodeIdUnknown,)),
+        ("shelve", ("alarm", -1.0), (Codes.BadNodeIdUnknown, Codes.Good)),
+    ],
+)
+def test_an_argument_that_can_never_be_is_named(
+    line: Line, method: str, arguments: tuple[object, ...], codes: tuple[int, ...]
+) -> None:
+    client, before = line.client("test"), line.server.status()
+    given = [value if isinstance(value, ua.Variant) else ua.Variant(value) for value in arguments]
+    request = ua.CallMethodRequest(ua.NodeId("line", 2), ua.NodeId(f"line/{method}", 2), given)
+    (result,) = client.tloop.post(client.aio_obj.uaclient.call([request]))
+    assert result.StatusCode.value == Codes.BadInvalidArgument
+    assert tuple(code.value for code in result.InputArgumentResults) == codes
+    after = line.server.status()
+    assert (after.writes - before.writes, after.refused - before.refused) == (0, 1)
+    line.advance()
+    assert all(not row[4] for row in line.outcomes())

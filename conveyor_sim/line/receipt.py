@@ -1,0 +1,105 @@
+"""`Receipt`: what can be judged of an input as it is received, before its tick: all that no state of the line changes.
+
+Protocol servers answer a client by it at once. The line itself judges again at the tick, by the same rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple
+
+from conveyor_sim.line.alarms.operations import OPERATIONS as ALARM_OPERATIONS
+from conveyor_sim.line.alarms.operations import argument_problem
+from conveyor_sim.line.authority import MAY, hand_over_problem, pattern_problem, reserved, reserved_mode, unauthorized
+from conveyor_sim.line.commands import ALARMS, refusal
+from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, Input
+from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.observe.counters import LINE
+from conveyor_sim.support.printable import printable
+
+Cause = Literal["operation", "role", "name", "value", "form"]
+"""operation: not for this kind of writer; role: the value is not for it; name: there is no such thing; value: out of
+range, or not of the tag's kind; form: anything else about the input."""
+
+RESET_COUNTERS = "reset_counters"
+
+COUNTING = ("infeed", "inspection", "outfeed", "reject", "sink", "source", "station")
+"""Classes of devices that have counters which can be reset."""
+
+
+class Refusal(NamedTuple):
+    """Why an input can never be applied."""
+
+    cause: Cause
+    reason: str
+
+
+class Receipt:
+    """Judges inputs of one line."""
+
+    def __init__(self, tags: Sequence[Tag], where: str) -> None:
+        """tags: all of the line. where: its place in the plant."""
+        self._where = where
+        modes = {tag.device: tag for tag in tags if tag.device and tag.name == f"{tag.device}/mode"}
+        signals = {tag.name: tag.without_limits() for tag in tags if tag.role in SIGNALS}
+        self._tables: Mapping[str, tuple[str, Mapping[str, Tag]]] = {
+            SET: ("command", {tag.name: tag for tag in tags if tag.role in COMMANDS}),
+            INJECT: ("fault", {tag.name: tag for tag in tags if tag.role == "fault"}),
+            MODE: ("device", modes),
+            FORCE: ("signal", signals),
+        }
+        """By operation: what its names are of, with the word for one of them."""
+        self._counting = {LINE, *(tag.device for tag in tags if tag.device_class in COUNTING)}
+
+    def refusal(self, given: Input) -> Refusal | None:
+        """Return why an input can never be applied, whatever state the line is in; None if it may be."""
+        operation, names, values = given.operation, given.names, given.values
+        if reason := unauthorized(given, MAY):
+            return Refusal("operation", reason)
+        if given.texts and operation in (*self._tables, UNFORCE, RESET_COUNTERS):
+            return Refusal("form", f"{len(given.texts)} texts given, expected none")
+        if operation in self._tables:
+            return self._table_refusal(given)
+        if operation == UNFORCE:
+            return _values_refusal(values) or _unknown(self._tables[FORCE][1], "signal", names)
+        if operation == RESET_COUNTERS:
+            return _values_refusal(values) or _unknown(self._counting, "device that counts", names)
+        if operation in (OWN, DISOWN):
+            if reason := hand_over_problem(given):
+                return Refusal("form", reason)
+            reason = pattern_problem(given.texts, self._tables[MODE][1], self._where)
+            return Refusal("name", reason) if reason else None
+        if operation in ALARM_OPERATIONS and (reason := argument_problem(operation, names, values)):
+            return Refusal("value" if names and len(values) == len(names) else "form", reason)
+        return None
+
+    def _table_refusal(self, given: Input) -> Refusal | None:
+        what, known = self._tables[given.operation]
+        names, values = given.names, given.values
+        if reason := refusal(known, what, names, values):
+            return Refusal(_cause(known, what, names, values), reason)
+        for device, mode in zip(names, values, strict=True) if given.operation == MODE else ():
+            if reserved_mode(given.writer_kind, [mode]) is not None:
+                return Refusal("role", reserved(device, given.writer_kind, mode))
+        return None
+
+
+def _cause(known: Mapping[str, Tag], what: str, names: Sequence[str], values: Sequence[float]) -> Cause:
+    """Return the cause of what `refusal` has something against."""
+    if not names or len(names) != len(values) or len(set(names)) != len(names):
+        return "form"
+    unknown = any(name not in known and (what != "command" or not name.startswith(ALARMS)) for name in names)
+    return "name" if unknown else "value"
+
+
+def _values_refusal(values: Sequence[float]) -> Refusal | None:
+    return Refusal("form", f"{len(values)} values given, expected none") if values else None
+
+
+def _unknown(known: Mapping[str, Tag] | set[str], what: str, names: Sequence[str]) -> Refusal | None:
+    for place, name in enumerate(names):
+        if name not in known:
+            return Refusal("name", f"{printable(name)}: no such {what}")
+        if what == "signal" and name in names[:place]:
+            return Refusal("form", f"{name}: given twice")
+    return None

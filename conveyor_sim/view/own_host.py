@@ -1,0 +1,64 @@
+"""The name by which a browser asks for a server of this machine: Host (RFC 9110, 7.2) and Origin (RFC 6454, 7)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from ipaddress import AddressValueError, IPv6Address
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+DEFAULT_PORTS = {"http": 80, "https": 443}
+"""By scheme; browsers leave them out."""
+
+OWN_NAMES = ("127.0.0.1", "localhost", "[::1]")
+"""Names of this machine, for itself."""
+
+_AUTHORITY = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::([0-9]{0,5}))?")
+_LONGEST = 300
+
+
+class Authority(NamedTuple):
+    """Name and port of a server, in one form for all that mean the same."""
+
+    name: str
+    """In small letters, without a dot at the end; an address of IPv6 in brackets, in its shortest form."""
+    port: int
+
+
+def authority(text: str, scheme: str) -> Authority | None:
+    """Return what a Host header names; None if it is none. A port that is left out is that of the scheme."""
+    match = _AUTHORITY.fullmatch(text) if len(text) <= _LONGEST else None
+    if match is None:
+        return None
+    name, port = match[1].lower().removesuffix("."), int(match[2]) if match[2] else DEFAULT_PORTS[scheme]
+    if name.startswith("["):
+        try:
+            name = f"[{IPv6Address(name[1:-1]).compressed}]"
+        except AddressValueError:
+            return None
+    return Authority(name, port) if name and port <= 65535 else None
+
+
+def is_own(hosts: Sequence[str], scheme: str) -> bool:
+    """Return True if a request asks for this machine. hosts: all its Host headers, of which there must be one.
+
+    The port may be any: a tunnel has another one than the server. A page of somebody else, whose name was made to lead
+    here, asks for that name.
+    """
+    found = authority(hosts[0], scheme) if len(hosts) == 1 else None
+    return found is not None and found.name in OWN_NAMES
+
+
+def is_same_origin(origins: Sequence[str], hosts: Sequence[str], scheme: str) -> bool:
+    """Return True if a page of the very server that it asks sends a request. origins, hosts: headers, one each."""
+    if len(origins) != 1 or len(hosts) != 1:
+        return False
+    try:
+        origin = urlsplit(origins[0])
+    except ValueError:
+        return False
+    if origin.scheme != scheme or origin.path or origin.query or origin.fragment:
+        return False
+    asked = authority(hosts[0], scheme)
+    return asked is not None and authority(origin.netloc, scheme) == asked
