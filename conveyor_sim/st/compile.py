@@ -91,6 +91,7 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
     calls = Calls(trace)
     declared = calls.declarations = Declarations(source, calls)
+    declared.resolve()
     lines = Lines()
     for one in source.types:
         declared.named(one.at, one.name)

@@ -136,6 +136,8 @@ class Member:
     section: str = "VAR"
     constant: bool = False
     retain: bool = False
+    volatile: bool = False
+    """NON_RETAIN: a warm restart initialises it, also within an instance of RETAIN."""
     value: Any = None
     """Of a constant."""
     address: str = ""

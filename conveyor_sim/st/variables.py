@@ -114,24 +114,33 @@ def load(value: Any, data: Any) -> Any:
     return value
 
 
-def retain(kind: Type, old: Any, new: Any) -> None:
-    """Carry RETAIN variables from one value of a type to another, those of blocks within it too."""
+def retain(kind: Type, old: Any, new: Any, inherited: bool = False) -> None:
+    """Carry RETAIN variables from one value of a type to another, those of blocks within it too.
+
+    inherited: the instance itself is RETAIN, so all its variables are except those of NON_RETAIN (IEC 61131-3:2013,
+    6.5.6.2).
+    """
     if isinstance(kind, Array):
         if isinstance(_innermost(kind), Structure):
             inner = replace(kind, ranges=kind.ranges[1:]) if len(kind.ranges) > 1 else kind.element
             for one, other in zip(old, new, strict=True):
-                retain(inner, one, other)
+                retain(inner, one, other, inherited)
         return
-    if not isinstance(kind, Structure) or (isinstance(kind, BlockType) and kind.standard):
+    if not isinstance(kind, Structure):
+        return
+    if isinstance(kind, BlockType) and kind.standard:
+        if inherited:
+            load(new, dump(old))
         return
     for member in kind.members.values():
         if member.section in ("VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"):
             continue
         before, now = getattr(old, member.slot), getattr(new, member.slot)
-        if member.retain:
+        kept = member.retain or (inherited and not member.volatile)
+        if isinstance(_innermost(member.type), Structure):
+            retain(member.type, before, now, kept)
+        elif kept:
             setattr(new, member.slot, load(now, dump(before)))
-        else:
-            retain(member.type, before, now)
 
 
 def _innermost(kind: Type) -> Type:
