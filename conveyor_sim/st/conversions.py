@@ -54,7 +54,10 @@ def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
     source, target, cut = found
     if source is not None:
         given = converted(value, source, name)
-        value = Value(at, value.type if isinstance(source, String) else source, given, value.constant)
+        known = value.constant
+        if source.kind == "int" and known is not None:
+            known = source.wrap(known)
+        value = Value(at, value.type if isinstance(source, String) else source, given, known)
     elif value.literal:
         value = Value(at, value.type, value.code, value.constant)
     code = _cut(value, target) if cut else _code(value, target)
@@ -71,7 +74,7 @@ def _cut(value: Value, target: Type) -> str | None:
 
 def _code(value: Value, target: Type) -> str | None:
     source, code = value.type.base, value.code
-    if source == target or source.kind == target.kind == "string":
+    if (source == target and source.kind != "int") or source.kind == target.kind == "string":
         return f"{code}[:{target.high}]" if isinstance(target, String) else code
     if isinstance(target, String):
         return _to_text(source, code)
@@ -93,7 +96,8 @@ def _code(value: Value, target: Type) -> str | None:
         return TIME.wrapped(f"{code} * {_MS}")
     if source == TIME:
         code = f"_divide({code}, {_MS})"
-    return code if target.low <= source.low and source.high <= target.high and source != TIME else target.wrapped(code)
+    low, high = value.bounds if source.kind == "int" else (source.low, source.high)
+    return code if target.low <= low and high <= target.high and source != TIME else target.wrapped(code)
 
 
 def _from_real(source: Type, code: str, target: Type) -> str | None:

@@ -23,6 +23,7 @@ from conveyor_sim.st.types import (
     String,
     Structure,
     Type,
+    register,
 )
 from conveyor_sim.st.values import (
     Place,
@@ -31,7 +32,9 @@ from conveyor_sim.st.values import (
     converted,
     described,
     folded,
-    text_of,
+    intermediate,
+    operand,
+    reach,
     unified,
     untyped,
 )
@@ -40,6 +43,7 @@ _COMPARED = {"=": "==", "<>": "!=", "<": "<", ">": ">", "<=": "<=", ">=": ">="}
 _LOGIC = {"AND": "&", "OR": "|", "XOR": "^"}
 _ARITHMETIC = {"+", "-", "*", "/", "**", "MOD"}
 _SHORT = {"AND_THEN": "and", "OR_ELSE": "or"}
+_EXACT_IN_LREAL = 1 << 53
 _EXACT: dict[str, Callable[[Any, Any], Any]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 
 Calls = Callable[["Expressions", tree.Call, "Type | None"], Value]
@@ -207,7 +211,8 @@ class Expressions:
             if not low <= value.constant <= high:
                 raise SourceError(node.at, f"found index {value.constant}, expected {low} to {high}")
             return str(value.constant - low)
-        if low <= value.type.low and value.type.high <= high:
+        least, most = value.bounds
+        if low <= least and most <= high:
             return f"{value.code} - {low}" if low else value.code
         # The condition comes first, and nothing between it and what it guards gives _i another value.
         shifted = f"_i - {low}" if low > 0 else f"_i + {-low}" if low else "_i"
@@ -250,6 +255,9 @@ class Expressions:
             return value
         if value.literal:
             return untyped(node.at, -value.constant)
+        if kind.kind == "int":
+            low, high = reach(value, kind)
+            return folded(intermediate(node.at, kind, f"(-{operand(value, kind)})", -high, -low), value)
         code = f"(-{value.code})" if kind.kind == "real" else kind.wrapped(f"-{value.code}")
         return folded(Value(node.at, kind, code), value)
 
@@ -281,9 +289,9 @@ class Expressions:
             raise self._no_operator(node, left, right, "numbers")
         if word == "**":
             kind = REAL if kind == REAL or hint == REAL else LREAL
-        a, b = _operand(left, kind), _operand(right, kind)
         if kind.kind == "int":
-            return folded(self._whole(node, kind, left, a, right, b), left, right)
+            return folded(self._whole(node, kind, left, right), left, right)
+        a, b = converted(left, kind), converted(right, kind)
         joined = {"/": f"_quotient({a}, {b})", "**": f"_power({a}, {b})"}.get(word, f"({a} {word} {b})")
         if word == "MOD":
             raise self._no_operator(node, left, right, "whole numbers")
@@ -296,22 +304,38 @@ class Expressions:
             return folded(Value(node.at, kind, f"({raw})", raw=raw, kind="sum"), left, right)
         return folded(Value(node.at, kind, joined), left, right)
 
-    def _whole(self, node: tree.Binary, kind: Type, left: Value, a: str, right: Value, b: str) -> Value:
-        word = node.operator
+    def _whole(self, node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
+        word, wide = node.operator, register(kind)
+        a, b = operand(left, kind), operand(right, kind)
+        (least, most), (low, high) = reach(left, kind), reach(right, kind)
         if word == "/":
-            known = right.constant
-            if known == 0:
-                raise SourceError(right.at, f"found a division by {right.constant}, expected another divisor")
-            if known is not None and kind.width <= 32 and known > 0:
-                return Value(node.at, kind, f"int({a} / {b})")  # exact below 2^53
-            return Value(node.at, kind, kind.wrapped(f"_divide({a}, {b})"))
+            return self._divided(node, kind, (a, least, most), right, b)
         if word == "MOD":
-            return Value(node.at, kind, f"_modulo({a}, {b})")
+            return Value(node.at, kind, f"_modulo({a}, {b})", span=(min(least, 0), max(most, 0)))
         if word == "*":
-            return Value(node.at, kind, kind.wrapped(f"{a} * {b}"))
+            ends = [one * other for one in (least, most) for other in (low, high)]
+            return intermediate(node.at, kind, f"({a} * {b})", min(ends), max(ends))
         # A sum of sums wraps once: two's complement is a ring.
-        raw = f"{left.raw if left.kind == 'sum' and left.type == kind else a} {word} {b}"
-        return Value(node.at, kind, kind.wrapped(raw), raw=raw, kind="sum")
+        chained = left.kind == "sum" and left.type.base.kind == "int" and register(left.type.base).width == wide.width
+        raw = f"{left.raw if chained else a} {word} {b}"
+        if chained and left.code != f"({left.raw})":  # wrapped already
+            found = Value(node.at, kind, wide.wrapped(raw), span=(wide.low, wide.high))
+        else:
+            ends = [least + low, most + high] if word == "+" else [least - high, most - low]
+            found = intermediate(node.at, kind, f"({raw})", *ends)
+        return replace(found, raw=raw, kind="sum")
+
+    def _divided(self, node: tree.Binary, kind: Type, left: tuple[str, int, int], right: Value, divisor: str) -> Value:
+        """An integer division. left: code of the dividend, with its least and greatest value."""
+        dividend, least, most = left
+        low, high = reach(right, kind)
+        if low == high == 0:
+            raise SourceError(right.at, "found a division by 0, expected another divisor")
+        greatest = max(abs(least), abs(most))
+        if low == high > 0 and greatest <= _EXACT_IN_LREAL:
+            return Value(node.at, kind, f"int({dividend} / {divisor})", span=(divide(least, low), divide(most, low)))
+        lowest = 0 if least >= 0 and low >= 0 else -greatest
+        return intermediate(node.at, kind, f"_divide({dividend}, {divisor})", lowest, greatest)
 
     def _exact(self, node: tree.Binary, left: Value, right: Value) -> Value:
         a, b, word = left.constant, right.constant, node.operator
@@ -345,7 +369,7 @@ class Expressions:
         kind = unified(left, right, None)
         if kind is None or isinstance(kind, (Array, Structure)):
             raise self._no_operator(node, left, right, "values of one type")
-        a, b = (one.code if kind.kind == "string" else converted(one, kind) for one in (left, right))
+        a, b = (one.code if kind.kind == "string" else operand(one, kind) for one in (left, right))
         return folded(Value(node.at, BOOL, f"({a} {_COMPARED[node.operator]} {b})"), left, right)
 
     def _logic(self, node: tree.Binary, left: Value, right: Value) -> Value:
@@ -360,8 +384,3 @@ class Expressions:
     def _no_operator(self, node: tree.Binary, left: Value, right: Value, expected: str) -> SourceError:
         found = f"{described(left)} {node.operator} {described(right)}"
         return SourceError(node.at, f"found {found}, expected {expected}")
-
-
-def _operand(value: Value, kind: Type) -> str:
-    """Code of an operand; its subrange is not looked at again."""
-    return text_of(value.constant) if value.constant is not None and kind.kind == "int" else converted(value, kind)

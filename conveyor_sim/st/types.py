@@ -213,6 +213,16 @@ NUMBERS = (*INTEGERS, REAL, LREAL)
 ELEMENTARY = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, STRING, WSTRING)} | {"LTIME": TIME}
 
 
+def register(kind: Type) -> Type:
+    """Type of intermediate results of an integer type: 32 bits at least, as in CODESYS and TwinCAT.
+
+    USINT and UINT have 64: neither DINT nor UDINT holds both their differences and their products.
+    """
+    if kind.width >= DINT.width:
+        return kind
+    return DINT if kind.low < 0 else LINT
+
+
 def is_wide(kind: Type) -> bool:
     """Whether a text is a WSTRING."""
     return kind.name.startswith("WSTRING")
