@@ -15,6 +15,7 @@ from conveyor_sim.st.types import (
     BOOL,
     ELEMENTARY,
     LREAL,
+    LTIME,
     REAL,
     STRING,
     TIME,
@@ -125,7 +126,7 @@ class Expressions:
             if node.kind == "bool":
                 return constant(node.at, BOOL, node.value)
             if node.kind == "time":
-                return constant(node.at, TIME, node.value)
+                return constant(node.at, LTIME if node.text[0] in "lL" else TIME, node.value)
             kind = WSTRING if node.kind == "wide" else STRING
             return constant(node.at, replace(kind, high=len(str(node.value))), node.value)
         target = ELEMENTARY.get(node.type)
@@ -282,7 +283,7 @@ class Expressions:
             return self._logic(node, left, right)
         if left.literal and right.literal:
             return self._exact(node, left, right)
-        if TIME in (left.type, right.type):
+        if "time" in (left.type.base.kind, right.type.base.kind):
             return self._time(node, left, right)
         kind = unified(left, right, hint)
         if kind is None or kind.kind not in ("int", "real"):
@@ -351,18 +352,21 @@ class Expressions:
         return replace(folded(Value(node.at, LREAL, f"_power({float(a)}, {float(b)})"), left, right), literal="real")
 
     def _time(self, node: tree.Binary, left: Value, right: Value) -> Value:
+        """TIME and LTIME, of which LTIME is the type of what both take part in."""
         word = node.operator
-        if left.type == right.type == TIME and word in "+-":
-            return folded(Value(node.at, TIME, TIME.wrapped(f"{left.code} {word} {right.code}")), left, right)
-        number, time = (left, right) if right.type == TIME else (right, left)
+        times = [one for one in (left, right) if one.type.base.kind == "time"]
+        kind = LTIME if any(one.type.base == LTIME for one in times) else TIME
+        if len(times) == 2 and word in "+-":
+            return folded(Value(node.at, kind, kind.wrapped(f"{left.code} {word} {right.code}")), left, right)
+        time, number = times[0], right if times[0] is left else left
         if number.type.base.kind in ("int", "real") and (word == "*" or (word == "/" and time is left)):
             real = number.type.base.kind == "real"
             if word == "*":
-                code = f"_nearest({time.code} * {number.code}, {TIME.low}, {TIME.high})" if real else ""
-                return folded(Value(node.at, TIME, code or TIME.wrapped(f"{time.code} * {number.code}")), left, right)
+                code = f"_nearest({time.code} * {number.code}, {kind.low}, {kind.high})" if real else ""
+                return folded(Value(node.at, kind, code or kind.wrapped(f"{time.code} * {number.code}")), left, right)
             exact = f"_quotient({time.code}, {number.code})" if real else f"_divide({time.code}, {number.code})"
-            code = f"_nearest({exact}, {TIME.low}, {TIME.high})" if real else exact
-            return folded(Value(node.at, TIME, code), left, right)
+            code = f"_nearest({exact}, {kind.low}, {kind.high})" if real else exact
+            return folded(Value(node.at, kind, code), left, right)
         raise self._no_operator(node, left, right, "TIME with TIME (+, -) or with a number (*, /)")
 
     def _compared(self, node: tree.Binary, left: Value, right: Value) -> Value:

@@ -10,7 +10,7 @@ from typing import Any
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
 from conveyor_sim.st.operations import Root, copied, overwrite
-from conveyor_sim.st.types import TIME, Type
+from conveyor_sim.st.types import Type
 from conveyor_sim.st.values import NAMESPACE
 from conveyor_sim.st.variables import Variable, dump, leaves, load, retain
 
@@ -174,7 +174,7 @@ def python_value(kind: Type, number: float) -> Any:
         return number >= 0.5
     if base.kind == "real":
         return NAMESPACE["_single"](number) if base.name == "REAL" else float(number)
-    whole = round(number * 1e9) if base == TIME else round(number)
+    whole = round(number * 1e9) if base.kind == "time" else round(number)
     if not kind.low <= whole <= kind.high:
         raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
     return whole

@@ -9,7 +9,7 @@ from typing import Any
 
 from conveyor_sim.st.blocks import CLASSES
 from conveyor_sim.st.errors import Fault, Position, SourceError
-from conveyor_sim.st.literals import time_text
+from conveyor_sim.st.literals import long_time_text, time_text
 from conveyor_sim.st.operations import NAMES
 from conveyor_sim.st.types import (
     BOOL,
@@ -17,6 +17,7 @@ from conveyor_sim.st.types import (
     INT,
     LINT,
     LREAL,
+    LTIME,
     REAL,
     TIME,
     ULINT,
@@ -126,7 +127,9 @@ def described(value: Value) -> str:
         return f"the number {value.constant}"
     if value.constant is None:
         return value.type.name
-    return time_text(value.constant) if value.type.base == TIME else f"{value.type.name} {value.constant}"
+    texts = {TIME: time_text, LTIME: long_time_text}
+    text = texts.get(value.type.base)
+    return text(value.constant) if text else f"{value.type.name} {value.constant}"
 
 
 def converts(value: Value, target: Type) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 
 from conveyor_sim.st.errors import StructuredTextError
 from conveyor_sim.st.operations import Attribute, Element, Record
-from conveyor_sim.st.types import TIME, Array, BlockType, Structure, Type
+from conveyor_sim.st.types import Array, BlockType, Structure, Type
 
 Step = str | int
 """A slot, or an index from 0."""
@@ -47,7 +47,7 @@ class Variable:
     def number(self) -> float:
         """Its value as a signal has it: a bool is 0 or 1, a TIME is in s, a text is its length."""
         value = self.read()
-        if self.type.base == TIME:
+        if self.type.base.kind == "time":
             return float(value) * 1e-9
         return float(len(value)) if isinstance(value, str) else float(value)
 
