@@ -1,7 +1,8 @@
 """The types of the standard: ranges, what converts to what by itself, and how code keeps a value in its type.
 
 Values are Python's: BOOL a bool; integers, bit strings and enumerations an int; REAL and LREAL a float, a REAL rounded
-to 32 bits; TIME and LTIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an object.
+to 32 bits; TIME and LTIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an
+object.
 """
 
 from __future__ import annotations
