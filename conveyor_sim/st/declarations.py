@@ -9,8 +9,9 @@ from conveyor_sim.st import tree
 from conveyor_sim.st.blocks import STANDARD
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.located import Located, address_of, require_fit
 from conveyor_sim.st.scope import Names, Scope
-from conveyor_sim.st.sections import OUTSIDE, meaning
+from conveyor_sim.st.sections import LOCATED, OUTSIDE, meaning
 from conveyor_sim.st.types import (
     ELEMENTARY,
     Array,
@@ -45,6 +46,8 @@ class Declarations:
         self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
         self.structures: list[Structure] = []
         """Those declared, each after what it contains."""
+        self.located: list[Located] = []
+        """Variables with addresses."""
         self._calls = calls
         self._pending: dict[str, tree.TypeDeclaration | tree.Unit] = {}
         self._functions: dict[str, tree.Unit] = {}
@@ -261,10 +264,11 @@ class Declarations:
         key = declared.name.lower()
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
-        outer = kind is self.names.globals or kind.python.startswith("_P_")
-        if (declared.tag or declared.address) and not outer:
+        unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
+        if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
             written = declared.address or f"{{tag: {declared.tag}}}"
-            raise SourceError(declared.at, f"found {written}, expected it in a PROGRAM or VAR_GLOBAL only")
+            where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
+            raise SourceError(declared.at, f"found {written}, expected it in {where}")
         found = self._type(declared.type, known)
         if isinstance(found, BlockType) and (found.function or found.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {found.name}, expected a type or a function block")
@@ -283,7 +287,7 @@ class Declarations:
             if shared is None or shared.type != found:
                 there = "none of that name" if shared is None else shared.type.name
                 raise SourceError(declared.at, f"found {declared.name} : {found.name}, {there} in VAR_GLOBAL")
-        kind.members[key] = Member(
+        kind.members[key] = member = Member(
             declared.name,
             found,
             code,
@@ -296,6 +300,11 @@ class Declarations:
             declared.tag,
             declared.at,
         )
+        if declared.address:
+            address = address_of(declared.at, declared.address)
+            require_fit(declared.at, declared.name, found, address, constant)
+            initial = declared.initial is not None or bool(found.start)
+            self.located.append(Located(kind.python, member, address, initial))
 
     def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
         """Code of an initial value, made of constants."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
+from conveyor_sim.st.located import identity
 from conveyor_sim.st.operations import Root, copied, overwrite
 from conveyor_sim.st.types import Type
 from conveyor_sim.st.values import NAMESPACE
@@ -95,8 +96,7 @@ class Program:
             self._late()
 
     def _noted(self, variable: Root, line: int, column: int) -> None:
-        owner, slot = variable
-        self._written[id(owner), slot] = line, column
+        self._written[identity(*variable)] = line, column
 
     def _place(self, traceback: TracebackType | None) -> str:
         """File, line and column of the innermost statement that was being carried out."""
@@ -149,6 +149,8 @@ class Program:
             raise StructuredTextError(
                 f"{self.compiled.file}: found a snapshot of another program, expected one of this"
             )
+        if self.compiled.shared and "located" not in data["globals"]:
+            raise StructuredTextError(f"{self.compiled.file}: found a snapshot without memory of %I, %Q and %M")
         self._begin()
         load(self.globals, data["globals"])
         for name, one in self.instances.items():

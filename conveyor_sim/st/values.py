@@ -10,6 +10,7 @@ from typing import Any
 from conveyor_sim.st.blocks import CLASSES
 from conveyor_sim.st.errors import Fault, Position, SourceError
 from conveyor_sim.st.literals import long_time_text, time_text
+from conveyor_sim.st.located import Cell, Memory
 from conveyor_sim.st.operations import NAMES
 from conveyor_sim.st.types import (
     BOOL,
@@ -33,7 +34,7 @@ from conveyor_sim.st.types import (
     single,
 )
 
-NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES}
+NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES, "_Memory": Memory, "_Cell": Cell}
 """What code may call."""
 
 _MOST = {REAL: "3.4028235E38", LREAL: "1.7976931348623157E308"}

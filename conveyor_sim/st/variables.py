@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.st.located import identity
 from conveyor_sim.st.operations import Attribute, Element, Record
 from conveyor_sim.st.types import Array, BlockType, Structure, Type
 
@@ -40,7 +41,7 @@ class Variable:
         owner, found = self._owner, (0, "")
         for step in (*self._way, self._last):
             if isinstance(step, str) and not isinstance(owner, Record):
-                found = id(owner), step
+                found = identity(owner, step)
             owner = owner[step] if isinstance(step, int) else getattr(owner, step)
         return found
 
