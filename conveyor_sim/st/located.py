@@ -190,7 +190,7 @@ def _check(group: list[Located]) -> None:
     for other in group:
         alike = other.extent == one.extent and other.member.type == one.member.type
         if isinstance(other.member.type, (Array, Structure, String)):
-            third = one if other is not one else group[-1]
+            third = next((str(each) for each in group if each is not other), "another instance of its program")
             raise SourceError(other.at, f"found {other}, which shares memory with {third}, expected elementary types")
         if not alike and not (one.address.area == "M" and all(map(_is_plain, (one, other)))):
             expected = "BOOL, integers, bit strings or reals" if one.address.area == "M" else "one address and type"

@@ -150,7 +150,9 @@ class Program:
                 f"{self.compiled.file}: found a snapshot of another program, expected one of this"
             )
         if self.compiled.shared and "located" not in data["globals"]:
-            raise StructuredTextError(f"{self.compiled.file}: found a snapshot without shared memory, expected one with it")
+            raise StructuredTextError(
+                f"{self.compiled.file}: found a snapshot without shared memory, expected one with it"
+            )
         self._begin()
         load(self.globals, data["globals"])
         for name, one in self.instances.items():

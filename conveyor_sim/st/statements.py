@@ -167,7 +167,7 @@ class Statements:
         first, last = (self._expressions.value(bound, kind.base) for bound in (node.first, node.last))
         step = "1" if node.step is None else self._step(node.step, kind)
         rounds = self._name("r")
-        codes = f"{converted(first, kind)}, {self._last(last, kind)}, {step}, {kind.low}, {kind.high}"
+        codes = f"{converted(first, kind)}, {self._wide(last, kind)}, {step}, {kind.low}, {kind.high}"
         self._lines.add(f"{rounds} = _rounds({codes})", node.at)
         self._lines.add(f"for _k in {rounds}:", node.at)
         with self._lines.inner():
@@ -180,10 +180,10 @@ class Statements:
         with self._lines.inner():
             self._lines.add(control.write(f"_after({rounds}, {kind.low}, {kind.high})"), node.at)
 
-    def _last(self, last: Value, kind: Type) -> str:
-        """Code of the last value of a FOR: as wide as it was computed, because nothing is assigned to a variable."""
-        code = converted(last, kind)
-        return code if last.literal or last.span is None or isinstance(kind, Subrange) else operand(last, kind.base)
+    def _wide(self, value: Value, kind: Type) -> str:
+        """Return code of the last value or the step of a FOR: as wide as it was computed, for it is not assigned."""
+        code = converted(value, kind)
+        return code if value.literal or value.span is None or isinstance(kind, Subrange) else operand(value, kind)
 
     def _step(self, node: tree.Expression, kind: Type) -> str:
         step = self._expressions.value(node, kind.base)
@@ -191,7 +191,7 @@ class Statements:
             raise SourceError(node.at, "found BY 0, expected a step other than 0")
         if step.literal == "int":  # FOR i := 10 TO 0 BY -1 of a USINT
             return step.code
-        return converted(step, kind.base)
+        return self._wide(step, kind.base)
 
     def _while(self, node: tree.While) -> None:
         self._lines.add(f"while {self._expressions.condition(node.condition)}:", node.at)
