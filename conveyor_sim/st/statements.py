@@ -181,7 +181,7 @@ class Statements:
             self._lines.add(control.write(f"_after({rounds}, {kind.low}, {kind.high})"), node.at)
 
     def _wide(self, value: Value, kind: Type) -> str:
-        """Return code of the last value or the step of a FOR: as wide as it was computed, for it is not assigned."""
+        """Return code of the last value or the step of a FOR: not assigned, so as wide as it was computed."""
         code = converted(value, kind)
         return code if value.literal or value.span is None or isinstance(kind, Subrange) else operand(value, kind)
 
