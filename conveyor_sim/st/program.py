@@ -155,6 +155,8 @@ class Program:
             )
         self._begin()
         load(self.globals, data["globals"])
+        if self.compiled.shared and not all(0 <= one < 256 for one in self.globals.located.values):
+            raise StructuredTextError(f"{self.compiled.file}: found a snapshot with wrong memory, expected bytes")
         for name, one in self.instances.items():
             load(one, data["instances"][name])
         self._due = dict(data["due"])

@@ -55,7 +55,8 @@ def meaning(section: tree.Variables, unit: str) -> tuple[str, ...]:
     name, given = section.section, section.qualifiers
     if name not in allowed:
         where = "" if unit == OUTSIDE else f" in a {unit}"
-        raise SourceError(section.at, f"found {name}, expected one of {', '.join(allowed)}{where}")
+        expected = f"one of {', '.join(allowed)}" if len(allowed) > 1 else next(iter(allowed))
+        raise SourceError(section.at, f"found {name}, expected {expected}{where}")
     for one in given:
         if one not in allowed[name]:
             takes = f"with {' or '.join(allowed[name])}" if allowed[name] else "without a qualifier"

@@ -73,6 +73,15 @@ def test_a_snapshot_without_the_memory_is_refused(tmp_path: Path) -> None:
         plc.restore(kept)
 
 
+def test_a_snapshot_with_other_numbers_than_bytes_is_refused(tmp_path: Path) -> None:
+    plc = bound(tmp_path, SHARED)
+    kept = plc.snapshot()
+    for values, said in (([0, 256], "expected bytes"), ([0, -1], "expected bytes"), ([0], "expected 2 values")):
+        kept["globals"]["located"]["values"] = values
+        with pytest.raises(StructuredTextError, match=said):
+            plc.restore(kept)
+
+
 def test_two_controllers_share_nothing(tmp_path: Path) -> None:
     one, other = bound(tmp_path, SHARED), bound(tmp_path, SHARED)
     scan(one, 0)
