@@ -9,6 +9,7 @@ from typing import Any
 
 from conveyor_sim.st import tree
 from conveyor_sim.st.errors import SourceError
+from conveyor_sim.st.integers import computed, negated
 from conveyor_sim.st.operations import divide, modulo
 from conveyor_sim.st.scope import Scope
 from conveyor_sim.st.types import (
@@ -24,7 +25,6 @@ from conveyor_sim.st.types import (
     String,
     Structure,
     Type,
-    register,
 )
 from conveyor_sim.st.values import (
     Place,
@@ -33,9 +33,7 @@ from conveyor_sim.st.values import (
     converted,
     described,
     folded,
-    intermediate,
     operand,
-    reach,
     unified,
     untyped,
 )
@@ -44,7 +42,6 @@ _COMPARED = {"=": "==", "<>": "!=", "<": "<", ">": ">", "<=": "<=", ">=": ">="}
 _LOGIC = {"AND": "&", "OR": "|", "XOR": "^"}
 _ARITHMETIC = {"+", "-", "*", "/", "**", "MOD"}
 _SHORT = {"AND_THEN": "and", "OR_ELSE": "or"}
-_EXACT_IN_LREAL = 1 << 53
 _EXACT: dict[str, Callable[[Any, Any], Any]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 
 Calls = Callable[["Expressions", tree.Call, "Type | None"], Value]
@@ -257,8 +254,7 @@ class Expressions:
         if value.literal:
             return untyped(node.at, -value.constant)
         if kind.kind == "int":
-            low, high = reach(value, kind)
-            return folded(intermediate(node.at, kind, f"(-{operand(value, kind)})", -high, -low), value)
+            return folded(negated(node.at, kind, value), value)
         code = f"(-{value.code})" if kind.kind == "real" else kind.wrapped(f"-{value.code}")
         return folded(Value(node.at, kind, code), value)
 
@@ -291,7 +287,7 @@ class Expressions:
         if word == "**":
             kind = REAL if kind == REAL or hint == REAL else LREAL
         if kind.kind == "int":
-            return folded(self._whole(node, kind, left, right), left, right)
+            return folded(computed(node, kind, left, right), left, right)
         a, b = converted(left, kind), converted(right, kind)
         joined = {"/": f"_quotient({a}, {b})", "**": f"_power({a}, {b})"}.get(word, f"({a} {word} {b})")
         if word == "MOD":
@@ -304,39 +300,6 @@ class Expressions:
             raw = f"{left.raw if left.kind == 'sum' and left.type == LREAL else a} {word} {b}"
             return folded(Value(node.at, kind, f"({raw})", raw=raw, kind="sum"), left, right)
         return folded(Value(node.at, kind, joined), left, right)
-
-    def _whole(self, node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
-        word, wide = node.operator, register(kind)
-        a, b = operand(left, kind), operand(right, kind)
-        (least, most), (low, high) = reach(left, kind), reach(right, kind)
-        if word == "/":
-            return self._divided(node, kind, (a, least, most), right, b)
-        if word == "MOD":
-            return Value(node.at, kind, f"_modulo({a}, {b})", span=(min(least, 0), max(most, 0)))
-        if word == "*":
-            ends = [one * other for one in (least, most) for other in (low, high)]
-            return intermediate(node.at, kind, f"({a} * {b})", min(ends), max(ends))
-        # A sum of sums wraps once: two's complement is a ring.
-        chained = left.kind == "sum" and left.type.base.kind == "int" and register(left.type.base).width == wide.width
-        raw = f"{left.raw if chained else a} {word} {b}"
-        if chained and left.code != f"({left.raw})":  # wrapped already
-            found = Value(node.at, kind, wide.wrapped(raw), span=(wide.low, wide.high))
-        else:
-            ends = [least + low, most + high] if word == "+" else [least - high, most - low]
-            found = intermediate(node.at, kind, f"({raw})", *ends)
-        return replace(found, raw=raw, kind="sum")
-
-    def _divided(self, node: tree.Binary, kind: Type, left: tuple[str, int, int], right: Value, divisor: str) -> Value:
-        """An integer division. left: code of the dividend, with its least and greatest value."""
-        dividend, least, most = left
-        low, high = reach(right, kind)
-        if low == high == 0:
-            raise SourceError(right.at, "found a division by 0, expected another divisor")
-        greatest = max(abs(least), abs(most))
-        if low == high > 0 and greatest <= _EXACT_IN_LREAL:
-            return Value(node.at, kind, f"int({dividend} / {divisor})", span=(divide(least, low), divide(most, low)))
-        lowest = 0 if least >= 0 and low >= 0 else -greatest
-        return intermediate(node.at, kind, f"_divide({dividend}, {divisor})", lowest, greatest)
 
     def _exact(self, node: tree.Binary, left: Value, right: Value) -> Value:
         a, b, word = left.constant, right.constant, node.operator

@@ -10,8 +10,9 @@ from conveyor_sim.st import tree
 from conveyor_sim.st.conversions import conversion, convert
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.integers import intermediate, reach
 from conveyor_sim.st.types import BOOL, INT, LREAL, NUMBERS, REAL, STRING, TIME, Array, String, Structure, Type, fits
-from conveyor_sim.st.values import Value, converted, described, folded, intermediate, operand, reach, unified
+from conveyor_sim.st.values import Value, converted, described, folded, operand, unified
 
 Build = Callable[["Application"], Value]
 

@@ -156,23 +156,6 @@ def operand(value: Value, kind: Type) -> str:
     return value.code if within(value, wide) else wide.wrapped(value.code)
 
 
-def reach(value: Value, kind: Type) -> tuple[int, int]:
-    """Return the least and greatest value of `operand`."""
-    wide = register(kind)
-    return value.bounds if within(value, wide) else (wide.low, wide.high)
-
-
-def intermediate(at: Position, kind: Type, code: str, low: int, high: int) -> Value:
-    """Return a result of integers from low to high: wrapped in two's complement where `register` can't hold it.
-
-    code stands by itself.
-    """
-    wide = register(kind)
-    if wide.low <= low and high <= wide.high:
-        return Value(at, kind, code, span=(low, high))
-    return Value(at, kind, wide.wrapped(code), span=(wide.low, wide.high))
-
-
 def converted(value: Value, target: Type, what: str = "") -> str:
     """Code of the value in a type. what: it is expected for. Raises SourceError."""
     expected = f"{target.name}{f' for {what}' if what else ''}"
