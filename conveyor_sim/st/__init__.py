@@ -1,11 +1,11 @@
 """PLC programs in Structured Text (IEC 61131-3:2013), as controllers of a line.
 
-A text goes one way: `parse.py` (with `grammar.lark`) makes the tree of `tree.py`; `declarations.py` its types
-(`types.py`) and names (`scope.py`); `expressions.py`, `calls.py` and `statements.py` check what is done and write it as
-Python, and `compile.py` puts that together. `functions.py`, `conversions.py` and `blocks.py` are the standard library,
-`operations.py` what code needs at run time. `program.py` runs it. `library.py` has a program run that another compiler
-has made a shared library of. What the standard leaves open is decided in
-docs/structured_text.md.
+A text goes one way: `pragmas.py` leaves one branch of its conditional pragmas; `parse.py` (with `grammar.lark`) makes
+the tree of `tree.py`; `declarations.py` its types (`types.py`), names (`scope.py`), qualifiers (`sections.py`) and
+addresses (`located.py`); `expressions.py`, `integers.py`, `calls.py` and `statements.py` check what is done and write
+it as Python, and `compile.py` puts that together. `functions.py`, `conversions.py` and `blocks.py` are the standard
+library, `operations.py` what code needs at run time. `program.py` runs it. `library.py` has a program run that another
+compiler has made a shared library of. What the standard leaves open is decided in docs/structured_text.md.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType
@@ -12,6 +14,7 @@ from conveyor_sim.st.calls import PASSED, Calls
 from conveyor_sim.st.declarations import MOST_ELEMENTS, Declarations
 from conveyor_sim.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.located import NOTHING_SHARED, Layout, laid_out
 from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
 from conveyor_sim.st.types import TIME, BlockType, Member, Structure
@@ -60,6 +63,8 @@ class Compiled:
     """Of the text: a snapshot fits the same program only."""
     trace: bool
     """Whether assignments note that they were the last to write."""
+    shared: Mapping[tuple[str, str], int]
+    """By Python class and slot: the memory that a located variable shares with others."""
 
 
 def compile_file(path: Path, trace: bool = False) -> Compiled:
@@ -91,19 +96,23 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
         raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
     calls = Calls(trace)
     declared = calls.declarations = Declarations(source, calls)
+    declared.resolve()
     lines = Lines()
     for one in source.types:
         declared.named(one.at, one.name)
     units = [(unit, _type_of(unit, declared)) for unit in source.units]
     _require_few(declared, units)
+    layout = _layout(source, declared)
+    if layout.size:
+        lines.add(f"_memory = _Memory({layout.size})")
     for unit, kind in units:
-        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls)
+        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, layout)
     if found := calls.recursion():
         node, name = found
         raise SourceError(node.at, f"found a call that leads back to {name}, expected no recursion")
     for structure in declared.structures:
         _class(lines, structure.python, "_Record", list(structure.members.values()))
-    _class(lines, "_Globals", "", list(declared.names.globals.members.values()))
+    _class(lines, "_Globals", "", list(declared.names.globals.members.values()), layout)
     lines.add("_g = _Globals()")
     python = "\n".join(lines.lines) + "\n"
     programs = {unit.name.lower(): kind for unit, kind in units if unit.kind == "PROGRAM"}
@@ -122,7 +131,14 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
         declared.names.globals,
         hashlib.sha256(text.encode()).hexdigest(),
         trace,
+        {place: one.group for place, one in layout.places.items()},
     )
+
+
+def _layout(source: tree.Source, declared: Declarations) -> Layout:
+    """Return the memory that located variables share."""
+    programs = [f"_P_{one.type.lower()}" for configured in source.configurations for one in configured.instances]
+    return laid_out(declared.located, Counter(programs))
 
 
 def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
@@ -141,10 +157,12 @@ def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
     return kind
 
 
-def _unit(unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls) -> None:
+def _unit(
+    unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls, layout: Layout
+) -> None:
     """The class of a unit, whose `run` is its body."""
     members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
-    _class(lines, kind.python, "", members)
+    _class(lines, kind.python, "", members, layout)
     with lines.inner():
         lines.add("def run(self, now=0):", unit.at)
         made = kind.size if kind.function else sum(one.type.size for one in kind.of("VAR_TEMP"))
@@ -175,14 +193,23 @@ def _function(kind: BlockType, lines: Lines) -> None:
             lines.add(f"return self.v_{kind.name.lower()}")
 
 
-def _class(lines: Lines, name: str, base: str, members: list[Member]) -> None:
+def _class(lines: Lines, name: str, base: str, members: list[Member], layout: Layout = NOTHING_SHARED) -> None:
+    """A class with a slot for each variable, and a descriptor for each that shares memory."""
+    places = {one.slot: place for one in members if (place := layout.places.get((name, one.slot))) is not None}
+    memory = "located" if name == "_Globals" and layout.size else ""
+    slots = [one.slot for one in members if one.slot not in places] + [memory] * bool(memory)
     lines.add(f"class {name}({base}):")
     with lines.inner():
-        lines.add(f"__slots__ = ({''.join(f'{one.slot!r}, ' for one in members)})")
+        lines.add(f"__slots__ = ({''.join(f'{slot!r}, ' for slot in slots)})")
+        for slot, place in places.items():
+            lines.add(f"{slot} = {place.code}")
         lines.add("def __init__(self):")
         with lines.inner():
+            if memory:
+                lines.add(f"self.{memory} = _memory")
             for one in members:
-                lines.add(f"self.{one.slot} = {'None' if one.section == 'VAR_IN_OUT' else one.initial}")
+                if one.slot not in places or places[one.slot].sets:
+                    lines.add(f"self.{one.slot} = {'None' if one.section == 'VAR_IN_OUT' else one.initial}")
             lines.add("pass")
 
 

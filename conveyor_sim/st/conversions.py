@@ -2,7 +2,7 @@
 
 Whole numbers and bit strings keep their lowest bits; reals become the nearest whole number, of two the even one, and
 stop the program where the type has none. A DWORD is the bits of a REAL, an LWORD those of an LREAL. A TIME is a number
-of milliseconds, as in CODESYS and TwinCAT: the standard does not say.
+of milliseconds and an LTIME one of nanoseconds, as in CODESYS and TwinCAT: the standard does not say.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ import struct
 from typing import Any
 
 from conveyor_sim.st.errors import Fault, Position, SourceError
-from conveyor_sim.st.literals import duration, time_text
+from conveyor_sim.st.literals import duration, long_time_text, time_text
 from conveyor_sim.st.types import (
     DINT,
     DWORD,
     ELEMENTARY,
     LREAL,
+    LTIME,
     LWORD,
     REAL,
     TIME,
@@ -29,7 +30,8 @@ from conveyor_sim.st.types import (
 )
 from conveyor_sim.st.values import NAMESPACE, Value, converted, described, folded
 
-_MS = 1_000_000
+_UNITS = {TIME: 1_000_000, LTIME: 1}
+"""Nanoseconds that the number 1 stands for."""
 _BASES = {"2": 2, "8": 8, "16": 16}
 _DURATION = re.compile("L?T(IME)?#", re.IGNORECASE)
 _NAME = re.compile(r"(?:(\w+?)_)?(TO|TRUNC)_(\w+)")
@@ -54,7 +56,10 @@ def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
     source, target, cut = found
     if source is not None:
         given = converted(value, source, name)
-        value = Value(at, value.type if isinstance(source, String) else source, given, value.constant)
+        known = value.constant
+        if source.kind == "int" and known is not None:
+            known = source.wrap(known)
+        value = Value(at, value.type if isinstance(source, String) else source, given, known)
     elif value.literal:
         value = Value(at, value.type, value.code, value.constant)
     code = _cut(value, target) if cut else _code(value, target)
@@ -71,7 +76,7 @@ def _cut(value: Value, target: Type) -> str | None:
 
 def _code(value: Value, target: Type) -> str | None:
     source, code = value.type.base, value.code
-    if source == target or source.kind == target.kind == "string":
+    if (source == target and source.kind != "int") or source.kind == target.kind == "string":
         return f"{code}[:{target.high}]" if isinstance(target, String) else code
     if isinstance(target, String):
         return _to_text(source, code)
@@ -87,13 +92,16 @@ def _code(value: Value, target: Type) -> str | None:
         if source.kind == "bits":
             pairs = {(DWORD, REAL): "_from_dword", (LWORD, LREAL): "_from_lword"}
             return f"{pairs[source, target]}({code})" if (source, target) in pairs else None
-        number = f"{code} / {_MS}.0" if source == TIME else code
+        number = f"{code} / {_UNITS[source]}.0" if source.kind == "time" else code
         return f"_single({number})" if target == REAL else f"float({number})"
-    if target == TIME:
-        return TIME.wrapped(f"{code} * {_MS}")
-    if source == TIME:
-        code = f"_divide({code}, {_MS})"
-    return code if target.low <= source.low and source.high <= target.high and source != TIME else target.wrapped(code)
+    if source.kind == target.kind == "time":
+        return code
+    if target.kind == "time":
+        return target.wrapped(f"{code} * {_UNITS[target]}")
+    if source.kind == "time":
+        return target.wrapped(f"_divide({code}, {_UNITS[source]})")
+    low, high = value.bounds if source.kind == "int" else (source.low, source.high)
+    return code if target.low <= low and high <= target.high else target.wrapped(code)
 
 
 def _from_real(source: Type, code: str, target: Type) -> str | None:
@@ -102,8 +110,8 @@ def _from_real(source: Type, code: str, target: Type) -> str | None:
         return f"{pairs[source, target]}({code})" if (source, target) in pairs else None
     if target.kind == "real":
         return f"_single({code})" if target == REAL else code
-    if target == TIME:
-        return f"_nearest({code} * {_MS}, {TIME.low}, {TIME.high})"
+    if target.kind == "time":
+        return f"_nearest({code} * {_UNITS[target]}, {target.low}, {target.high})"
     return f"_nearest({code}, {target.low}, {target.high})"
 
 
@@ -111,7 +119,7 @@ def _to_text(source: Type, code: str) -> str | None:
     if isinstance(source, Enumeration):
         return f"dict({ {value: name for name, value in source.values}!r}).get({code}, '')"
     names = {"bool": "_bool_text", "int": "str", "bits": "str", "time": "_time_text", "real": "repr"}
-    name = "_single_text" if source == REAL else names.get(source.kind)
+    name = {REAL: "_single_text", LTIME: "_long_time_text"}.get(source) or names.get(source.kind)
     return f"{name}({code})" if name else None
 
 
@@ -140,7 +148,7 @@ def _parsed(text: str, name: str) -> Any:
             whole = int(digits, _BASES[base]) if hash_ else int(given)
             if target.low <= whole <= target.high:
                 return whole
-        if target == TIME and _DURATION.match(given):
+        if target.kind == "time" and _DURATION.match(given):
             return duration(Position(1, 1), given)
     except (ValueError, KeyError, SourceError):
         pass
@@ -156,6 +164,7 @@ NAMESPACE.update(
     _bool_text=_bool_text,
     _single_text=_single_text,
     _time_text=time_text,
+    _long_time_text=long_time_text,
     _from_dword=_bits("<I", "<f"),
     _from_lword=_bits("<Q", "<d"),
     _to_dword=_bits("<f", "<I"),

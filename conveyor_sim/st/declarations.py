@@ -9,7 +9,9 @@ from conveyor_sim.st import tree
 from conveyor_sim.st.blocks import STANDARD
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.located import Located, address_of, require_fit
 from conveyor_sim.st.scope import Names, Scope
+from conveyor_sim.st.sections import LOCATED, OUTSIDE, meaning
 from conveyor_sim.st.types import (
     ELEMENTARY,
     Array,
@@ -32,11 +34,8 @@ MOST_ELEMENTS = 1_000_000
 MOST_LEVELS = 100
 """Structures and blocks one within the other."""
 
-_SECTIONS = {
-    "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
-    "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"),
-    "PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_EXTERNAL", "VAR_TEMP"),
-}
+MOST_CONSTANTS = 50
+"""Global variables whose initial values use each other, as a chain."""
 
 
 class Declarations:
@@ -47,6 +46,8 @@ class Declarations:
         self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
         self.structures: list[Structure] = []
         """Those declared, each after what it contains."""
+        self.located: list[Located] = []
+        """Variables with addresses."""
         self._calls = calls
         self._pending: dict[str, tree.TypeDeclaration | tree.Unit] = {}
         self._functions: dict[str, tree.Unit] = {}
@@ -66,9 +67,12 @@ class Declarations:
             (*source.globals, *(one for config in source.configurations for one in config.globals))
         )
         self.names.read = self._read
-        for one in source.types:
-            if isinstance(one.type, tree.EnumType):
-                self.named(one.at, one.name)
+        self._enumerations = [one for one in source.types if isinstance(one.type, tree.EnumType)]
+
+    def resolve(self) -> None:
+        """Resolve enumerations and global variables, whose values may call functions. Raise SourceError."""
+        for one in self._enumerations:
+            self.named(one.at, one.name)
         order = list(self._globals)
         for key in order:
             self._read(key)
@@ -89,8 +93,11 @@ class Declarations:
     def _read(self, key: str) -> None:
         """Take up a global variable, if there is one of that name and it is not known yet."""
         if (section := self._globals.pop(key, None)) is not None:
+            if len(self.names.reading) == MOST_CONSTANTS:
+                at, found = section.declarations[0].at, f"found {MOST_CONSTANTS} initial values that use each other"
+                raise SourceError(at, f"{found}, expected a shorter chain")
             self.names.reading.add(key)
-            self._members(self.names.globals, (section,), ("VAR_GLOBAL",))
+            self._members(self.names.globals, (section,), OUTSIDE)
             self.names.reading.remove(key)
 
     def scope(self, unit: BlockType | None) -> Scope:
@@ -225,7 +232,7 @@ class Declarations:
         kind = BlockType(
             unit.name, "block", python=prefix + unit.name.lower(), function=unit.kind == "FUNCTION", result=result
         )
-        self._members(kind, unit.sections, _SECTIONS[unit.kind])
+        self._members(kind, unit.sections, unit.kind)
         if result is not None:
             name = unit.name.lower()
             if name in kind.members:
@@ -238,17 +245,13 @@ class Declarations:
         self._bound(kind, unit.at)
         return kind
 
-    def _members(self, kind: BlockType, sections: Iterable[tree.Variables], allowed: tuple[str, ...]) -> None:
+    def _members(self, kind: BlockType, sections: Iterable[tree.Variables], unit: str) -> None:
+        """Add the variables of a unit; unit: its kind, as `sections.py` has it."""
         known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
         for section in sections:
-            if section.section not in allowed:
-                raise SourceError(section.at, f"found {section.section}, expected one of {', '.join(allowed)}")
-            if "PERSISTENT" in section.qualifiers and "RETAIN" not in section.qualifiers:
-                section = replace(section, qualifiers=(*section.qualifiers, "RETAIN"))
-            if "RETAIN" in section.qualifiers and "CONSTANT" in section.qualifiers:
-                raise SourceError(section.at, "found CONSTANT RETAIN, expected one of them")
+            qualifiers = meaning(section, unit)
             for declared in section.declarations:
-                self._add(kind, declared, section.section, section.qualifiers, known)
+                self._add(kind, declared, section.section, qualifiers, known)
 
     def _add(
         self,
@@ -261,10 +264,11 @@ class Declarations:
         key = declared.name.lower()
         if key in kind.members:
             raise SourceError(declared.at, f"found {declared.name} again, expected another name")
-        outer = kind is self.names.globals or kind.python.startswith("_P_")
-        if (declared.tag or declared.address) and not outer:
+        unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
+        if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
             written = declared.address or f"{{tag: {declared.tag}}}"
-            raise SourceError(declared.at, f"found {written}, expected it in a PROGRAM or VAR_GLOBAL only")
+            where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
+            raise SourceError(declared.at, f"found {written}, expected it in {where}")
         found = self._type(declared.type, known)
         if isinstance(found, BlockType) and (found.function or found.python.startswith("_P_")):
             raise SourceError(declared.at, f"found {found.name}, expected a type or a function block")
@@ -283,18 +287,24 @@ class Declarations:
             if shared is None or shared.type != found:
                 there = "none of that name" if shared is None else shared.type.name
                 raise SourceError(declared.at, f"found {declared.name} : {found.name}, {there} in VAR_GLOBAL")
-        kind.members[key] = Member(
+        kind.members[key] = member = Member(
             declared.name,
             found,
             code,
             section,
             constant,
             "RETAIN" in qualifiers,
+            "NON_RETAIN" in qualifiers,
             value,
             declared.address,
             declared.tag,
             declared.at,
         )
+        if declared.address:
+            address = address_of(declared.at, declared.address)
+            require_fit(declared.at, declared.name, found, address, constant)
+            initial = declared.initial is not None or bool(found.start)
+            self.located.append(Located(kind.python, member, address, initial))
 
     def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
         """Code of an initial value, made of constants."""

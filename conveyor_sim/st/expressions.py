@@ -9,12 +9,14 @@ from typing import Any
 
 from conveyor_sim.st import tree
 from conveyor_sim.st.errors import SourceError
+from conveyor_sim.st.integers import computed, negated
 from conveyor_sim.st.operations import divide, modulo
 from conveyor_sim.st.scope import Scope
 from conveyor_sim.st.types import (
     BOOL,
     ELEMENTARY,
     LREAL,
+    LTIME,
     REAL,
     STRING,
     TIME,
@@ -31,7 +33,7 @@ from conveyor_sim.st.values import (
     converted,
     described,
     folded,
-    text_of,
+    operand,
     unified,
     untyped,
 )
@@ -121,7 +123,7 @@ class Expressions:
             if node.kind == "bool":
                 return constant(node.at, BOOL, node.value)
             if node.kind == "time":
-                return constant(node.at, TIME, node.value)
+                return constant(node.at, LTIME if node.text[0] in "lL" else TIME, node.value)
             kind = WSTRING if node.kind == "wide" else STRING
             return constant(node.at, replace(kind, high=len(str(node.value))), node.value)
         target = ELEMENTARY.get(node.type)
@@ -207,7 +209,8 @@ class Expressions:
             if not low <= value.constant <= high:
                 raise SourceError(node.at, f"found index {value.constant}, expected {low} to {high}")
             return str(value.constant - low)
-        if low <= value.type.low and value.type.high <= high:
+        least, most = value.bounds
+        if low <= least and most <= high:
             return f"{value.code} - {low}" if low else value.code
         # The condition comes first, and nothing between it and what it guards gives _i another value.
         shifted = f"_i - {low}" if low > 0 else f"_i + {-low}" if low else "_i"
@@ -250,6 +253,8 @@ class Expressions:
             return value
         if value.literal:
             return untyped(node.at, -value.constant)
+        if kind.kind == "int":
+            return folded(negated(node.at, kind, value), value)
         code = f"(-{value.code})" if kind.kind == "real" else kind.wrapped(f"-{value.code}")
         return folded(Value(node.at, kind, code), value)
 
@@ -274,16 +279,16 @@ class Expressions:
             return self._logic(node, left, right)
         if left.literal and right.literal:
             return self._exact(node, left, right)
-        if TIME in (left.type, right.type):
+        if "time" in (left.type.base.kind, right.type.base.kind):
             return self._time(node, left, right)
         kind = unified(left, right, hint)
         if kind is None or kind.kind not in ("int", "real"):
             raise self._no_operator(node, left, right, "numbers")
         if word == "**":
             kind = REAL if kind == REAL or hint == REAL else LREAL
-        a, b = _operand(left, kind), _operand(right, kind)
         if kind.kind == "int":
-            return folded(self._whole(node, kind, left, a, right, b), left, right)
+            return folded(computed(node, kind, left, right), left, right)
+        a, b = converted(left, kind), converted(right, kind)
         joined = {"/": f"_quotient({a}, {b})", "**": f"_power({a}, {b})"}.get(word, f"({a} {word} {b})")
         if word == "MOD":
             raise self._no_operator(node, left, right, "whole numbers")
@@ -295,23 +300,6 @@ class Expressions:
             raw = f"{left.raw if left.kind == 'sum' and left.type == LREAL else a} {word} {b}"
             return folded(Value(node.at, kind, f"({raw})", raw=raw, kind="sum"), left, right)
         return folded(Value(node.at, kind, joined), left, right)
-
-    def _whole(self, node: tree.Binary, kind: Type, left: Value, a: str, right: Value, b: str) -> Value:
-        word = node.operator
-        if word == "/":
-            known = right.constant
-            if known == 0:
-                raise SourceError(right.at, f"found a division by {right.constant}, expected another divisor")
-            if known is not None and kind.width <= 32 and known > 0:
-                return Value(node.at, kind, f"int({a} / {b})")  # exact below 2^53
-            return Value(node.at, kind, kind.wrapped(f"_divide({a}, {b})"))
-        if word == "MOD":
-            return Value(node.at, kind, f"_modulo({a}, {b})")
-        if word == "*":
-            return Value(node.at, kind, kind.wrapped(f"{a} * {b}"))
-        # A sum of sums wraps once: two's complement is a ring.
-        raw = f"{left.raw if left.kind == 'sum' and left.type == kind else a} {word} {b}"
-        return Value(node.at, kind, kind.wrapped(raw), raw=raw, kind="sum")
 
     def _exact(self, node: tree.Binary, left: Value, right: Value) -> Value:
         a, b, word = left.constant, right.constant, node.operator
@@ -327,25 +315,28 @@ class Expressions:
         return replace(folded(Value(node.at, LREAL, f"_power({float(a)}, {float(b)})"), left, right), literal="real")
 
     def _time(self, node: tree.Binary, left: Value, right: Value) -> Value:
+        """TIME and LTIME, of which LTIME is the type of what both take part in."""
         word = node.operator
-        if left.type == right.type == TIME and word in "+-":
-            return folded(Value(node.at, TIME, TIME.wrapped(f"{left.code} {word} {right.code}")), left, right)
-        number, time = (left, right) if right.type == TIME else (right, left)
+        times = [one for one in (left, right) if one.type.base.kind == "time"]
+        kind = LTIME if any(one.type.base == LTIME for one in times) else TIME
+        if len(times) == 2 and word in "+-":
+            return folded(Value(node.at, kind, kind.wrapped(f"{left.code} {word} {right.code}")), left, right)
+        time, number = times[0], right if times[0] is left else left
         if number.type.base.kind in ("int", "real") and (word == "*" or (word == "/" and time is left)):
             real = number.type.base.kind == "real"
             if word == "*":
-                code = f"_nearest({time.code} * {number.code}, {TIME.low}, {TIME.high})" if real else ""
-                return folded(Value(node.at, TIME, code or TIME.wrapped(f"{time.code} * {number.code}")), left, right)
+                code = f"_nearest({time.code} * {number.code}, {kind.low}, {kind.high})" if real else ""
+                return folded(Value(node.at, kind, code or kind.wrapped(f"{time.code} * {number.code}")), left, right)
             exact = f"_quotient({time.code}, {number.code})" if real else f"_divide({time.code}, {number.code})"
-            code = f"_nearest({exact}, {TIME.low}, {TIME.high})" if real else exact
-            return folded(Value(node.at, TIME, code), left, right)
+            code = f"_nearest({exact}, {kind.low}, {kind.high})" if real else exact
+            return folded(Value(node.at, kind, code), left, right)
         raise self._no_operator(node, left, right, "TIME with TIME (+, -) or with a number (*, /)")
 
     def _compared(self, node: tree.Binary, left: Value, right: Value) -> Value:
         kind = unified(left, right, None)
         if kind is None or isinstance(kind, (Array, Structure)):
             raise self._no_operator(node, left, right, "values of one type")
-        a, b = (one.code if kind.kind == "string" else converted(one, kind) for one in (left, right))
+        a, b = (one.code if kind.kind == "string" else operand(one, kind) for one in (left, right))
         return folded(Value(node.at, BOOL, f"({a} {_COMPARED[node.operator]} {b})"), left, right)
 
     def _logic(self, node: tree.Binary, left: Value, right: Value) -> Value:
@@ -360,8 +351,3 @@ class Expressions:
     def _no_operator(self, node: tree.Binary, left: Value, right: Value, expected: str) -> SourceError:
         found = f"{described(left)} {node.operator} {described(right)}"
         return SourceError(node.at, f"found {found}, expected {expected}")
-
-
-def _operand(value: Value, kind: Type) -> str:
-    """Code of an operand; its subrange is not looked at again."""
-    return text_of(value.constant) if value.constant is not None and kind.kind == "int" else converted(value, kind)

@@ -10,8 +10,9 @@ from conveyor_sim.st import tree
 from conveyor_sim.st.conversions import conversion, convert
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
+from conveyor_sim.st.integers import intermediate, reach
 from conveyor_sim.st.types import BOOL, INT, LREAL, NUMBERS, REAL, STRING, TIME, Array, String, Structure, Type, fits
-from conveyor_sim.st.values import Value, converted, described, folded, unified
+from conveyor_sim.st.values import Value, converted, described, folded, operand, unified
 
 Build = Callable[["Application"], Value]
 
@@ -42,9 +43,11 @@ class Application:
             return self.hint.base if first.literal == "int" or self.hint.base.kind == "real" else LREAL
         return first.type.base
 
-    def given(self, code: str, kind: Type) -> Value:
-        """What it comes to."""
-        return folded(Value(self.at, kind, code), *self.values)
+    def given(self, code: str, kind: Type, values: Sequence[Value] = ()) -> Value:
+        """Return the result. values: those of a result that is one of them, as wide as they are."""
+        reached = [reach(one, kind) for one in values] if kind.kind == "int" else []
+        span = (min(low for low, _ in reached), max(high for _, high in reached)) if reached else None
+        return folded(Value(self.at, kind, code, span=span), *self.values)
 
     def refuse(self, value: Value, expected: str) -> SourceError:
         """What is said where an argument can't be."""
@@ -79,8 +82,10 @@ def _abs(call: Application) -> Value:
     kind = call.joined([value])
     if kind.kind not in ("int", "real"):
         raise call.refuse(value, "a number")
-    code = f"abs({converted(value, kind)})"
-    return call.given(kind.wrapped(code) if kind.kind == "int" and kind.low < 0 else code, kind)
+    code = f"abs({operand(value, kind)})"
+    if kind.kind == "real":
+        return call.given(code, kind)
+    return folded(intermediate(call.at, kind, code, 0, max(map(abs, reach(value, kind)))), value)
 
 
 def _operator(word: str) -> Build:
@@ -98,7 +103,7 @@ def _compare(call: Application) -> Value:
     kind = call.joined(call.values)
     if isinstance(kind, (Array, Structure)):
         raise call.refuse(call.values[0], "an elementary type")
-    codes = [one.code if kind.kind == "string" else converted(one, kind) for one in call.values]
+    codes = [one.code if kind.kind == "string" else operand(one, kind) for one in call.values]
     return call.given(f"_chain(_{call.name.lower()}, {', '.join(codes)})", BOOL)
 
 
@@ -110,14 +115,14 @@ def _pick(python: str, ordered: bool, before: int = 0) -> Build:
         kind = call.joined(values)
         if ordered and (isinstance(kind, (Array, Structure)) or kind == BOOL):
             raise call.refuse(values[0], "numbers, times or texts")
-        codes = [one.code if kind.kind == "string" else converted(one, kind) for one in values]
+        codes = [one.code if kind.kind == "string" else operand(one, kind) for one in values]
         if kind.kind == "string":
             kind = STRING if not call.values else max((one.type for one in values), key=lambda one: one.high)
         if python == "SEL":
             code = f"_sel({converted(choice[0], BOOL, 'G of SEL')}, {', '.join(codes)})"
         else:
             code = f"{python}({', '.join([*(call.whole(one) for one in choice), *codes])})"
-        return call.given(code, kind)
+        return call.given(code, kind, values)
 
     return build
 

@@ -56,6 +56,11 @@ def duration(at: Position, text: str) -> int:
     return sign * total
 
 
+def long_time_text(value: int) -> str:
+    """Return a duration as a literal of LTIME: LTIME#1m30s."""
+    return f"LTIME{time_text(value)[1:]}"
+
+
 def time_text(value: int) -> str:
     """A duration as it is written: T#1m30s."""
     rest, parts = abs(value), ""

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.scan import ALARMS
 from conveyor_sim.st.compile import Compiled
-from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.st.errors import Position, StructuredTextError
+from conveyor_sim.st.located import address_of, overlapping
 from conveyor_sim.st.types import ELEMENTARY, Member, Type
 
-_ADDRESS = re.compile(r"%([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?")
-_WIDTHS = {"X": "bool", "": "bool", "W": 16, "D": 32, "L": 64}
 _TABLES = {
     ("I", True): "discrete input",
     ("Q", True): "coil",
@@ -87,7 +86,9 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
     not fit, for a direction that can't be, and for a command that two variables give.
     """
     file = compiled.file
-    known = {name: member for name, member, _ in _candidates(compiled)}
+    candidates = list(_candidates(compiled))
+    known = {one.name for one in candidates}
+    groups = {one.name: one.group for one in candidates if one.group is not None}
     for name in given:
         if name.lower() not in known:
             raise StructuredTextError(
@@ -97,7 +98,7 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
     by_identifier = _by_identifier(tags)
     bound: list[Bound] = []
     left: list[str] = []
-    for name, member, shared in _candidates(compiled):
+    for name, member, shared in ((one.name, one.member, one.is_global) for one in candidates):
         where = f"{file}:{member.at[0]}:{member.at[1]}: {member.name}"
         tag, how = wanted.get(name) or member.tag, "tag"
         if not tag and member.address:
@@ -110,22 +111,39 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
             left.append(name)
     given_by: dict[str, str] = {}
     for one in bound:
-        if not one.is_input and one.tag in given_by:
-            both = f"{given_by[one.tag]} and {one.variable}"
+        other = given_by.get(one.tag, one.variable)
+        if not one.is_input and groups.get(other, other) != groups.get(one.variable, one.variable):
+            both = f"{other} and {one.variable}"
             raise StructuredTextError(f"{file}: {one.tag}: found {both} for it, expected one variable")
         if not one.is_input:
             given_by[one.tag] = one.variable
+    _require_one_tag(file, bound, groups)
+    if not addresses:
+        _require_apart(file, candidates, bound)
+    tagged = {groups[one.variable] for one in bound if one.variable in groups}
+    left = [name for name in left if groups.get(name) not in tagged]
     return Mapped(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in given_by))
 
 
-def _candidates(compiled: Compiled) -> Iterator[tuple[str, Member, bool]]:
-    """Variables that may be tags, by their whole names; and whether they are global."""
+@dataclass(frozen=True)
+class Candidate:
+    """A variable that may be a tag, by its whole name. group: of the located variables that share memory with it."""
+
+    name: str
+    member: Member
+    is_global: bool
+    group: int | None
+
+
+def _candidates(compiled: Compiled) -> Iterator[Candidate]:
     for member in compiled.globals.members.values():
-        yield member.name.lower(), member, True
+        group = compiled.shared.get((compiled.globals.python, member.slot))
+        yield Candidate(member.name.lower(), member, True, group)
     for program in compiled.programs:
         for member in program.type.members.values():
             if member.section != "VAR_EXTERNAL":
-                yield f"{program.name.lower()}/{member.name.lower()}", member, False
+                group = compiled.shared.get((program.type.python, member.slot))
+                yield Candidate(f"{program.name.lower()}/{member.name.lower()}", member, False, group)
 
 
 def _by_identifier(tags: LineTags) -> dict[str, str]:
@@ -138,28 +156,47 @@ def _by_identifier(tags: LineTags) -> dict[str, str]:
 
 
 def _located(where: str, member: Member, addresses: Addresses) -> str:
-    match = _ADDRESS.fullmatch(member.address)
-    if match is None:
-        raise StructuredTextError(f"{where}: found {member.address}, expected an address such as %IX0.3, %IW5 or %QD2")
-    area, size, number, bit = match.groups()
-    if area == "M":
+    address = address_of(Position(*member.at), member.address)
+    if address.area == "M":
         return ""
-    if size == "B" or (bit is not None and (size not in ("X", "") or int(bit) > 7)):
-        raise StructuredTextError(
-            f"{where}: found {member.address}, expected %IX with a bit from 0 to 7, or %IW, %ID, %IL"
-        )
-    width = _WIDTHS[size]
-    address = int(number) * 8 + int(bit) if bit is not None else int(number)
-    table = _TABLES[area, width == "bool"]
-    if (found := addresses.get((table, address))) is None:
+    table = _TABLES[address.area, address.size == "X"]
+    if (found := addresses.get((table, address.number))) is None:
         return ""
     tag, there = found
-    if there != width:
+    if there != ("bool" if address.size == "X" else address.bits):
         expected = "one bit" if there == "bool" else f"{there} bits"
         raise StructuredTextError(
-            f"{where}: found {member.address} for {tag}, expected {expected} at {table} {address}"
+            f"{where}: found {member.address} for {tag}, expected {expected} at {table} {address.number}"
         )
     return tag
+
+
+def _require_one_tag(file: str, bound: list[Bound], groups: Mapping[str, int]) -> None:
+    """Raise StructuredTextError for two tags of variables that share memory."""
+    tags: dict[int, Bound] = {}
+    for one in bound:
+        if one.variable in groups and (other := tags.setdefault(groups[one.variable], one)).tag != one.tag:
+            found = f"{one.tag} for {one.variable}, and {other.tag} for {other.variable}"
+            raise StructuredTextError(f"{file}: found {found}, expected one tag, because they share memory")
+
+
+def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[Bound]) -> None:
+    """Raise StructuredTextError for variables of %I or %Q that share memory in a PLC, but not without a Modbus map."""
+    tagged = {one.variable for one in bound}
+    spans = []
+    for one in candidates:
+        if one.member.address and not one.member.address.startswith("%M"):
+            address = address_of(Position(*one.member.at), one.member.address)
+            start = address.number * address.bits
+            spans.append((address.area, start, start + address.bits, one))
+    for group in overlapping(spans):
+        own = {one.group if one.group is not None else one.name for one in group}
+        free = [one for one in group if one.name not in tagged]
+        if len(own) > 1 and free:
+            other = next(one for one in group if one is not free[0])
+            found = f"{free[0].name} at {free[0].member.address}, {other.name} at {other.member.address}"
+            expected = "a tag for each or other addresses: bits and registers are two memories"
+            raise StructuredTextError(f"{file}: found {found}, expected {expected}")
 
 
 def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> Bound:

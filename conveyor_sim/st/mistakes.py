@@ -17,6 +17,7 @@ REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
     **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
     **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
+    **dict.fromkeys(("VAR_STAT", "VAR_INST"), "VAR_STAT and VAR_INST; VAR of a block keeps its values"),
     **dict.fromkeys(("DATE", "TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT"), _DATES),
     **dict.fromkeys(("D#", "DATE#", "TIME_OF_DAY#", "TOD#", "DATE_AND_TIME#", "DT#"), _DATES),
     **dict.fromkeys(("LDATE", "LTIME_OF_DAY", "LTOD", "LDATE_AND_TIME", "LDT"), _DATES),
@@ -27,6 +28,7 @@ REFUSED: Mapping[str, str] = {
 SUSPECT: Mapping[str, str] = {
     **dict.fromkeys(("REFERENCE", "REF", "ADR"), "pointers and references"),
     **dict.fromkeys(("METHOD", "PROPERTY", "THIS", "SUPER", "USING"), "classes, methods and namespaces"),
+    **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"), "access specifiers"),
     **dict.fromkeys(("STEP", "TRANSITION", "ACTION"), "SFC"),
     **dict.fromkeys(("JMP", "GOTO"), "jumps"),
     **dict.fromkeys(("UNION",), "unions"),

@@ -118,11 +118,14 @@ def in_range(value: int, low: int, high: int) -> int:
     return value
 
 
-def rounds(first: int, last: int, step: int) -> range:
-    """Values of a FOR's control variable."""
+def rounds(first: int, last: int, step: int, low: int, high: int) -> range:
+    """Return the values of a FOR's control variable, whose type holds low to high. Raise Fault for others."""
     if step == 0:
         raise Fault("found BY 0, expected a step other than 0")
-    return range(first, last + (1 if step > 0 else -1), step)
+    values = range(first, last + (1 if step > 0 else -1), step)
+    if values and not low <= values[-1] <= high:
+        raise Fault(f"found a FOR to {last}, expected a last value that its variable reaches, {low} to {high}")
+    return values
 
 
 def after(values: range, low: int, high: int) -> int:

@@ -17,6 +17,7 @@ from lark.visitors import Transformer
 from conveyor_sim.st import literals, tree
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.mistakes import at_of, not_refused, unexpected
+from conveyor_sim.st.pragmas import selected
 
 _LEVELS = (
     ("OR", "OR_ELSE"),
@@ -47,6 +48,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 def parse(text: str) -> tree.Source:
     """The syntax tree of a file. Raises SourceError."""
+    text = selected(text)
     try:
         with _ONE_AT_A_TIME:
             parser, made = _parser()
@@ -57,11 +59,9 @@ def parse(text: str) -> tree.Source:
     except UnexpectedToken as error:
         raise unexpected(error, text) from None
     except UnexpectedCharacters as error:
-        char = text[error.pos_in_stream]
+        at, char = Position(error.line, error.column), text[error.pos_in_stream]
         hint = "; pointers are not supported" if char == "^" else ""
-        raise SourceError(
-            Position(error.line, error.column), f"found {char!r}, expected Structured Text{hint}"
-        ) from None
+        raise SourceError(at, f"found {char!r}, expected Structured Text{hint}") from None
     assert isinstance(source, tree.Source)
     return source
 

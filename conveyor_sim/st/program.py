@@ -9,8 +9,9 @@ from typing import Any
 
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
+from conveyor_sim.st.located import identity
 from conveyor_sim.st.operations import Root, copied, overwrite
-from conveyor_sim.st.types import TIME, Type
+from conveyor_sim.st.types import Type
 from conveyor_sim.st.values import NAMESPACE
 from conveyor_sim.st.variables import Variable, dump, leaves, load, retain
 
@@ -95,8 +96,7 @@ class Program:
             self._late()
 
     def _noted(self, variable: Root, line: int, column: int) -> None:
-        owner, slot = variable
-        self._written[id(owner), slot] = line, column
+        self._written[identity(*variable)] = line, column
 
     def _place(self, traceback: TracebackType | None) -> str:
         """File, line and column of the innermost statement that was being carried out."""
@@ -149,8 +149,14 @@ class Program:
             raise StructuredTextError(
                 f"{self.compiled.file}: found a snapshot of another program, expected one of this"
             )
+        if self.compiled.shared and "located" not in data["globals"]:
+            raise StructuredTextError(
+                f"{self.compiled.file}: found a snapshot without shared memory, expected one with it"
+            )
         self._begin()
         load(self.globals, data["globals"])
+        if self.compiled.shared and not all(0 <= one < 256 for one in self.globals.located.values):
+            raise StructuredTextError(f"{self.compiled.file}: found a snapshot with wrong memory, expected bytes")
         for name, one in self.instances.items():
             load(one, data["instances"][name])
         self._due = dict(data["due"])
@@ -174,7 +180,7 @@ def python_value(kind: Type, number: float) -> Any:
         return number >= 0.5
     if base.kind == "real":
         return NAMESPACE["_single"](number) if base.name == "REAL" else float(number)
-    whole = round(number * 1e9) if base == TIME else round(number)
+    whole = round(number * 1e9) if base.kind == "time" else round(number)
     if not kind.low <= whole <= kind.high:
         raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
     return whole

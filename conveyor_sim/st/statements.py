@@ -11,8 +11,8 @@ from conveyor_sim.st import tree
 from conveyor_sim.st.calls import Calls
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
-from conveyor_sim.st.types import BlockType, Type
-from conveyor_sim.st.values import Place, assignment, converted, converts, described
+from conveyor_sim.st.types import BlockType, Subrange, Type, register
+from conveyor_sim.st.values import Place, Value, assignment, converted, converts, described, operand
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -126,6 +126,8 @@ class Statements:
             raise SourceError(
                 node.selector.at, f"found {described(selector)}, expected a whole number or an enumeration"
             )
+        if kind.kind == "int" and selector.span is not None:
+            kind = register(kind)
         name = self._name("c")
         self._lines.add(f"{name} = {selector.code}", node.at)
         taken: list[tuple[int, int]] = []  # rising
@@ -162,11 +164,11 @@ class Statements:
         kind = control.type
         if kind.base.kind != "int":
             raise SourceError(node.control.at, f"found {described(control)}, expected a variable of an integer type")
-        bounds = [self._expressions.value(bound, kind.base) for bound in (node.first, node.last)]
+        first, last = (self._expressions.value(bound, kind.base) for bound in (node.first, node.last))
         step = "1" if node.step is None else self._step(node.step, kind)
         rounds = self._name("r")
-        codes = ", ".join(converted(bound, kind) for bound in bounds)
-        self._lines.add(f"{rounds} = _rounds({codes}, {step})", node.at)
+        codes = f"{converted(first, kind)}, {self._wide(last, kind)}, {step}, {kind.low}, {kind.high}"
+        self._lines.add(f"{rounds} = _rounds({codes})", node.at)
         self._lines.add(f"for _k in {rounds}:", node.at)
         with self._lines.inner():
             self._lines.add(control.write("_k"), node.at)
@@ -178,13 +180,18 @@ class Statements:
         with self._lines.inner():
             self._lines.add(control.write(f"_after({rounds}, {kind.low}, {kind.high})"), node.at)
 
+    def _wide(self, value: Value, kind: Type) -> str:
+        """Return code of the last value or the step of a FOR: not assigned, so as wide as it was computed."""
+        code = converted(value, kind)
+        return code if value.literal or value.span is None or isinstance(kind, Subrange) else operand(value, kind)
+
     def _step(self, node: tree.Expression, kind: Type) -> str:
         step = self._expressions.value(node, kind.base)
         if step.constant == 0:
             raise SourceError(node.at, "found BY 0, expected a step other than 0")
         if step.literal == "int":  # FOR i := 10 TO 0 BY -1 of a USINT
             return step.code
-        return converted(step, kind.base)
+        return self._wide(step, kind.base)
 
     def _while(self, node: tree.While) -> None:
         self._lines.add(f"while {self._expressions.condition(node.condition)}:", node.at)

@@ -1,7 +1,8 @@
 """The types of the standard: ranges, what converts to what by itself, and how code keeps a value in its type.
 
 Values are Python's: BOOL a bool; integers, bit strings and enumerations an int; REAL and LREAL a float, a REAL rounded
-to 32 bits; TIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an object.
+to 32 bits; TIME and LTIME an int, ns; STRING a str; an array a list, nested by dimension; a structure or a block an
+object.
 """
 
 from __future__ import annotations
@@ -136,6 +137,8 @@ class Member:
     section: str = "VAR"
     constant: bool = False
     retain: bool = False
+    volatile: bool = False
+    """NON_RETAIN: a warm restart initialises it, also within an instance of RETAIN."""
     value: Any = None
     """Of a constant."""
     address: str = ""
@@ -201,14 +204,24 @@ BYTE, WORD, DWORD, LWORD = (
     Type(name, "bits", 0, (1 << bits) - 1) for name, bits in (("BYTE", 8), ("WORD", 16), ("DWORD", 32), ("LWORD", 64))
 )
 REAL, LREAL = Type("REAL", "real"), Type("LREAL", "real")
-TIME = Type("TIME", "time", -(2**63), 2**63 - 1)
+TIME, LTIME = (Type(name, "time", -(2**63), 2**63 - 1) for name in ("TIME", "LTIME"))
 STRING, WSTRING = String("STRING", "string", 0, 80), String("WSTRING", "string", 0, 80)
 VOID = Type("nothing", "void")
 
 INTEGERS = (SINT, USINT, INT, UINT, DINT, UDINT, LINT, ULINT)
 BITS = (BYTE, WORD, DWORD, LWORD)
 NUMBERS = (*INTEGERS, REAL, LREAL)
-ELEMENTARY = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, STRING, WSTRING)} | {"LTIME": TIME}
+ELEMENTARY = {t.name: t for t in (BOOL, *NUMBERS, *BITS, TIME, LTIME, STRING, WSTRING)}
+
+
+def register(kind: Type) -> Type:
+    """Type of intermediate results of an integer type: 32 bits at least, as in CODESYS and TwinCAT.
+
+    USINT and UINT have 64: neither DINT nor UDINT holds both their differences and their products.
+    """
+    if kind.width >= DINT.width:
+        return kind
+    return DINT if kind.low < 0 else LINT
 
 
 def is_wide(kind: Type) -> bool:
@@ -219,7 +232,7 @@ def is_wide(kind: Type) -> bool:
 def fits(source: Type, target: Type) -> bool:
     """Whether a value of one type is one of the other by itself (IEC 61131-3:2013, figure 12): nothing is ever lost."""
     source, into = source.base, target.base
-    if source == into:
+    if source == into or source.kind == into.kind == "time":
         return True
     if source.kind == into.kind == "string":
         return is_wide(source) == is_wide(into)
@@ -236,6 +249,8 @@ def fits(source: Type, target: Type) -> bool:
 
 def common(left: Type, right: Type) -> Type | None:
     """The smallest type that both fit, in which they are compared and computed."""
+    if left.base.kind == right.base.kind == "time":
+        return LTIME if LTIME in (left.base, right.base) else TIME
     if fits(left, right):
         return right.base
     if fits(right, left):

@@ -9,7 +9,8 @@ from typing import Any
 
 from conveyor_sim.st.blocks import CLASSES
 from conveyor_sim.st.errors import Fault, Position, SourceError
-from conveyor_sim.st.literals import time_text
+from conveyor_sim.st.literals import long_time_text, time_text
+from conveyor_sim.st.located import Cell, Memory
 from conveyor_sim.st.operations import NAMES
 from conveyor_sim.st.types import (
     BOOL,
@@ -17,6 +18,7 @@ from conveyor_sim.st.types import (
     INT,
     LINT,
     LREAL,
+    LTIME,
     REAL,
     TIME,
     ULINT,
@@ -28,13 +30,16 @@ from conveyor_sim.st.types import (
     Type,
     common,
     fits,
+    register,
     single,
 )
 
-NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES}
+NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES, "_Memory": Memory, "_Cell": Cell}
 """What code may call."""
 
 _MOST = {REAL: "3.4028235E38", LREAL: "1.7976931348623157E308"}
+
+_EXACT_IN_REAL = 1 << 24
 
 LARGE = 100
 """Elements whose copy takes as long as a round of a loop."""
@@ -55,6 +60,15 @@ class Value:
     """The code before it was brought into its type; for the next operator of the same kind."""
     kind: str = ""
     """Of operators that raw may be followed by."""
+    span: tuple[int, int] | None = None
+    """Least and greatest value of an intermediate result, which may be wider than its integer type (`register`)."""
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Least and greatest value of a whole number."""
+        if self.constant is not None:
+            return int(self.constant), int(self.constant)
+        return self.span or (self.type.low, self.type.high)
 
 
 @dataclass(frozen=True)
@@ -114,7 +128,9 @@ def described(value: Value) -> str:
         return f"the number {value.constant}"
     if value.constant is None:
         return value.type.name
-    return time_text(value.constant) if value.type.base == TIME else f"{value.type.name} {value.constant}"
+    texts = {TIME: time_text, LTIME: long_time_text}
+    text = texts.get(value.type.base)
+    return text(value.constant) if text else f"{value.type.name} {value.constant}"
 
 
 def converts(value: Value, target: Type) -> bool:
@@ -124,12 +140,30 @@ def converts(value: Value, target: Type) -> bool:
     return fits(value.type, target)
 
 
+def within(value: Value, kind: Type) -> bool:
+    """Return True if a type holds every value that a whole number can have."""
+    low, high = value.bounds
+    return kind.low <= low and high <= kind.high
+
+
+def operand(value: Value, kind: Type) -> str:
+    """Return code of an operand in the type that the operands share, integers at the width of `register`."""
+    if kind.kind != "int" or value.literal:
+        return converted(value, kind)
+    wide = register(kind)
+    if value.constant is not None:
+        return text_of(wide.wrap(value.constant))
+    return value.code if within(value, wide) else wide.wrapped(value.code)
+
+
 def converted(value: Value, target: Type, what: str = "") -> str:
     """Code of the value in a type. what: it is expected for. Raises SourceError."""
     expected = f"{target.name}{f' for {what}' if what else ''}"
     if not converts(value, target):
         raise SourceError(value.at, f"found {described(value)}, expected {expected}{_advice(value, target)}")
     into, known = target.base, value.constant
+    if into.kind == "int" and not value.literal and not isinstance(target, Subrange) and not within(value, into):
+        return text_of(into.wrap(value.constant)) if known is not None else into.wrapped(value.code)
     if known is not None and into.kind in ("int", "bits", "bool") and not target.low <= known <= target.high:
         raise SourceError(value.at, f"found {known}, expected {expected}, {target.low} to {target.high}")
     if into.kind == "bool":
@@ -142,10 +176,12 @@ def converted(value: Value, target: Type, what: str = "") -> str:
                     value.at, f"found a number beyond {into.name}, expected {expected}, up to {_MOST[into]}"
                 )
             return text_of(number)
-        return f"float({value.code})" if value.type.base.kind == "int" else value.code
+        if value.type.base.kind != "int":
+            return value.code
+        exact = into == LREAL or max(map(abs, value.bounds)) <= _EXACT_IN_REAL
+        return f"float({value.code})" if exact else f"_single({value.code})"
     if isinstance(target, Subrange) and known is None:
-        inside = target.low <= value.type.low and value.type.high <= target.high
-        return value.code if inside else f"_in_range({value.code}, {target.low}, {target.high})"
+        return value.code if within(value, target) else f"_in_range({value.code}, {target.low}, {target.high})"
     if isinstance(target, String) and target.high < value.type.high:
         return f"{value.code}[:{target.high}]"
     if isinstance(target, BlockType):

@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.st.located import identity
 from conveyor_sim.st.operations import Attribute, Element, Record
-from conveyor_sim.st.types import TIME, Array, BlockType, Structure, Type
+from conveyor_sim.st.types import Array, BlockType, Structure, Type
 
 Step = str | int
 """A slot, or an index from 0."""
@@ -40,14 +41,14 @@ class Variable:
         owner, found = self._owner, (0, "")
         for step in (*self._way, self._last):
             if isinstance(step, str) and not isinstance(owner, Record):
-                found = id(owner), step
+                found = identity(owner, step)
             owner = owner[step] if isinstance(step, int) else getattr(owner, step)
         return found
 
     def number(self) -> float:
         """Its value as a signal has it: a bool is 0 or 1, a TIME is in s, a text is its length."""
         value = self.read()
-        if self.type.base == TIME:
+        if self.type.base.kind == "time":
             return float(value) * 1e-9
         return float(len(value)) if isinstance(value, str) else float(value)
 
@@ -114,24 +115,33 @@ def load(value: Any, data: Any) -> Any:
     return value
 
 
-def retain(kind: Type, old: Any, new: Any) -> None:
-    """Carry RETAIN variables from one value of a type to another, those of blocks within it too."""
+def retain(kind: Type, old: Any, new: Any, inherited: bool = False) -> None:
+    """Carry RETAIN variables from one value of a type to another, those of blocks within it too.
+
+    inherited: the instance itself is RETAIN, so all its variables are except those of NON_RETAIN (IEC 61131-3:2013,
+    6.5.6.2).
+    """
     if isinstance(kind, Array):
         if isinstance(_innermost(kind), Structure):
             inner = replace(kind, ranges=kind.ranges[1:]) if len(kind.ranges) > 1 else kind.element
             for one, other in zip(old, new, strict=True):
-                retain(inner, one, other)
+                retain(inner, one, other, inherited)
         return
-    if not isinstance(kind, Structure) or (isinstance(kind, BlockType) and kind.standard):
+    if not isinstance(kind, Structure):
+        return
+    if isinstance(kind, BlockType) and kind.standard:
+        if inherited:
+            load(new, dump(old))
         return
     for member in kind.members.values():
         if member.section in ("VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP"):
             continue
         before, now = getattr(old, member.slot), getattr(new, member.slot)
-        if member.retain:
+        kept = member.retain or (inherited and not member.volatile)
+        if isinstance(_innermost(member.type), Structure):
+            retain(member.type, before, now, kept)
+        elif kept:
             setattr(new, member.slot, load(now, dump(before)))
-        else:
-            retain(member.type, before, now)
 
 
 def _innermost(kind: Type) -> Type:

@@ -28,7 +28,8 @@ from conveyor_sim.st.program import Program
 CASES = Path(__file__).parent / "cases"
 TICK = 10_000_000  # ns
 TYPED = re.compile(
-    r"\b(?!16#|8#|2#|T#)[A-Z]+#(?:16#[0-9A-F]+|-?[0-9][0-9_.]*(?:[eE][+-]?\d+)?|TRUE|FALSE|'[^']*')|T#-?[\w.]+"
+    r"\b(?!16#|8#|2#|T#|LTIME#)[A-Z]+#(?:16#[0-9A-F]+|-?[0-9][0-9_.]*(?:[eE][+-]?\d+)?|TRUE|FALSE|'[^']*')"
+    r"|\b(?:T|LTIME)#-?[\w.]+"
 )
 
 

@@ -31,15 +31,31 @@ PIECES = (
     "END_PROGRAM", "POINTER", "METHOD", "STEP", "TON", "CTU", "STRING", "STRING[3]", "BOOL", "SINT", "ULINT", "LREAL",
     "TIME", "WORD", "main", "n", "a", "x", "q", "self", "_rt", "__init__", "None", "v_n", "LEN", "MUX", "EXPT", "SHL",
     "REAL_TO_INT", "TO_STRING", "ABS", "TIME()", "\x00", "ü", "\u2028", "\ufeff", "((((((((", "IF a THEN " * 30,
+    "{IF defined (A)}", "{ELSIF NOT defined (B)}", "{ELSE}", "{END_IF}", "{define A}", "{define B 'x'}", "{undefine A}",
+    "AT %MW0", "AT %MX0.0", "AT %MD0", "AT %QX0.0", "LTIME", "LTIME#1s", "NON_RETAIN", "VAR_INPUT CONSTANT", "ABS(-1)",
     "(" * 300, "NOT " * 200, "a." * 100, "[1]" * 100, "FOR i := 1 TO 9 DO " * 25, "+ 1" * 500,
 )  # fmt: skip
 
-TYPES = ("BOOL", "SINT", "UINT", "DINT", "ULINT", "LINT", "REAL", "LREAL", "TIME", "STRING[9]", "BYTE", "LWORD")
+TYPES = (
+    "BOOL",
+    "SINT",
+    "UINT",
+    "DINT",
+    "ULINT",
+    "LINT",
+    "REAL",
+    "LREAL",
+    "TIME",
+    "LTIME",
+    "STRING[9]",
+    "BYTE",
+    "LWORD",
+)
 OPERATORS = ("+", "-", "*", "/", "MOD", "**", "AND", "OR", "XOR", "=", "<>", "<", ">=", "AND_THEN")
 FUNCTIONS = (
     "ABS", "SQRT", "LN", "EXP", "TRUNC", "LEN", "MAX", "MIN", "LIMIT", "SEL", "MUX", "SHL", "ROR", "CONCAT", "MID",
-    "REPLACE", "TO_INT", "TO_BYTE", "TO_LREAL", "TO_REAL", "TO_TIME", "TO_STRING", "TO_BOOL", "EXPT", "LEFT",
-    "DELETE",
+    "REPLACE", "TO_INT", "TO_BYTE", "TO_LREAL", "TO_REAL", "TO_TIME", "TO_LTIME", "TO_STRING", "TO_BOOL", "EXPT",
+    "LEFT", "DELETE",
 )  # fmt: skip
 LITERALS = (
     "0",
