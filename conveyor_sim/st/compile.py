@@ -9,12 +9,12 @@ from types import CodeType
 
 from conveyor_sim.st import tree
 from conveyor_sim.st.calls import PASSED, Calls
-from conveyor_sim.st.declarations import MOST_ELEMENTS, Declarations
+from conveyor_sim.st.declarations import Declarations, require_small
 from conveyor_sim.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
-from conveyor_sim.st.types import TIME, BlockType, Member, Structure
+from conveyor_sim.st.types import TIME, BlockType, Member, Structure, Type
 from conveyor_sim.st.values import LARGE
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -126,13 +126,12 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
 
 
 def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
-    """Raises SourceError for more than MOST_ELEMENTS in all that a file declares."""
-    elements = declared.names.globals.size + sum(one.size for one in declared.structures)
+    """Raises SourceError for more elements or text than a file may declare in all."""
+    shared: list[Type] = [declared.names.globals, *declared.structures]
+    elements, characters = sum(one.size for one in shared), sum(one.characters for one in shared)
     for unit, kind in units:
-        elements += kind.size
-        if elements > MOST_ELEMENTS:
-            found = f"found {elements} elements with those of {unit.name}"
-            raise SourceError(unit.at, f"{found}, expected at most {MOST_ELEMENTS} in all that is declared")
+        elements, characters = elements + kind.size, characters + kind.characters
+        require_small(elements, characters, unit.at, f" with those of {unit.name}")
 
 
 def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
@@ -203,7 +202,7 @@ def _schedule(
             raise SourceError(task.at, f"found {task.name} again, expected another name")
         tasks[key] = _task(task, known)
     found: dict[str, Scheduled] = {}
-    elements = 0
+    elements = characters = 0
     for one in configuration.instances:
         if one.type.lower() not in programs:
             raise SourceError(one.at, f"found {one.type}, expected a PROGRAM: {', '.join(programs) or 'there is none'}")
@@ -215,9 +214,8 @@ def _schedule(
             raise SourceError(one.at, f"found {one.name} again, expected each program once")
         interval, priority = own or (0, LOWEST)
         kind = programs[one.type.lower()]
-        elements += kind.size
-        if elements > MOST_ELEMENTS:
-            raise SourceError(one.at, f"found {elements} elements in programs, expected at most {MOST_ELEMENTS}")
+        elements, characters = elements + kind.size, characters + kind.characters
+        require_small(elements, characters, one.at, " in programs")
         found[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
     if not found:
         raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")

@@ -10,7 +10,21 @@ from conveyor_sim.st import tree
 from conveyor_sim.st.conversions import conversion, convert
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
-from conveyor_sim.st.types import BOOL, INT, LREAL, NUMBERS, REAL, STRING, TIME, Array, String, Structure, Type, fits
+from conveyor_sim.st.types import (
+    BOOL,
+    INT,
+    LREAL,
+    MOST_CHARACTERS,
+    NUMBERS,
+    REAL,
+    STRING,
+    TIME,
+    Array,
+    String,
+    Structure,
+    Type,
+    fits,
+)
 from conveyor_sim.st.values import Value, converted, described, folded, unified
 
 Build = Callable[["Application"], Value]
@@ -146,7 +160,7 @@ def _texts(parameters: str, result: str) -> Build:
         grows = call.name in ("CONCAT", "INSERT", "REPLACE")
         texts = [one.type for one in call.values if one.type.kind == "string"]
         most = sum(one.high for one in texts) if grows else texts[0].high
-        longest = min(32767, most)
+        longest = min(MOST_CHARACTERS, most)
         kind = INT if result == "n" else String(texts[0].name.partition("[")[0], "string", 0, longest)
         return call.given(f"{python}({', '.join(codes)})", kind)
 

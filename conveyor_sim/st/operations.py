@@ -9,11 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from conveyor_sim.st.errors import Fault
-from conveyor_sim.st.types import single
-
-MOST_CHARACTERS = 32767
-"""Of any text."""
-
+from conveyor_sim.st.types import MOST_CHARACTERS, single
 
 Root = tuple[Any, str]
 """A variable of a unit: the instance, and its slot."""
@@ -227,9 +223,9 @@ def mid(text: str, count: int, place: int) -> str:
 
 
 def insert(text: str, other: str, place: int) -> str:
-    """INSERT: another text behind a place."""
+    """INSERT: another text behind a place, cut at the longest length of a text."""
     _count("INSERT", place)
-    return text[:place] + other + text[place:]
+    return (text[:place] + other + text[place:])[:MOST_CHARACTERS]
 
 
 def delete(text: str, count: int, place: int) -> str:
@@ -239,9 +235,9 @@ def delete(text: str, count: int, place: int) -> str:
 
 
 def replace(text: str, other: str, count: int, place: int) -> str:
-    """REPLACE"""
+    """REPLACE, cut at the longest length of a text."""
     begin = _place("REPLACE", place) - 1
-    return text[:begin] + other + text[begin + _count("REPLACE", count) :]
+    return (text[:begin] + other + text[begin + _count("REPLACE", count) :])[:MOST_CHARACTERS]
 
 
 def _count(name: str, value: int) -> int:

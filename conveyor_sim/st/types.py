@@ -12,6 +12,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+MOST_CHARACTERS = 32767
+"""Longest text of any kind, intermediate results included: INT, the result type of LEN, holds this length."""
+
 Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
 
 _SINGLE = array("f", [0.0])
@@ -48,6 +51,11 @@ class Type:
     def size(self) -> int:
         """Elementary variables within one of it."""
         return 1
+
+    @property
+    def characters(self) -> int:
+        """Sum of the declared lengths of all texts within one value."""
+        return self.high if self.kind == "string" else 0
 
     @property
     def width(self) -> int:
@@ -124,6 +132,11 @@ class Array(Type):
         """Of all its elements."""
         return math.prod(high - low + 1 for low, high in self.ranges) * self.element.size
 
+    @property
+    def characters(self) -> int:
+        """Sum of the declared lengths of all texts in the array."""
+        return math.prod(high - low + 1 for low, high in self.ranges) * self.element.characters
+
 
 @dataclass(frozen=True)
 class Member:
@@ -165,8 +178,16 @@ class Structure(Type):
     @cached_property
     def size(self) -> int:  # once all members are known
         """Of all its members but those that are elsewhere."""
-        own = [one.type.size for one in self.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
-        return max(1, sum(own))
+        return max(1, sum(one.type.size for one in self._own()))
+
+    @cached_property
+    def characters(self) -> int:  # once all members are known
+        """Sum of the declared lengths of all texts in its members."""
+        return sum(one.type.characters for one in self._own())
+
+    def _own(self) -> list[Member]:
+        """Return the members whose values are stored in the object itself."""
+        return [one for one in self.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Structure) and self.python == other.python
