@@ -15,7 +15,7 @@ from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
 from conveyor_sim.st.types import TIME, BlockType, Member, Structure, Type
-from conveyor_sim.st.values import LARGE
+from conveyor_sim.st.work import statements
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -146,13 +146,11 @@ def _unit(unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lin
     _class(lines, kind.python, "", members)
     with lines.inner():
         lines.add("def run(self, now=0):", unit.at)
-        made = kind.size if kind.function else sum(one.type.size for one in kind.of("VAR_TEMP"))
+        made = kind.work if kind.function else sum(one.type.work for one in kind.of("VAR_TEMP"))
         with lines.inner():
-            lines.add(f"_rt.left -= {1 + made // LARGE}", unit.at)
-            lines.add("if _rt.left < 0: _late()", unit.at)
             for member in kind.of("VAR_TEMP"):
                 lines.add(f"self.{member.slot} = {member.initial}")
-        Statements(lines, expressions, calls).block(unit.body)
+        Statements(lines, expressions, calls).block(unit.body, unit.at, statements(made))
     if kind.function:
         _function(kind, lines)
 

@@ -328,6 +328,7 @@ NAMES: dict[str, Any] = {
     "_replace": replace,
     "_concat": concat,
     "_find": find,
+    **{f"_{one.__name__}_counted": one for one in (left, right, mid, insert, delete, replace, concat, find)},
     "_limit": limit,
     "_mux": mux,
     "_sel": sel,

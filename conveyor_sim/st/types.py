@@ -17,6 +17,9 @@ MOST_CHARACTERS = 32767
 
 Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
 
+_LIST, _OBJECT, _MEMBER, _ELEMENTS = 4, 6, 2, 16
+"""Work of making one list, one object and one of its members; elements of a list that count 1 together (`work.py`)."""
+
 _SINGLE = array("f", [0.0])
 
 
@@ -56,6 +59,11 @@ class Type:
     def characters(self) -> int:
         """Sum of the declared lengths of all texts within one value."""
         return self.high if self.kind == "string" else 0
+
+    @property
+    def work(self) -> int:
+        """Work of making or copying a value, beyond that of the statement that does it."""
+        return 0
 
     @property
     def width(self) -> int:
@@ -137,6 +145,14 @@ class Array(Type):
         """Sum of the declared lengths of all texts in the array."""
         return math.prod(high - low + 1 for low, high in self.ranges) * self.element.characters
 
+    @property
+    def work(self) -> int:
+        """Work of its lists, nested by dimension, and of their elements."""
+        lists, elements = 0, 1
+        for low, high in self.ranges:
+            lists, elements = lists + elements, elements * (high - low + 1)
+        return _LIST * lists + elements // _ELEMENTS + elements * self.element.work
+
 
 @dataclass(frozen=True)
 class Member:
@@ -184,6 +200,11 @@ class Structure(Type):
     def characters(self) -> int:  # once all members are known
         """Sum of the declared lengths of all texts in its members."""
         return sum(one.type.characters for one in self._own())
+
+    @cached_property
+    def work(self) -> int:  # once all members are known
+        """Work of the object and its members."""
+        return _OBJECT + sum(_MEMBER + one.type.work for one in self._own())
 
     def _own(self) -> list[Member]:
         """Return the members whose values are stored in the object itself."""
