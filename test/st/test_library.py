@@ -112,7 +112,10 @@ def test_its_instance_is_destroyed_at_the_end(tmp_path: Path) -> None:
         ("*(volatile int *)0 = 1;", r"broken\.so: ended by SIGSEGV in scan, expected an answer"),
         ("abort();", r"broken\.so: ended by SIGABRT in scan, expected an answer"),
         ("exit(3);", r"broken\.so: ended with code 3 in scan, expected an answer"),
-        ("for (;;) thrd_sleep(&(struct timespec){.tv_sec = 1}, 0);", r"broken\.so: watchdog: scan took more than 5 s of wall time"),
+        (
+            "for (;;) thrd_sleep(&(struct timespec){.tv_sec = 1}, 0);",
+            r"broken\.so: watchdog: scan took more than 5 s of wall time",
+        ),
         ("return 7;", r"broken\.so: the program has stopped, with code 7"),
     ],
 )
