@@ -114,7 +114,9 @@ class CompiledProgram:
         if not select.select([process.stdout], [], [], self._patience)[0]:
             process.kill()
             self.close()
-            raise ControlError(f"{self._path}: watchdog: {do} took more than {self._patience:g} s of wall time, expected less")
+            raise ControlError(
+                f"{self._path}: watchdog: {do} took more than {self._patience:g} s of wall time, expected less"
+            )
         line = process.stdout.readline()
         if not line.endswith(b"\n"):
             raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer")
