@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ctrl_c import restore_for_children
 
 HERE = Path(__file__).parent
 QUICK = frozenset({"control", "effects", "laws", "model", "scene", "state", "support", "timestep"})
@@ -24,6 +25,10 @@ LONGEST = (
     "test_simulation.py",
 )  # fmt: skip
 """Other files that took more than 35 s where three processes shared two cores, the longest first."""
+
+
+def pytest_configure() -> None:
+    restore_for_children()
 
 
 def pytest_collection() -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -93,13 +94,18 @@ def test_package_xml_names_every_ros_package_that_is_imported() -> None:
     assert ros | {"rclpy"} <= declared | {"simulation_interfaces"}  # served only where it is installed
 
 
-def test_ros_finds_the_package_in_the_environment_of_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As `ros2 pkg prefix`, `ros2 run` and `ros2 launch` look for it; set up twice, as after a change."""
-    index = pytest.importorskip("ament_index_python", reason="needs ROS 2")
+def set_up_module() -> Any:
     spec = importlib.util.spec_from_file_location("set_up", ROOT / "tools" / "set_up.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def test_ros_finds_the_package_in_the_environment_of_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `ros2 pkg prefix`, `ros2 run` and `ros2 launch` look for it; set up twice, as after a change."""
+    index = pytest.importorskip("ament_index_python", reason="needs ROS 2")
+    module = set_up_module()
     distribution = importlib.metadata.distribution("conveyor_sim")
     installed = tmp_path / "lib" / "python3.11" / "site-packages" / "conveyor_sim-0.dist-info"
     installed.mkdir(parents=True)
@@ -221,6 +227,40 @@ def test_set_up_without_compiler_says_what_to_install(empty_machine: Path) -> No
     assert result.stderr.startswith("There is no C compiler (cc or gcc or clang) on PATH")
     assert result.stderr.count("\n") == 1
     assert not (empty_machine / ".venv").exists()
+
+
+@pytest.mark.parametrize(
+    "folder", ["a:b", "what's", 'a"b', "$HOME", "a`b", "a\\b", "a#1", "50%", "a;b", "a\tb", "a\nb"]
+)
+def test_set_up_in_a_folder_that_cannot_work_says_so_first(empty_machine: Path, folder: str) -> None:
+    (empty_machine / "bin" / "python3").symlink_to(base_python())
+    checkout = empty_machine / folder / "conveyor_sim"
+    checkout.mkdir(parents=True)
+    for name in ("tools", "requirements", "msg_defs", "conveyor_sim", "setup.py", "setup.cfg"):
+        shutil.move(empty_machine / name, checkout / name)
+    result = run("sh", "tools/set_up.sh", "jazzy", cwd=checkout, PATH=str(empty_machine / "bin"), CC="", CXX="")
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (1, "", 1)
+    assert "in the path of the checkout, expected a folder without" in result.stderr
+    assert not (checkout / ".venv").exists()
+
+
+@pytest.mark.parametrize(
+    "path", ["/tmp/x y/conveyor_sim", "/home/jörg/Fließband (neu)/sim", "/a/b+c=d@e,f&g!", "/" + "a" * 999]
+)
+def test_paths_that_work_are_not_refused(path: str) -> None:
+    assert set_up_module().path_complaint(path) == ""
+
+
+def test_paths_that_are_too_long_are_refused() -> None:
+    assert "found a path of 1002 bytes" in set_up_module().path_complaint("/" + "ö" * 500 + "x")
+
+
+@pytest.mark.parametrize("name", ["x y", "plain"])
+def test_messages_are_built_where_no_path_has_a_space(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).mkdir()
+    code = "import sys; sys.path.insert(0, 'tools'); import set_up; print(set_up.scratch_folder())"
+    chosen = run(sys.executable, "-c", code, cwd=ROOT, TMPDIR=str(tmp_path / name)).stdout.strip()
+    assert chosen == str(tmp_path / name) if name == "plain" else chosen in ("/tmp", "/var/tmp")
 
 
 def test_set_up_for_an_unknown_distribution_names_the_known_ones(empty_machine: Path) -> None:

@@ -10,9 +10,11 @@ import fcntl
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -24,7 +26,12 @@ DISTROS = {"jazzy": ".venv", "kilted": ".venv-kilted"}
 TOOLS = {"test": "the test tools", "bench": "what is compared with", "docs": "what the docs site is built with"}
 SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, where ROS looks for a package's share
 MESSAGE_BUILD = ROOT / "tools" / "message_build"
-STRIP = MESSAGE_BUILD / "strip_missing_includes.cmake"
+STRIP = "strip_missing_includes.cmake"
+REFUSED = ":;\"'`$\\#%"
+"""What no path of the environment may contain: PATH and its like are split at colons, lists of CMake at semicolons, and
+the others mean something to the shells and tools that read scripts' first lines and file URLs."""
+LONGEST = 1000
+"""Bytes of the checkout's path: files in the environment have up to 300 more, and Linux takes 4096."""
 
 
 class SetUpError(Exception):
@@ -86,32 +93,42 @@ class Environment:
 
     def build_messages(self) -> None:
         """Builds and installs conveyor_msgs into the environment's own prefix, which needs no path to be found."""
-        build = self.path / "conveyor_msgs"
-        manifest = build / "install_manifest.txt"
-        if manifest.exists():
-            for name in manifest.read_text().splitlines():
-                Path(name).unlink(missing_ok=True)
-        shutil.rmtree(build, ignore_errors=True)
+        installed = self.path / "conveyor_msgs.txt"
+        if installed.exists():
+            for name in installed.read_text().splitlines():
+                (self.path / name).unlink(missing_ok=True)
         log = self.path / "conveyor_msgs.log"
         log.unlink(missing_ok=True)
+        # ROS's message generators can't handle a space in any path that they see: all are links in a scratch folder.
+        with tempfile.TemporaryDirectory(prefix="conveyor_msgs_", dir=scratch_folder()) as folder:
+            scratch = Path(folder)
+            (scratch / "env").symlink_to(self.path)
+            (scratch / "msg_defs").symlink_to(ROOT / "msg_defs")
+            (scratch / "tools").symlink_to(MESSAGE_BUILD)
+            self._build_messages_in(scratch, log)
+            manifest = (scratch / "build" / "install_manifest.txt").read_text().splitlines()
+        installed.write_text("\n".join(name.removeprefix(f"{scratch}/env/") for name in manifest) + "\n")
+
+    def _build_messages_in(self, scratch: Path, log: Path) -> None:
+        env_path, build = scratch / "env", scratch / "build"
         # CMake looks for packages beside every bin/ on PATH: a sourced ROS must not be among them.
         path = [p for p in os.environ["PATH"].split(":") if not (Path(p).parent / "share" / "ament_index").is_dir()]
         parsed = build / "parsed"
         parsed.mkdir(parents=True)
-        env = {**os.environ, "AMENT_PREFIX_PATH": str(self.path), "PATH": ":".join([f"{self.path}/bin", *path])}
-        env |= {"PYTHONPATH": str(MESSAGE_BUILD), "CONVEYOR_MSGS_PARSED": str(parsed)}
+        env = {**os.environ, "AMENT_PREFIX_PATH": str(env_path), "PATH": ":".join([f"{env_path}/bin", *path])}
+        env |= {"PYTHONPATH": str(scratch / "tools"), "CONVEYOR_MSGS_PARSED": str(parsed)}
         options = {
             "CMAKE_BUILD_TYPE": "Release",
-            "CMAKE_PREFIX_PATH": self.path,
-            "CMAKE_INSTALL_PREFIX": self.path,
-            "CMAKE_PROJECT_INCLUDE": STRIP,
-            "Python3_EXECUTABLE": self.python,
+            "CMAKE_PREFIX_PATH": env_path,
+            "CMAKE_INSTALL_PREFIX": env_path,
+            "CMAKE_PROJECT_INCLUDE": scratch / "tools" / STRIP,
+            "Python3_EXECUTABLE": env_path / "bin" / "python",
             "BUILD_TESTING": "OFF",
         }
-        cmake = self.path / "bin" / "cmake"
+        cmake = env_path / "bin" / "cmake"
         defines = [f"-D{name}={value}" for name, value in options.items()]
         what = "building conveyor_msgs"
-        command([cmake, "-G", "Ninja", "-S", ROOT / "msg_defs", "-B", build, *defines], what, log, env)
+        command([cmake, "-G", "Ninja", "-S", scratch / "msg_defs", "-B", build, *defines], what, log, env)
         command([cmake, "--build", build, "--target", "install"], what, log, env)
 
     def register(self) -> None:
@@ -142,6 +159,7 @@ def command(arguments: list, what: str, log: Path | None = None, env: dict | Non
     """Runs a command with its output in the log; SetUpError, after the output's end, if it fails."""
     done = subprocess.run(
         [str(argument) for argument in arguments],
+        cwd=ROOT,
         env=env,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -165,6 +183,28 @@ def key(*parts: Path | str) -> str:
         digest.update(part.encode() if isinstance(part, str) else part.name.encode() + b"\0" + part.read_bytes())
         digest.update(b"\0")
     return digest.hexdigest()
+
+
+def path_complaint(path: str) -> str:
+    """Return why an environment in a folder can't work, in one sentence; "" if it can."""
+    odd = sorted({char for char in path if char in REFUSED or not char.isprintable()})
+    if odd:
+        shown = " and ".join("a character that can't be printed" if not c.isprintable() else repr(c) for c in odd)
+        return f"{path!r}: found {shown} in the path of the checkout, expected a folder without: move it and try again."
+    if (size := len(os.fsencode(path))) > LONGEST:
+        return f"{path}: found a path of {size} bytes, expected a folder of at most {LONGEST}: move it and try again."
+    return ""
+
+
+def scratch_folder() -> str:
+    """Return a temporary folder in whose path ROS's message generators find nothing odd. Raise SetUpError."""
+    for folder in (tempfile.gettempdir(), "/tmp", "/var/tmp"):
+        if re.fullmatch(r"[\w./+-]+", folder, re.ASCII) and os.access(folder, os.W_OK | os.X_OK):
+            return folder
+    raise SetUpError(
+        f"{tempfile.gettempdir()!r}: found no temporary folder with only letters, digits and ./_+- in its path, which "
+        "building the messages needs, expected TMPDIR to name one."
+    )
 
 
 def check_compiler() -> None:
@@ -194,6 +234,9 @@ def set_up(distro: str, tools: list[str]) -> None:
         return
 
     start = time.monotonic()
+    if complaint := path_complaint(str(ROOT)):
+        raise SetUpError(complaint)
+    scratch_folder()
     check_compiler()
     if not environment.state:
         environment.create()
@@ -216,7 +259,7 @@ def set_up(distro: str, tools: list[str]) -> None:
             built = beside.submit(environment.build_messages)
         if missing("packages"):
             say("this package, and what it draws and tests with ...")
-            environment.pip_install(["-e", f"{ROOT}[plot,accuracy,test]"], "installing this package")
+            environment.pip_install(["-e", ".[plot,accuracy,test]"], "installing this package")
             environment.write_state(packages=packages)
         if missing("index"):
             environment.forget("index")

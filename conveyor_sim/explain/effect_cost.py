@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from conveyor_sim.effects import EFFECTS
-from conveyor_sim.errors import SimulationError
+from conveyor_sim.errors import ConveyorError, SimulationError
 from conveyor_sim.model import Model
 from conveyor_sim.model.remedies import step_limit, with_remedy
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
@@ -114,10 +114,12 @@ class Pricing:
         self._failed: dict[str, str] = {}
 
     def warm_up(self, progress: Progress) -> None:
-        """Run to the state that is measured; progress in simulated time, s."""
+        """Run to the state that is measured; progress in simulated time, s. Raise ConveyorError if it has no bottle."""
         for tick in range(self._ticks):
             self._warm.advance()
             progress((tick + 1) * self._scene.tick, self._ticks * self._scene.tick)
+        if self._warm.counts.present == 0:
+            raise ConveyorError(f"at {self._warm.time:g} s: no bottle on the line, expected --at a time with bottles")
 
     def prepare(self, progress: Progress) -> None:
         """Compile the scene without each effect, and without any of them; progress in variants."""

@@ -21,6 +21,7 @@ Box = tuple[float, float, float, float]
 Orientation = Literal["horizontal", "vertical"]
 
 WIDTH: Final = 11.0  # inches
+SMALLEST: Final = 1.0  # m, of a box around a single point
 _POINTS: Final = 72.0  # an inch
 # With more circles and lines than this an SVG would weigh a megabyte, so it holds them as a picture.
 _MANY: Final = 5000
@@ -123,6 +124,9 @@ def draw_view(
         draw_orientation(ax, frame, norm, float(np.clip(0.12 * radius, 0.25, 0.8)))
     if forces is not None:
         draw_forces(ax, frame, forces)
+    if not (plant.belts or plant.rails or plant.marks or len(frame.x)):
+        said = "nothing to draw:\nno belts, rails, devices or bottles"
+        ax.text(0.5, 0.5, said, transform=ax.transAxes, ha="center", va="center", gid="nothing")
     ax.set_xlim(box[0], box[2])
     ax.set_ylim(box[1], box[3])
     ax.set_xlabel("x (m)")
@@ -147,7 +151,10 @@ def force_scale(frames: Sequence[Frame], points_per_metre: float, peak: float) -
 
 
 def whole_region(plant: Plant, frames: Sequence[Frame], share: float = 0.09) -> Box:
-    """The box around plant and bottles and a margin, of `share` of its size, for names."""
+    """Return the box around plant and bottles and a margin, of `share` of its size, for names.
+
+    What is a single point gets a box of SMALLEST m around it; where there is nothing at all, the origin does.
+    """
     bounds = [plant.bounds()]
     for frame in frames:
         reach = np.stack([frame.radius, frame.radius], axis=1)
@@ -157,7 +164,9 @@ def whole_region(plant: Plant, frames: Sequence[Frame], share: float = 0.09) -> 
     corners = np.array(bounds)
     x0, y0 = corners[:, :2].min(axis=0)
     x1, y1 = corners[:, 2:].max(axis=0)
-    margin = share * max(x1 - x0, y1 - y0)
+    if not x0 <= x1:
+        x0 = y0 = x1 = y1 = 0.0
+    margin = share * max(x1 - x0, y1 - y0) or 0.5 * SMALLEST
     return float(x0 - margin), float(y0 - margin), float(x1 + margin), float(y1 + margin)
 
 

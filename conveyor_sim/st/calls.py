@@ -9,6 +9,7 @@ from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.functions import apply, is_standard
 from conveyor_sim.st.types import BOOL, VOID, BlockType, Member, Type
 from conveyor_sim.st.values import Place, Value, assignment, converted, described
+from conveyor_sim.st.work import CALL
 
 PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 """Sections of what a call passes."""
@@ -43,6 +44,7 @@ class Calls:
                 raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
             raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
         self._note(expressions, function, node)
+        expressions.work += CALL
         codes = []
         given = self._bound(expressions, node, function)
         for member in function.of(*PASSED):

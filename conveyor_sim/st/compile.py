@@ -11,14 +11,14 @@ from types import CodeType
 
 from conveyor_sim.st import tree
 from conveyor_sim.st.calls import PASSED, Calls
-from conveyor_sim.st.declarations import MOST_ELEMENTS, Declarations
+from conveyor_sim.st.declarations import Declarations, require_small
 from conveyor_sim.st.errors import Position, SourceError, StructuredTextError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.located import NOTHING_SHARED, Layout, laid_out
 from conveyor_sim.st.parse import parse
 from conveyor_sim.st.statements import Lines, Statements
-from conveyor_sim.st.types import TIME, BlockType, Member, Structure
-from conveyor_sim.st.values import LARGE
+from conveyor_sim.st.types import TIME, BlockType, Member, Structure, Type
+from conveyor_sim.st.work import statements
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import SENTENCE, printable
 
@@ -142,13 +142,12 @@ def _layout(source: tree.Source, declared: Declarations) -> Layout:
 
 
 def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
-    """Raises SourceError for more than MOST_ELEMENTS in all that a file declares."""
-    elements = declared.names.globals.size + sum(one.size for one in declared.structures)
+    """Raises SourceError for more elements or text than a file may declare in all."""
+    shared: list[Type] = [declared.names.globals, *declared.structures]
+    elements, characters = sum(one.size for one in shared), sum(one.characters for one in shared)
     for unit, kind in units:
-        elements += kind.size
-        if elements > MOST_ELEMENTS:
-            found = f"found {elements} elements with those of {unit.name}"
-            raise SourceError(unit.at, f"{found}, expected at most {MOST_ELEMENTS} in all that is declared")
+        elements, characters = elements + kind.size, characters + kind.characters
+        require_small(elements, characters, unit.at, f" with those of {unit.name}")
 
 
 def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
@@ -165,13 +164,11 @@ def _unit(
     _class(lines, kind.python, "", members, layout)
     with lines.inner():
         lines.add("def run(self, now=0):", unit.at)
-        made = kind.size if kind.function else sum(one.type.size for one in kind.of("VAR_TEMP"))
+        made = kind.work if kind.function else sum(one.type.work for one in kind.of("VAR_TEMP"))
         with lines.inner():
-            lines.add(f"_rt.left -= {1 + made // LARGE}", unit.at)
-            lines.add("if _rt.left < 0: _late()", unit.at)
             for member in kind.of("VAR_TEMP"):
                 lines.add(f"self.{member.slot} = {member.initial}")
-        Statements(lines, expressions, calls).block(unit.body)
+        Statements(lines, expressions, calls).block(unit.body, unit.at, statements(made))
     if kind.function:
         _function(kind, lines)
 
@@ -230,7 +227,7 @@ def _schedule(
             raise SourceError(task.at, f"found {task.name} again, expected another name")
         tasks[key] = _task(task, known)
     found: dict[str, Scheduled] = {}
-    elements = 0
+    elements = characters = 0
     for one in configuration.instances:
         if one.type.lower() not in programs:
             raise SourceError(one.at, f"found {one.type}, expected a PROGRAM: {', '.join(programs) or 'there is none'}")
@@ -242,9 +239,8 @@ def _schedule(
             raise SourceError(one.at, f"found {one.name} again, expected each program once")
         interval, priority = own or (0, LOWEST)
         kind = programs[one.type.lower()]
-        elements += kind.size
-        if elements > MOST_ELEMENTS:
-            raise SourceError(one.at, f"found {elements} elements in programs, expected at most {MOST_ELEMENTS}")
+        elements, characters = elements + kind.size, characters + kind.characters
+        require_small(elements, characters, one.at, " in programs")
         found[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
     if not found:
         raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")

@@ -36,8 +36,8 @@ class StructuredText:
         record: str | Iterable[str] = (),
     ) -> None:
         """path: of the program. tags: by variable ("main/speed"), over what the program says itself. modbus_map: the
-        file that located variables (AT %IX0.0) are looked up in. budget: rounds of loops and calls of a task in one
-        scan, beyond which the watchdog stops it. trace: `last_written` knows who wrote; a scan takes longer. record:
+        file that located variables (AT %IX0.0) are looked up in. budget: statements of all programs in one scan,
+        beyond which the watchdog stops them. trace: `last_written` knows who wrote; a scan takes longer. record:
         patterns of variables that are recorded ("main/*", `control/recorded.py`).
 
         Raises StructuredTextError, a ControlError, for a program that can't be, and MapError for such a map.

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 import struct
+from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.st.errors import Fault, Position, SourceError
@@ -22,6 +23,7 @@ from conveyor_sim.st.types import (
     LTIME,
     LWORD,
     REAL,
+    STRING,
     TIME,
     Enumeration,
     String,
@@ -55,7 +57,8 @@ def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
     assert found is not None
     source, target, cut = found
     if source is not None:
-        given = converted(value, source, name)
+        into = replace(source, high=value.type.high) if isinstance(source, String) else source
+        given = converted(value, into, name)
         known = value.constant
         if source.kind == "int" and known is not None:
             known = source.wrap(known)
@@ -65,6 +68,8 @@ def convert(at: Position, name: str, value: Value, hint: Type | None) -> Value:
     code = _cut(value, target) if cut else _code(value, target)
     if code is None:
         raise SourceError(at, f"found {name} of {described(value)}, which is no conversion, expected one that is")
+    if isinstance(target, String) and isinstance(value.type, String):
+        target = replace(target, high=value.type.high)  # nothing is lost between STRING and WSTRING
     return folded(Value(at, target, code), value)
 
 
@@ -77,7 +82,7 @@ def _cut(value: Value, target: Type) -> str | None:
 def _code(value: Value, target: Type) -> str | None:
     source, code = value.type.base, value.code
     if (source == target and source.kind != "int") or source.kind == target.kind == "string":
-        return f"{code}[:{target.high}]" if isinstance(target, String) else code
+        return code
     if isinstance(target, String):
         return _to_text(source, code)
     if source.kind == "string":
@@ -117,7 +122,7 @@ def _from_real(source: Type, code: str, target: Type) -> str | None:
 
 def _to_text(source: Type, code: str) -> str | None:
     if isinstance(source, Enumeration):
-        return f"dict({ {value: name for name, value in source.values}!r}).get({code}, '')"
+        return f"dict({ {value: name[: STRING.high] for name, value in source.values}!r}).get({code}, '')"
     names = {"bool": "_bool_text", "int": "str", "bits": "str", "time": "_time_text", "real": "repr"}
     name = {REAL: "_single_text", LTIME: "_long_time_text"}.get(source) or names.get(source.kind)
     return f"{name}({code})" if name else None

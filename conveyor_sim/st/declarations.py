@@ -14,6 +14,7 @@ from conveyor_sim.st.scope import Names, Scope
 from conveyor_sim.st.sections import LOCATED, OUTSIDE, meaning
 from conveyor_sim.st.types import (
     ELEMENTARY,
+    MOST_CHARACTERS,
     Array,
     BlockType,
     Enumeration,
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 MOST_ELEMENTS = 1_000_000
 """Of an array, a structure or a block, with all that is in it."""
+
+MOST_TEXT = 16_000_000
+"""Sum of the declared lengths of all texts in a file, in characters: at most 64 MB of memory."""
 
 MOST_LEVELS = 100
 """Structures and blocks one within the other."""
@@ -144,9 +148,11 @@ class Declarations:
             if spec.length is None:
                 return kind
             length = known.known(spec.length, "the length of a text")
-            if not isinstance(kind, String) or not 1 <= length <= 32767:
-                raise SourceError(spec.at, f"found {spec.name}[{length}], expected STRING or WSTRING of 1 to 32767")
-            return replace(kind, name=f"{kind.name}[{length}]", high=length)
+            if not isinstance(kind, String) or not 1 <= length <= MOST_CHARACTERS:
+                found = f"found {spec.name}[{length}]"
+                raise SourceError(spec.at, f"{found}, expected STRING or WSTRING of 1 to {MOST_CHARACTERS}")
+            start = repr(eval(kind.start)[:length]) if kind.start else ""
+            return replace(kind, name=f"{kind.name}[{length}]", high=length, start=start)
         if isinstance(spec, tree.SubrangeType):
             return self._subrange(spec, known)
         if isinstance(spec, tree.ArrayType):
@@ -178,17 +184,17 @@ class Declarations:
             if low > high:
                 raise SourceError(spec.at, f"found the range {low}..{high}, expected a rising one")
             elements *= high - low + 1
-            _require_few(elements, spec.at)
+            require_small(elements, 0, spec.at)
             ranges.append((low, high))
         element = self._type(spec.element, known)
-        _require_few(elements * element.size, spec.at)
+        require_small(elements * element.size, elements * element.characters, spec.at)
         shown = ", ".join(f"{low}..{high}" for low, high in ranges)
         return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
 
     def _bound(self, kind: Structure, at: Position) -> None:
         """Keep how many levels it has, once its members are known."""
         own = [one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
-        _require_few(kind.size, at)
+        require_small(kind.size, kind.characters, at)
         self._levels[kind.python] = levels = 1 + max(map(self._levels_of, own), default=0)
         if levels > MOST_LEVELS:
             raise SourceError(at, f"found {levels} types one within the other, expected at most {MOST_LEVELS}")
@@ -361,6 +367,9 @@ def _times(count: int, code: str) -> str:
     return code if count == 1 else f"*({code} for _ in range({count}))" if count else ""
 
 
-def _require_few(elements: int, at: Position) -> None:
+def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:
+    """Raise SourceError for more elements or more text than MOST_ELEMENTS and MOST_TEXT. of: owner, for the message."""
     if elements > MOST_ELEMENTS:
-        raise SourceError(at, f"found {elements} elements, expected at most {MOST_ELEMENTS}")
+        raise SourceError(at, f"found {elements} elements{of}, expected at most {MOST_ELEMENTS}")
+    if characters > MOST_TEXT:
+        raise SourceError(at, f"found texts of {characters} characters in all{of}, expected at most {MOST_TEXT}")

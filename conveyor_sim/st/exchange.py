@@ -40,7 +40,7 @@ def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, 
         remaining = end - time.monotonic()
         ready = dict(waiting.poll(max(0.0, remaining) * 1e3)) if remaining > 0.0 else {}
         if not ready:
-            raise LateError(f"took more than {patience:g} s")
+            raise LateError(f"took more than {patience:g} s of wall time")
         if outward in ready and left:
             left = left[_written(outward, left) :]
             if not left:

@@ -37,6 +37,7 @@ from conveyor_sim.st.values import (
     unified,
     untyped,
 )
+from conveyor_sim.st.work import of_text
 
 _COMPARED = {"=": "==", "<>": "!=", "<": "<", ">": ">", "<=": "<=", ">=": ">="}
 _LOGIC = {"AND": "&", "OR": "|", "XOR": "^"}
@@ -54,10 +55,22 @@ class Expressions:
         self.scope = scope
         self.controls: list[str] = []
         """Code of the control variables of each FOR around what is checked."""
+        self.work = 0
+        """Work of the expressions checked so far (`work.py`)."""
         self._calls = calls
 
     def value(self, node: tree.Expression, hint: Type | None = None) -> Value:
         """What an expression comes to. hint: the type of where it goes; literals of its operands take it."""
+        found = self._value(node, hint)
+        self.work += 1 + of_text(found.type)
+        return found
+
+    def take_work(self) -> int:
+        """Return the work of the expressions checked since the last call."""
+        work, self.work = self.work, 0
+        return work
+
+    def _value(self, node: tree.Expression, hint: Type | None) -> Value:
         if isinstance(node, tree.Binary):
             return self._binaries(node, hint)
         if isinstance(node, tree.Literal):
@@ -91,6 +104,7 @@ class Expressions:
 
     def place(self, node: tree.Expression) -> Place:
         """A variable or a part of one."""
+        self.work += 1
         if isinstance(node, tree.Name):
             found = self.scope.find(node.at, node.name)
             if isinstance(found, Place):
@@ -272,6 +286,7 @@ class Expressions:
 
     def binary(self, node: tree.Binary, left: Value, right: Value, hint: Type | None = None) -> Value:
         """left operator right."""
+        self.work += 1
         word = node.operator
         if word in _COMPARED:
             return self._compared(node, left, right)

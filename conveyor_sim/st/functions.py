@@ -11,8 +11,24 @@ from conveyor_sim.st.conversions import conversion, convert
 from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.integers import intermediate, reach
-from conveyor_sim.st.types import BOOL, INT, LREAL, NUMBERS, REAL, STRING, TIME, Array, String, Structure, Type, fits
+from conveyor_sim.st.types import (
+    BOOL,
+    INT,
+    LREAL,
+    MOST_CHARACTERS,
+    NUMBERS,
+    REAL,
+    STRING,
+    TIME,
+    Array,
+    String,
+    Structure,
+    Type,
+    fits,
+)
 from conveyor_sim.st.values import Value, converted, described, folded, operand, unified
+from conveyor_sim.st.work import MANY, MANY_SEARCHED
+from conveyor_sim.st.work import conversion as conversion_work
 
 Build = Callable[["Application"], Value]
 
@@ -104,6 +120,7 @@ def _compare(call: Application) -> Value:
     if isinstance(kind, (Array, Structure)):
         raise call.refuse(call.values[0], "an elementary type")
     codes = [one.code if kind.kind == "string" else operand(one, kind) for one in call.values]
+    call.expressions.work += len(codes)
     return call.given(f"_chain(_{call.name.lower()}, {', '.join(codes)})", BOOL)
 
 
@@ -150,12 +167,21 @@ def _texts(parameters: str, result: str) -> Build:
         python = "len" if call.name == "LEN" else f"_{call.name.lower()}"
         grows = call.name in ("CONCAT", "INSERT", "REPLACE")
         texts = [one.type for one in call.values if one.type.kind == "string"]
+        if result != "n" or len(texts) > 1:
+            python += "_counted" if sum(one.high for one in texts) > (MANY_SEARCHED if result == "n" else MANY) else ""
         most = sum(one.high for one in texts) if grows else texts[0].high
-        longest = min(32767, most)
+        longest = min(MOST_CHARACTERS, most)
         kind = INT if result == "n" else String(texts[0].name.partition("[")[0], "string", 0, longest)
         return call.given(f"{python}({', '.join(codes)})", kind)
 
     return build
+
+
+def _convert(call: Application, name: str) -> Value:
+    (value,) = call.values
+    result = convert(call.at, name, value, call.hint)
+    call.expressions.work += conversion_work(value.type, result.type)
+    return result
 
 
 def _move(call: Application) -> Value:
@@ -226,7 +252,7 @@ def apply(
     at: Position, name: str, given: Sequence[tuple[str | None, Value]], expressions: Expressions, hint: Type | None
 ) -> Value:
     """A standard function, called with values by position or by name. Raises SourceError."""
-    found = FUNCTIONS.get(name.upper()) or _standard("IN", lambda call: convert(at, name, call.values[0], hint))
+    found = FUNCTIONS.get(name.upper()) or _standard("IN", lambda call: _convert(call, name))
     plain = tuple(one.removesuffix("...") for one in found.parameters)
     more = plain != found.parameters
     if given and given[0][0] is not None:
@@ -236,6 +262,7 @@ def apply(
     if len(values) < len(plain) or (len(values) > len(plain) and not more):
         expected = f"{len(plain)}{' or more' if more else ''}: {', '.join(plain)}" if plain else "none"
         raise SourceError(at, f"found {len(values)} arguments of {name}, expected {expected}")
+    expressions.work += 1
     for one in values:
         if one.type.kind in ("block", "void"):
             raise SourceError(one.at, f"found {described(one)} in {name}, expected a value")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from conveyor_sim.st.errors import Position, SourceError
+from conveyor_sim.st.types import MOST_CHARACTERS
 
 _UNITS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000}
 _UNITS |= {"ms": 1_000_000, "us": 1_000, "ns": 1}
@@ -97,4 +98,6 @@ def characters(at: Position, text: str, wide: bool) -> str:
                 )
             found.append(chr(int(code, 16)))
             index += 1 + digits
+    if len(found) > MOST_CHARACTERS:
+        raise SourceError(at, f"found a text of {len(found)} characters, expected at most {MOST_CHARACTERS}")
     return "".join(found)

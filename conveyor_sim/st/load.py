@@ -12,7 +12,7 @@ SUFFIX, LIBRARY = ".st", ".so"
 
 
 _TAGS, _MAP = "tags (a mapping from variables to tags)", "modbus_map (a file)"
-_RECORD, _BUDGET, _PATIENCE = "record (patterns of variables)", "budget (rounds of loops and calls)", "patience (s)"
+_RECORD, _BUDGET, _PATIENCE = "record (patterns of variables)", "budget (statements)", "patience (s)"
 
 
 def load(reference: str, parameters: Mapping[str, object] | None = None) -> Controller:

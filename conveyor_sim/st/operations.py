@@ -9,11 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from conveyor_sim.st.errors import Fault
-from conveyor_sim.st.types import single
-
-MOST_CHARACTERS = 32767
-"""Of any text."""
-
+from conveyor_sim.st.types import MOST_CHARACTERS, single
 
 Root = tuple[Any, str]
 """A variable of a unit: the instance, and its slot."""
@@ -230,9 +226,9 @@ def mid(text: str, count: int, place: int) -> str:
 
 
 def insert(text: str, other: str, place: int) -> str:
-    """INSERT: another text behind a place."""
+    """INSERT: another text behind a place, cut at the longest length of a text."""
     _count("INSERT", place)
-    return text[:place] + other + text[place:]
+    return (text[:place] + other + text[place:])[:MOST_CHARACTERS]
 
 
 def delete(text: str, count: int, place: int) -> str:
@@ -242,9 +238,9 @@ def delete(text: str, count: int, place: int) -> str:
 
 
 def replace(text: str, other: str, count: int, place: int) -> str:
-    """REPLACE"""
+    """REPLACE, cut at the longest length of a text."""
     begin = _place("REPLACE", place) - 1
-    return text[:begin] + other + text[begin + _count("REPLACE", count) :]
+    return (text[:begin] + other + text[begin + _count("REPLACE", count) :])[:MOST_CHARACTERS]
 
 
 def _count(name: str, value: int) -> int:
@@ -335,6 +331,7 @@ NAMES: dict[str, Any] = {
     "_replace": replace,
     "_concat": concat,
     "_find": find,
+    **{f"_{one.__name__}_counted": one for one in (left, right, mid, insert, delete, replace, concat, find)},
     "_limit": limit,
     "_mux": mux,
     "_sel": sel,

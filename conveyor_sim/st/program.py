@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from types import TracebackType
 from typing import Any
@@ -10,14 +10,15 @@ from typing import Any
 from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Fault, StructuredTextError
 from conveyor_sim.st.located import identity
-from conveyor_sim.st.operations import Root, copied, overwrite
+from conveyor_sim.st.operations import Root, copied, find, overwrite
 from conveyor_sim.st.types import Type
 from conveyor_sim.st.values import NAMESPACE
 from conveyor_sim.st.variables import Variable, dump, leaves, load, retain
+from conveyor_sim.st.work import handling, searching
 
-BUDGET = 100_000
-"""Rounds of loops and calls of units that a task may take in one scan: far more than a PLC has time for. Whatever
-copies or makes arrays and structures takes one more for each LARGE elements."""
+BUDGET = 1_000_000
+"""Statements that all programs of a file may execute in one scan (`work.py`): more than a PLC has time for, and at most
+about a second here."""
 
 MOST_VARIABLES = 100_000
 """That can be read by name."""
@@ -37,7 +38,7 @@ class Program:
     """All instances of a file. Two of them share nothing but the code."""
 
     def __init__(self, compiled: Compiled, budget: int = BUDGET) -> None:
-        """budget: rounds of loops and calls in one scan of a task, beyond which the watchdog stops it."""
+        """budget: statements in one scan, beyond which the watchdog stops it."""
         self.compiled = compiled
         self.budget = budget
         self._clock = _Clock()
@@ -47,6 +48,7 @@ class Program:
     def _begin(self) -> None:
         self._written: dict[tuple[int, str], tuple[int, int]] = {}
         large = {"_copied_large": self._copied_large, "_overwrite_large": self._overwrite_large}
+        large |= {name: self._counted(one) for name, one in NAMESPACE.items() if name.endswith("_counted")}
         names = {**NAMESPACE, **large, "_rt": self._clock, "_late": self._late, "_noted": self._noted}
         exec(self.compiled.code, names)
         self.globals: Any = names["_g"]
@@ -58,7 +60,7 @@ class Program:
 
         Raises StructuredTextError, with file, line and column, for what stops the program.
         """
-        self._clock.now = now
+        self._clock.now, self._clock.left = now, self.budget
         ran = False
         for one in self.compiled.programs:
             name = one.name.lower()
@@ -67,7 +69,6 @@ class Program:
                 continue
             # What should have run in between is not made up for.
             self._due[name] = now + one.interval - (now - due) % one.interval if one.interval else now + 1
-            self._clock.left = self.budget
             ran = True
             try:
                 self.instances[name].run(now)
@@ -79,19 +80,29 @@ class Program:
         return ran
 
     def _late(self) -> None:
-        raise Fault(f"watchdog: found more than {self.budget} rounds of loops and calls in one scan, expected fewer")
+        raise Fault(f"watchdog: found more than {self.budget} statements in one scan, expected fewer")
 
-    def _copied_large(self, value: Any, rounds: int) -> Any:
-        """An array or a structure as a value of its own; rounds: of a loop, that take as long."""
-        self._spend(rounds)
+    def _copied_large(self, value: Any, count: int) -> Any:
+        """Return an array or a structure as a value of its own. count: statements that the copy counts as."""
+        self._spend(count)
         return copied(value)
 
-    def _overwrite_large(self, target: Any, value: Any, rounds: int) -> None:
-        self._spend(rounds)
+    def _overwrite_large(self, target: Any, value: Any, count: int) -> None:
+        self._spend(count)
         overwrite(target, value)
 
-    def _spend(self, rounds: int) -> None:
-        self._clock.left -= rounds
+    def _counted(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function of texts that counts by their present lengths."""
+        work = searching if function is find else handling
+
+        def call(*given: Any) -> Any:
+            self._spend(work(*given))
+            return function(*given)
+
+        return call
+
+    def _spend(self, count: int) -> None:
+        self._clock.left -= count
         if self._clock.left < 0:
             self._late()
 

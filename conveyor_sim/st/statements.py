@@ -13,6 +13,7 @@ from conveyor_sim.st.errors import Position, SourceError
 from conveyor_sim.st.expressions import Expressions
 from conveyor_sim.st.types import BlockType, Subrange, Type, register
 from conveyor_sim.st.values import Place, Value, assignment, converted, converts, described, operand
+from conveyor_sim.st.work import statements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +24,9 @@ MOST_LOOPS = 15
 MOST_BRANCHES = 1000
 """Of one IF or CASE; Python's compiler takes each for one level more, and has some 2900."""
 
+MOST_CODE = 32_000_000
+"""Characters of Python that a file may become: long constants stand where they are used."""
+
 
 class Lines:
     """Python source as it grows; `positions[n]` is where line n + 1 comes from, None for what is not of the program."""
@@ -31,11 +35,21 @@ class Lines:
         self.lines: list[str] = []
         self.positions: list[Position | None] = []
         self._depth = 0
+        self._size = 0
 
-    def add(self, code: str, at: Position | None = None) -> None:
-        """One line."""
+    def add(self, code: str, at: Position | None = None) -> int:
+        """Add a line, and return its index. Raise SourceError for more code than MOST_CODE."""
+        self._size += len(code)
+        if self._size > MOST_CODE:
+            raise SourceError(at or Position(1, 1), f"found more than {MOST_CODE} characters of code, expected fewer")
         self.lines.append(" " * self._depth + code)
         self.positions.append(at)
+        return len(self.lines) - 1
+
+    def change(self, index: int, code: str) -> None:
+        """Replace a line, at its depth."""
+        line = self.lines[index]
+        self.lines[index] = line[: len(line) - len(line.lstrip(" "))] + code
 
     @contextmanager
     def inner(self) -> Iterator[None]:
@@ -54,14 +68,38 @@ class Statements:
         self._calls = calls
         self._loops = 0
         self._names = 0
+        self._counter: int | None = None
+        """Line that counts the statements that follow it, as many as are sure to be executed after it."""
+        self._counted = 0
+        self._jumps = 0
 
-    def block(self, body: tree.Block) -> None:
-        """A list of statements, a level deeper."""
+    def block(self, body: tree.Block, at: Position, count: int = 0) -> None:
+        """Write a list of statements, a level deeper. count: statements that entering the block counts as."""
+        outer = self._counter, self._counted
         with self._lines.inner():
+            self._counter = None
+            if count:
+                self._count(count, at)
             for statement in body:
+                jumps = self._jumps
                 self._statement(statement)
-            if not body:
+                if self._jumps != jumps:  # what follows it may not be reached
+                    self._counter = None
+            if not (body or count):
                 self._lines.add("pass")
+        self._counter, self._counted = outer
+
+    def _count(self, count: int, at: Position) -> None:
+        """Take statements from the scan's budget, in one line with those before them."""
+        if self._counter is None:
+            self._counter, self._counted = self._lines.add("", at), 0
+            self._lines.add("if _rt.left < 0: _late()", at)
+        self._counted += count
+        self._lines.change(self._counter, f"_rt.left -= {self._counted}")
+
+    def _count_expressions(self, at: Position) -> None:
+        """Take what the expressions since the last count amount to, beyond the statement that they belong to."""
+        self._count(statements(self._expressions.take_work()), at)
 
     def _statement(self, node: tree.Statement) -> None:
         kinds: dict[type, Callable[..., None]] = {
@@ -74,7 +112,11 @@ class Statements:
             tree.Repeat: self._repeat,
             tree.Jump: self._jump,
         }
+        self._expressions.take_work()
+        self._count(1, node.at)
         kinds[type(node)](node)
+        if not isinstance(node, (tree.If, tree.Case, tree.For, tree.While, tree.Repeat)):
+            self._count_expressions(node.at)
 
     def _assignment(self, node: tree.Assignment) -> None:
         place = self._expressions.target(node.target)
@@ -109,15 +151,21 @@ class Statements:
             self._lines.add(line, at)
 
     def _if(self, node: tree.If) -> None:
-        word = "if"
+        word, work = "if", 0
         _require_few(node.at, "branches of one IF", len(node.branches))
         for condition, body in node.branches:
-            self._lines.add(f"{word} {self._expressions.condition(condition)}:", condition.at)
-            self.block(body)
+            code = self._expressions.condition(condition)
+            work += self._expressions.take_work()
+            self._lines.add(f"{word} {code}:", condition.at)
+            self.block(body, node.at, statements(work))
             word = "elif"
-        if node.otherwise:
-            self._lines.add("else:")
-            self.block(node.otherwise)
+        self._otherwise(node, "else:", statements(work))
+
+    def _otherwise(self, node: tree.If | tree.Case, word: str, count: int) -> None:
+        """Write an ELSE. count: statements that the conditions before it count as, which it takes if there is none."""
+        if node.otherwise or count:
+            self._lines.add(word)
+            self.block(node.otherwise, node.at, count)
 
     def _case(self, node: tree.Case) -> None:
         selector = self._expressions.value(node.selector)
@@ -128,7 +176,7 @@ class Statements:
             )
         if kind.kind == "int" and selector.span is not None:
             kind = register(kind)
-        name = self._name("c")
+        name, work = self._name("c"), self._expressions.take_work()
         self._lines.add(f"{name} = {selector.code}", node.at)
         taken: list[tuple[int, int]] = []  # rising
         word = "if"
@@ -145,12 +193,11 @@ class Statements:
                     raise SourceError(first.at, f"found {shown}, expected a label that no other choice has, and rising")
                 taken.insert(place, (low, high))
                 tests.append(f"{name} == {low}" if low == high else f"{low} <= {name} <= {high}")
+            work += self._expressions.take_work()
             self._lines.add(f"{word} {' or '.join(tests)}:", node.at)
-            self.block(body)
+            self.block(body, node.at, statements(work))
             word = "elif"
-        if node.otherwise:
-            self._lines.add("else:" if node.choices else "if True:")
-            self.block(node.otherwise)
+        self._otherwise(node, "else:" if node.choices else "if True:", statements(work))
 
     def _label(self, node: tree.Expression, kind: Type) -> int:
         value = self._expressions.value(node)
@@ -168,6 +215,7 @@ class Statements:
         step = "1" if node.step is None else self._step(node.step, kind)
         rounds = self._name("r")
         codes = f"{converted(first, kind)}, {self._wide(last, kind)}, {step}, {kind.low}, {kind.high}"
+        self._count_expressions(node.at)
         self._lines.add(f"{rounds} = _rounds({codes})", node.at)
         self._lines.add(f"for _k in {rounds}:", node.at)
         with self._lines.inner():
@@ -195,7 +243,9 @@ class Statements:
 
     def _while(self, node: tree.While) -> None:
         self._lines.add(f"while {self._expressions.condition(node.condition)}:", node.at)
-        self._body(node.body, node.at)
+        work = self._expressions.take_work()
+        self._count(statements(work), node.at)
+        self._body(node.body, node.at, work)
 
     def _repeat(self, node: tree.Repeat) -> None:
         # The condition comes at the top, so that CONTINUE comes to it.
@@ -204,22 +254,20 @@ class Statements:
         self._lines.add(f"while {first} or not ({self._expressions.condition(node.until)}):", node.until.at)
         with self._lines.inner():
             self._lines.add(f"{first} = False")
-        self._body(node.body, node.at)
+        self._body(node.body, node.at, self._expressions.take_work())
 
-    def _body(self, body: tree.Block, at: Position) -> None:
-        """A loop's, with its share of the scan's budget."""
+    def _body(self, body: tree.Block, at: Position, work: int = 0) -> None:
+        """Write the body of a loop, each round of which counts as a statement. work: of its condition."""
         self._loops += 1
         if self._loops > MOST_LOOPS:
             raise SourceError(at, f"found {self._loops} loops one within the other, expected at most {MOST_LOOPS}")
-        with self._lines.inner():
-            self._lines.add("_rt.left -= 1", at)
-            self._lines.add("if _rt.left < 0: _late()", at)
-        self.block(body)
+        self.block(body, at, 1 + statements(work))
         self._loops -= 1
 
     def _jump(self, node: tree.Jump) -> None:
         if node.word != "RETURN" and not self._loops:
             raise SourceError(node.at, f"found {node.word} outside of a loop, expected it in FOR, WHILE or REPEAT")
+        self._jumps += 1
         self._lines.add({"EXIT": "break", "CONTINUE": "continue", "RETURN": "return"}[node.word], node.at)
 
     def _name(self, letter: str) -> str:

@@ -13,7 +13,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+MOST_CHARACTERS = 32767
+"""Longest text of any kind, intermediate results included: INT, the result type of LEN, holds this length."""
+
 Kind = Literal["bool", "int", "bits", "real", "time", "string", "enum", "array", "structure", "block", "void"]
+
+_LIST, _OBJECT, _MEMBER, _ELEMENTS = 4, 6, 2, 16
+"""Work of making one list, one object and one of its members; elements of a list that count 1 together (`work.py`)."""
 
 _SINGLE = array("f", [0.0])
 
@@ -49,6 +55,16 @@ class Type:
     def size(self) -> int:
         """Elementary variables within one of it."""
         return 1
+
+    @property
+    def characters(self) -> int:
+        """Sum of the declared lengths of all texts within one value."""
+        return self.high if self.kind == "string" else 0
+
+    @property
+    def work(self) -> int:
+        """Work of making or copying a value, beyond that of the statement that does it."""
+        return 0
 
     @property
     def width(self) -> int:
@@ -125,6 +141,19 @@ class Array(Type):
         """Of all its elements."""
         return math.prod(high - low + 1 for low, high in self.ranges) * self.element.size
 
+    @property
+    def characters(self) -> int:
+        """Sum of the declared lengths of all texts in the array."""
+        return math.prod(high - low + 1 for low, high in self.ranges) * self.element.characters
+
+    @property
+    def work(self) -> int:
+        """Work of its lists, nested by dimension, and of their elements."""
+        lists, elements = 0, 1
+        for low, high in self.ranges:
+            lists, elements = lists + elements, elements * (high - low + 1)
+        return _LIST * lists + elements // _ELEMENTS + elements * self.element.work
+
 
 @dataclass(frozen=True)
 class Member:
@@ -168,8 +197,21 @@ class Structure(Type):
     @cached_property
     def size(self) -> int:  # once all members are known
         """Of all its members but those that are elsewhere."""
-        own = [one.type.size for one in self.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
-        return max(1, sum(own))
+        return max(1, sum(one.type.size for one in self._own()))
+
+    @cached_property
+    def characters(self) -> int:  # once all members are known
+        """Sum of the declared lengths of all texts in its members."""
+        return sum(one.type.characters for one in self._own())
+
+    @cached_property
+    def work(self) -> int:  # once all members are known
+        """Work of the object and its members."""
+        return _OBJECT + sum(_MEMBER + one.type.work for one in self._own())
+
+    def _own(self) -> list[Member]:
+        """Return the members whose values are stored in the object itself."""
+        return [one for one in self.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Structure) and self.python == other.python

@@ -33,6 +33,7 @@ from conveyor_sim.st.types import (
     register,
     single,
 )
+from conveyor_sim.st.work import copies
 
 NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES, "_Memory": Memory, "_Cell": Cell}
 """What code may call."""
@@ -40,9 +41,6 @@ NAMESPACE: dict[str, Any] = {**NAMES, **CLASSES, "_Memory": Memory, "_Cell": Cel
 _MOST = {REAL: "3.4028235E38", LREAL: "1.7976931348623157E308"}
 
 _EXACT_IN_REAL = 1 << 24
-
-LARGE = 100
-"""Elements whose copy takes as long as a round of a loop."""
 
 
 @dataclass(frozen=True)
@@ -191,8 +189,8 @@ def converted(value: Value, target: Type, what: str = "") -> str:
             raise SourceError(
                 value.at, f"found {target.name} with blocks in it, expected a value: blocks are not copied"
             )
-        rounds = target.size // LARGE
-        return f"_copied_large({value.code}, {rounds})" if rounds else f"_copied({value.code})"
+        count = copies(target)
+        return f"_copied_large({value.code}, {count})" if count else f"_copied({value.code})"
     return value.code
 
 
@@ -201,9 +199,9 @@ def assignment(place: Place, value: Value) -> str:
     code = converted(value, place.type)
     if not isinstance(place.type, (Array, Structure)):
         return place.write(code)
-    rounds = place.type.size // LARGE
+    count = copies(place.type)
     arguments = f"{place.code}, {value.code}"
-    return f"_overwrite_large({arguments}, {rounds})" if rounds else f"_overwrite({arguments})"
+    return f"_overwrite_large({arguments}, {count})" if count else f"_overwrite({arguments})"
 
 
 def _has_blocks(kind: Type) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -83,11 +84,18 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def _state(self, done: float) -> str:
         if self._counted:
             left = "" if self._left is None else f", at most {self._left:.0f} s left"
-            return f"{done:.0f} of {self._total:.0f} {self._counted}{left}"
+            digits = 0 if self._total == int(self._total) else _decimals(self._total)
+            return f"{done:.{digits}f} of {self._total:.{digits}f} {self._counted}{left}"
         start, already = self._start or (time.monotonic(), done)
-        wall = max(time.monotonic() - start, 1e-9)
-        return f"{done:.1f} of {self._total:.1f} s, {(done - already) / wall:.3g} x real time"
+        digits, wall = _decimals(self._total), max(time.monotonic() - start, 1e-9)
+        speed = f", {(done - already) / wall:.3g} x real time" if done > already else ""
+        return f"{done:.{digits}f} of {self._total:.{digits}f} s{speed}"
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+
+def _decimals(total: float) -> int:
+    """Return the decimals in which a tenth of a total of seconds differs from 0; one for 1 s and more."""
+    return 1 - min(0, math.floor(math.log10(total))) if 0.0 < total < 1.0 else 1

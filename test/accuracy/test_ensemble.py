@@ -128,10 +128,7 @@ def study(it: Scene, folder: Path, per_tick: tuple[int, int]) -> Iterator[subpro
     file = folder.with_suffix(".yaml")
     file.write_text(it.source_text)
     command = [sys.executable, "-c", STUDY, str(file), str(folder), *map(str, per_tick)]
-    # A shell that starts tests in the background has interrupts ignored, by what it starts, too.
-    with subprocess.Popen(
-        command, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
-    ) as process:
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE) as process:
         try:
             yield process
         finally:

@@ -141,14 +141,7 @@ def interrupted(folder: Path, ready: Callable[[str], bool]) -> tuple[int, list[s
     command = [sys.executable, "-c", code, "accuracy", str(file), "--out", str(folder / "out"), "--thorough"]
     with (
         open(answers, "w") as out,
-        # A shell that starts tests in the background has interrupts ignored, by what it starts, too.
-        subprocess.Popen(
-            command,
-            stdout=out,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "COLUMNS": "200"},
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        ) as process,
+        subprocess.Popen(command, stdout=out, stderr=subprocess.PIPE, env={**os.environ, "COLUMNS": "200"}) as process,
     ):
         end = time.monotonic() + PATIENCE
         while not ready(answers.read_text()):

@@ -140,3 +140,30 @@ def test_an_interrupt_that_is_held_back_comes_when_the_work_is_done() -> None:
         "    print('never')\n"
     )
     assert interrupted(["-c", code], 0.1, "began") == (130, "began\ndone\ninterrupted\n")
+
+
+IGNORED = ["sh", "-c", 'trap "" INT; exec "$0" "$@"', sys.executable]
+"""Python as a shell starts it in the background: SIGINT is ignored."""
+
+
+def test_a_command_that_is_started_with_interrupts_ignored_goes_on() -> None:
+    code = (
+        "import os, signal, time\nfrom conveyor_sim.support.interrupt import one_line\nwith one_line():\n"
+        "    os.kill(os.getpid(), signal.SIGINT); time.sleep(0.1)\nprint('done')\n"
+    )
+    done = subprocess.run([*IGNORED, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+
+
+def test_processes_of_tests_can_be_interrupted_where_tests_are_started_with_interrupts_ignored() -> None:
+    """Those that are started anew and those that are forked from a warm one."""
+    code = (
+        "import os, signal, subprocess, sys\nfrom ctrl_c import restore_for_children\nimport warm\n"
+        "shown = 'import signal; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)'\n"
+        "warm.FORKED.set_forkserver_preload([])\n"
+        "restore_for_children()\nos.kill(os.getpid(), signal.SIGINT)\n"
+        "print(subprocess.run([sys.executable, '-c', shown], capture_output=True, text=True).stdout, end='')\n"
+        "print(warm.run(['-c', shown]).stdout, end='')\n"
+    )
+    done = subprocess.run([*IGNORED, "-c", code], cwd=ROOT / "test", capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "True\nTrue\n"), done.stderr

@@ -2,6 +2,7 @@
 
 import io
 
+import pytest
 from rich.console import Console
 
 from conveyor_sim.support.progress import ProgressBar
@@ -16,6 +17,23 @@ def test_plain_lines_where_there_is_no_terminal() -> None:
     assert len(lines) == 10
     assert lines[-1].startswith("line: 2.0 of 2.0 s, ")
     assert lines[-1].endswith(" x real time")
+
+
+@pytest.mark.parametrize(
+    ("counted", "total", "said"),
+    [
+        ("", 0.01, ["line: 0.010 of 0.010 s"]),
+        ("", 0.2, ["line: 0.10 of 0.20 s", "line: 0.20 of 0.20 s"]),
+        ("s", 0.02, ["line: 0.010 of 0.020 s", "line: 0.020 of 0.020 s"]),
+        ("s", 2.0, ["line: 1 of 2 s", "line: 2 of 2 s"]),
+    ],
+)
+def test_short_times_are_not_rounded_to_0(counted: str, total: float, said: list[str]) -> None:
+    out = io.StringIO()
+    with ProgressBar("line", total, Console(file=out, force_terminal=False), counted) as bar:
+        for part in range(1, len(said) + 1):
+            bar.update(total * part / len(said))
+    assert [line.partition(", ")[0] for line in out.getvalue().splitlines()] == said
 
 
 def test_bar_on_a_terminal_ends_at_the_whole() -> None:

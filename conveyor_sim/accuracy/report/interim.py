@@ -53,7 +53,7 @@ def predicted(known: Forecast) -> Interim:
             f"Forces: {impacts}.",
             "Throughput: not known, nothing has run.",
             f"Cost: a second of the line should take about {digits(known.seconds)} s of one processor with "
-            f"{known.bottles} bottles, by a rule of thumb; {better}.",
+            f"{known.bottles} bottle{'s' * (known.bottles != 1)}, by a rule of thumb; {better}.",
             f"Setting: {line(point.setting)} (don't rely on it before it is measured)",
         ),
     )

@@ -33,7 +33,8 @@ def without_contact(scene: Scene, known: Forecast, looked: float | None) -> tupl
         f"Forces: there are none to be wrong: {_why(scene, looked)}.",
         f"Throughput: bottles only ride, so the friction of belts alone decides it{friction}.",
         f"Cost: about {digits(seconds(scene, setting, known.bottles))} s of one processor for a second of the line "
-        f"with {known.bottles} bottles, by a rule of thumb; a dearer setting gains nothing here.",
+        f"with {known.bottles} bottle{'s' * (known.bottles != 1)}, by a rule of thumb; "
+        "a dearer setting gains nothing here.",
         f"Setting: {line(setting)}, the preset draft: the cheapest within every bound of stability"
         + (" (the scene has it already)." if own_setting(scene) == setting else "."),
     ]

@@ -19,6 +19,7 @@ from typing import Any
 
 from conveyor_msgs import srv
 from conveyor_msgs.msg import Commands, SimulationState
+from ctrl_c import restore_for_children
 from fuzz.invariants import Violation
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -137,6 +138,7 @@ class Station:
             "duration": 1000.0,
             "checkpoint_folder": "/",
         }
+        restore_for_children()
         self._node = Child("sim_node", given | {"record": self._bag, "threads": 1}, self._environment, place)
         self.present()
         for publisher in self._publishers.values():
