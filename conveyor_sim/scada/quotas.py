@@ -33,8 +33,10 @@ class Quota:
     """
     connections_per_user: int = 16
     """Connections of one user."""
-    idle: int = 30
-    """Seconds without a request after which a guest may be dropped for another guest, or a user for the same user."""
+    idle: float = 30.0
+    """Seconds without a request after which a guest may be dropped for another guest, or a user for the same user. A
+    Modbus client that is idle for longer loses its control of the line.
+    """
 
 
 QUOTA = Quota()
@@ -66,9 +68,14 @@ def share_of_guests(places: int) -> int:
 class Places:
     """All connections of one protocol server."""
 
-    def __init__(self, quota: Quota) -> None:
-        """Start with all places free."""
-        self._quota = quota
+    def __init__(self, quota: Quota, keeps_active: bool = False) -> None:
+        """Start with all places free. keeps_active: True if guests that are not idle keep their places, too.
+
+        That is for a protocol without users, where one more connection can't be an operator's.
+        """
+        self._quota, self._keeps_active = quota, keeps_active
+        self.idle = quota.idle
+        """Seconds without a request after which a connection is idle."""
         self._taken: set[Place] = set()
         self.dropped = self.refused = 0
         """Connections that made room so far, and those that got no place."""
@@ -132,12 +139,14 @@ class Places:
         return [one for one in self._taken if one.address == address and one.stage < USER]
 
     def _idle(self, those: list[Place]) -> list[Place]:
-        before = time.monotonic() - self._quota.idle
+        before = time.monotonic() - self.idle
         return [one for one in those if one.active < before]
 
     def _drop_first(self, those: list[Place]) -> bool:
         """Drop the connection that comes first in the order of the module. Return False if there are only users."""
-        first = min((one for one in those if one.stage < USER), key=lambda one: (one.stage, one.active), default=None)
+        kept = set(those) - set(self._idle(those)) if self._keeps_active else set()
+        may = (one for one in those if one.stage < GUEST or (one.stage == GUEST and one not in kept))
+        first = min(may, key=lambda one: (one.stage, one.active), default=None)
         if first is None:
             return False
         self._drop(first)

@@ -8,7 +8,7 @@ from typing import Any
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 
-from conveyor_sim.scada.opcua.browsing import Views, require_count
+from conveyor_sim.scada.opcua.browsing import Views
 from conveyor_sim.scada.opcua.filters import require_filter
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import share_of_guests
@@ -53,11 +53,6 @@ class Bounds:
         name = self._session.name
         return self._session.user.name or str(name[0] if isinstance(name, tuple) else name)
 
-    def require(self, asked: Sequence[Any] | None, most: int) -> None:
-        """Charge one unit per operation. Raise ServiceError for too many operations, or none."""
-        require_count(asked, most)
-        self._units += len(asked or [])
-
     def require_answer(self, results: Iterable[ua.DataValue]) -> None:
         """Raise ServiceError with BadResponseTooLarge for values that are too large together."""
         size = sum(_bytes(result.Value.Value) for result in results if result.Value is not None)
@@ -72,7 +67,6 @@ class Bounds:
     def require_new_items(self, params: ua.CreateMonitoredItemsParameters) -> None:
         """Raise ServiceError for too many or too costly items. Reduce queues to the room that is left."""
         limits, asked = self.limits, params.ItemsToCreate
-        self.require(asked, limits.items_per_call)
         mine = self._items(lambda one: one.session_id == self._session.session_id)
         guests = self._items(lambda one: one.is_guest) if self.is_guest else 0
         if (
@@ -93,7 +87,6 @@ class Bounds:
     def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
         """As `require_new_items`, for items that exist."""
         asked = params.ItemsToModify
-        self.require(asked, self.limits.items_per_call)
         subscription = self._service.subscriptions.get(params.SubscriptionId)
         known = {} if subscription is None else subscription.monitored_item_srv._monitored_items
         fields = 0
@@ -106,8 +99,7 @@ class Bounds:
         self._bound_queues(asked)
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:
-        """Raise ServiceError for too many nodes. Reduce the values per node to what one answer takes."""
-        self.require(params.NodesToRead, self.limits.nodes_per_history_read)
+        """Reduce the values per node to what one answer takes."""
         details = params.HistoryReadDetails
         most = max(1, self.limits.history_values // len(params.NodesToRead))
         details.NumValuesPerNode = min(details.NumValuesPerNode or most, most)

@@ -10,7 +10,6 @@ import os
 from collections.abc import Iterable, Sequence
 
 from asyncua import ua
-from asyncua.common.utils import ServiceError
 from asyncua.server.address_space import AddressSpace
 
 from conveyor_sim.scada.opcua.limits import Limits
@@ -32,9 +31,8 @@ class Views:
         """References examined so far."""
 
     def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
-        """Return the references of each node. Raise ServiceError for too many nodes, or none."""
+        """Return the references of each node."""
         asked = params.NodesToBrowse or []
-        require_count(asked, self._limits.nodes_per_browse)
         kinds: dict[tuple[ua.NodeId, bool], frozenset[ua.NodeId] | None] = {}
         results, left = [], self._limits.references_per_answer
         for node in asked:
@@ -44,9 +42,8 @@ class Views:
         return results
 
     def browse_next(self, params: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
-        """Return the next references of each continuation point, or release it. Raise ServiceError as `browse`."""
+        """Return the next references of each continuation point, or release it."""
         points = params.ContinuationPoints or []
-        require_count(points, self._limits.nodes_per_browse)
         results, left = [], self._limits.references_per_answer
         for point in points:
             result = ua.BrowseResult()
@@ -59,8 +56,7 @@ class Views:
         return results
 
     def translate(self, paths: Sequence[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
-        """Return the targets of each path. Raise ServiceError for too many paths, or none."""
-        require_count(paths, self._limits.nodes_per_translate)
+        """Return the targets of each path."""
         kinds: dict[tuple[ua.NodeId, bool], frozenset[ua.NodeId] | None] = {}
         return [self._translate(path, kinds) for path in paths]
 
@@ -171,11 +167,3 @@ class Views:
 
 
 _HAS_SUBTYPE = ua.NodeId(ua.ObjectIds.HasSubtype)
-
-
-def require_count(asked: Sequence[object] | None, most: int) -> None:
-    """Raise ServiceError with BadTooManyOperations or, for an empty request, BadNothingToDo."""
-    if not asked:
-        raise ServiceError(Codes.BadNothingToDo)
-    if len(asked) > most:
-        raise ServiceError(Codes.BadTooManyOperations)

@@ -12,9 +12,9 @@ from asyncua.crypto.security_policies import SecurityPolicyNone
 from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import struct_from_binary
 
-from conveyor_sim.scada.opcua.browsing import require_count
 from conveyor_sim.scada.opcua.decoding import Allowance, BoundedBuffer
 from conveyor_sim.scada.opcua.limits import Limits
+from conveyor_sim.scada.opcua.operations import require_operations
 
 Codes = ua.StatusCodes
 
@@ -113,6 +113,8 @@ class Processor(UaProcessor):
     async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> bool:
         """Answer services that the library does not pass to the session, or does not have."""
         try:
+            if self._is_active:
+                self.units += require_operations(typeid, body, self._bounds)
             if typeid in (_BROWSE_NEXT, _REGISTER, _UNREGISTER) and self._is_active:
                 self.session.touch()
                 response = await self._answer(typeid, body)
@@ -131,10 +133,7 @@ class Processor(UaProcessor):
             return ua.BrowseNextResponse(Parameters=ua.BrowseNextResult(results))
         if typeid == _REGISTER:
             nodes = struct_from_binary(ua.RegisterNodesParameters, body).NodesToRegister
-            require_count(nodes, self._bounds.nodes_per_register)
             return ua.RegisterNodesResponse(Parameters=ua.RegisterNodesResult(nodes))
-        nodes = struct_from_binary(ua.UnregisterNodesParameters, body).NodesToUnregister
-        require_count(nodes, self._bounds.nodes_per_register)
         return ua.UnregisterNodesResponse()
 
     def _allowance(self, is_active: bool) -> Allowance:

@@ -166,7 +166,6 @@ class Session(InternalSession):
         if self.iserver.requests is None:
             raise ServiceError(Codes.BadServerHalted)
         asked = params.NodesToWrite or []
-        self.bounds.require(asked, self.bounds.limits.nodes_per_write)
         codes = self.iserver.requests.write(self.user, asked)
         for place, value in enumerate(asked):
             if codes[place].value == Codes.BadNotWritable and value.NodeId not in self.aspace:
@@ -175,7 +174,6 @@ class Session(InternalSession):
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Methods of this package; and those of the library that send conditions again."""
-        self.bounds.require(params, self.bounds.limits.methods_per_call)
         results = []
         for request in params or []:
             answers = (answer(self.user, request) for answer in self.iserver.answers)
@@ -187,7 +185,6 @@ class Session(InternalSession):
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         """With UserAccessLevel as it is for this user."""
-        self.bounds.require(params.NodesToRead, self.bounds.limits.nodes_per_read)
         results = await super().read(params)
         self.bounds.require_answer(results)
         requests = self.iserver.requests
@@ -247,34 +244,6 @@ class Session(InternalSession):
         """As when they were created."""
         self.bounds.require_changed_items(params)
         return await super().modify_monitored_items(params)
-
-    async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
-        """Delete items within the limits."""
-        self.bounds.require(params.MonitoredItemIds, self.bounds.limits.items_per_call)
-        return await super().delete_monitored_items(params)
-
-    async def set_monitoring_mode(self, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
-        """Change items within the limits."""
-        self.bounds.require(params.MonitoredItemIds, self.bounds.limits.items_per_call)
-        return await super().set_monitoring_mode(params)
-
-    async def set_publishing_mode(self, params: ua.SetPublishingModeParameters) -> list[ua.StatusCode]:
-        """Change subscriptions within the limits."""
-        self.bounds.require(params.SubscriptionIds, self.bounds.limits.subscriptions)
-        return await super().set_publishing_mode(params)
-
-    async def transfer_subscriptions(  # type: ignore[override]
-        self, params: ua.TransferSubscriptionsParameters, callback: Any
-    ) -> list[ua.TransferResult]:
-        """Transfer subscriptions within the limits."""
-        self.bounds.require(params.SubscriptionIds, self.bounds.limits.subscriptions)
-        return await super().transfer_subscriptions(params, callback)
-
-    async def delete_subscriptions(self, ids: list[int]) -> list[ua.StatusCode]:
-        """Delete subscriptions within the limits; the library calls this for all of a session, and for none, too."""
-        if len(ids or []) > self.bounds.limits.subscriptions:
-            raise ServiceError(Codes.BadTooManyOperations)
-        return await super().delete_subscriptions(ids or [])
 
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
         """Raw values, of tags that have a history."""
