@@ -223,7 +223,7 @@ class Subscriptions(SubscriptionService):
         self._ending.add(task)
         task.add_done_callback(self._ending.discard)
 
-    @uamethod
+    @uamethod  # type: ignore[untyped-decorator]
     async def condition_refresh(self, parent: Any, subscription_id: int, mid: int | None = None) -> Any:
         """Send all conditions that are retained again (OPC 10000-9, 5.5.7); at most once per `REFRESH_PERIOD`."""
         subscription = self.subscriptions.get(subscription_id)
