@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 from conveyor_sim.scada.face import FaceError, Settings
@@ -146,10 +149,19 @@ def test_limits_are_options() -> None:
     + [f"opcua.connections={text}" for text in ("0", "-1", "1.5", "x", "", "²", "9" * 5000, "1e3", "1000000001")],
 )
 def test_limits_that_can_not_be_are_named(option: str) -> None:
-    with pytest.raises(FaceError, match="^--limit: .* given, expected"):
+    with pytest.raises(FaceError, match=r"^--limit: .* given, expected"):
         limit_settings([option])
 
 
 def test_a_limit_is_given_once() -> None:
-    with pytest.raises(FaceError, match="web.idle given twice"):
+    with pytest.raises(FaceError, match="given twice, expected once"):
         limit_settings(["web.idle=3", "web.idle=4"])
+
+
+def test_the_docs_state_all_limits_and_their_defaults() -> None:
+    text = Path("docs/reliability.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ((?:`[a-z]+\.\w+`,? ?)+) \| (\d+) \|", text, re.MULTILINE)
+    stated = {name: int(value) for names, value in rows for name in re.findall(r"`([^`]+)`", names)}
+    assert set(stated) == set(limit_names())
+    settings = Settings(**limit_settings(f"{name}={value}" for name, value in stated.items()))
+    assert settings == Settings()

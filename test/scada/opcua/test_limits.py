@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
+from datetime import datetime, timedelta, timezone
 from typing import Any
 
 import pytest
 from asyncua import Client, ua
 
 from conveyor_sim.scada.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
-from conveyor_sim.scada.quotas import QUOTA, Quota, share_of_guests
-from test.scada.opcua.conftest import HISTORY, PASSWORD, PATIENCE, Line, Serve, alone, refused
-
-Codes = ua.StatusCodes
+from conveyor_sim.scada.quotas import QUOTA
+from test.scada.opcua.conftest import HISTORY, Line, Serve
+from test.scada.opcua.limit_clients import TICK, Codes, code_of, connected, item, items_of
 
 SMALL = Limits(
     nodes_per_read=6,
@@ -43,41 +42,11 @@ SMALL = Limits(
 )
 
 ZONE = ua.NodeId("belts/zone1", 2)
-TICK = ua.NodeId("run/tick", 2)
-SERVER = ua.NodeId(ua.ObjectIds.Server)
 
 
 @pytest.fixture(scope="module")
 def small(serve: Serve) -> Line:
     return serve(limits=SMALL, history=HISTORY)
-
-
-def connected(line: Line, work: Callable[[Client], Awaitable[Any]], user: str = "") -> Any:
-    """What work of a client comes to."""
-
-    async def come() -> Any:
-        async with client_of(line, user) as client:
-            return await work(client)
-
-    result = alone(come())
-    line.until(lambda: line.clients == (0, 0))
-    return result
-
-
-def client_of(line: Line, user: str = "") -> Client:
-    client = Client(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
-    if user:
-        client.set_user(user)
-        client.set_password(PASSWORD)
-    return client
-
-
-async def code_of(answer: Awaitable[Any]) -> int:
-    try:
-        await answer
-    except ua.UaStatusCodeError as error:
-        return int(error.code)
-    return int(Codes.Good)
 
 
 def test_what_is_published_is_what_is_enforced(small: Line) -> None:
@@ -107,22 +76,11 @@ def description(node: ua.NodeId = ZONE) -> ua.BrowseDescription:
     return ua.BrowseDescription(node, ua.BrowseDirection.Both, references, True, 0, 63)
 
 
-def item(filter: Any = None, node: ua.NodeId = TICK) -> ua.MonitoredItemCreateRequest:
-    of_events = isinstance(filter, ua.EventFilter)
-    attribute = ua.AttributeIds.EventNotifier if of_events else ua.AttributeIds.Value
-    made = ua.MonitoredItemCreateRequest(ua.ReadValueId(SERVER if of_events else node, attribute))
-    made.RequestedParameters = ua.MonitoringParameters(1, 0.0, filter, 10, True)
-    return made
-
-
-def items_of(subscription: Any, *items: ua.MonitoredItemCreateRequest) -> ua.CreateMonitoredItemsParameters:
-    return ua.CreateMonitoredItemsParameters(subscription.subscription_id, ua.TimestampsToReturn.Both, list(items))
-
-
 def history(count: int, values: int = 0, point: bytes | None = None) -> ua.HistoryReadParameters:
-    node = ua.NodeId("belts/zone1/cmd_speed", 2)
-    nodes = [ua.HistoryReadValueId(NodeId=node, ContinuationPoint=point)] * count
-    details = ua.ReadRawModifiedDetails(StartTime=ua.datetime_to_win_epoch and None, NumValuesPerNode=values)
+    """Return a request for the history of `count` nodes, of `values` values each."""
+    nodes = [ua.HistoryReadValueId(NodeId=ua.NodeId("belts/zone1/cmd_speed", 2), ContinuationPoint=point)] * count
+    start, end = datetime(2000, 1, 1, tzinfo=timezone.utc), datetime(2100, 1, 1, tzinfo=timezone.utc)
+    details = ua.ReadRawModifiedDetails(False, StartTime=start, EndTime=end, NumValuesPerNode=values)
     return ua.HistoryReadParameters(details, ua.TimestampsToReturn.Both, False, nodes)
 
 
@@ -273,111 +231,6 @@ def test_filters_within_the_limits_and_all_of_a_session_together(small: Line) ->
     assert connected(small, work) == [Codes.Good, Codes.Good, Codes.Good, Codes.BadTooManyOperations]
 
 
-def test_subscriptions_and_items_of_one_client_leave_some_for_others(small: Line) -> None:
-    async def subscriptions(client: Client, most: int) -> int:
-        for count in range(most):
-            try:
-                await client.create_subscription(1000, None)
-            except ua.UaStatusCodeError as error:
-                assert error.code == Codes.BadTooManySubscriptions
-                return count
-        return most
-
-    async def work(first: Client) -> None:
-        async with client_of(small) as second, client_of(small, "operator") as third, client_of(small, "test") as last:
-            assert await subscriptions(first, 10) == SMALL.subscriptions_per_session
-            assert await subscriptions(second, 10) == SMALL.subscriptions_per_party - SMALL.subscriptions_per_session
-            assert await subscriptions(third, 2) == 2 and await subscriptions(last, 2) == 1, "8 in all"
-
-    connected(small, work)
-
-    async def items(first: Client) -> None:
-        async with client_of(small) as second, client_of(small, "operator") as third:
-            counts = []
-            for client in (first, second, third):
-                subscription = await client.create_subscription(1000, None)
-                create = client.uaclient.session.create_monitored_items
-                code, count = Codes.Good, 0
-                while (code := await code_of(create(items_of(subscription, item())))) == Codes.Good:
-                    count += 1
-                assert code == Codes.BadTooManyMonitoredItems
-                counts.append(count)
-            assert counts == [24, share_of_guests(40) - 24, 40 - share_of_guests(40)]
-
-    connected(small, items)
-
-
-class Heard:
-    """What a subscription is sent."""
-
-    def __init__(self) -> None:
-        self.values: list[Any] = []
-        self.status: list[int] = []
-
-    def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
-        self.values.append(value)
-
-    def event_notification(self, event: Any) -> None:
-        self.values.append(event)
-
-    def status_change_notification(self, status: Any) -> None:
-        self.status.append(status.Status.value)
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    async def wait() -> None:
-        while not condition():
-            await asyncio.sleep(0.01)
-
-    await asyncio.wait_for(wait(), PATIENCE)
-
-
-def test_intervals_are_as_long_as_all_of_a_session_allow(small: Line) -> None:
-    async def work(client: Client) -> list[float]:
-        intervals = []
-        for _ in range(3):
-            params = ua.CreateSubscriptionParameters(100.0, 100, 10, 0, True, 0)
-            result = await client.uaclient.session.create_subscription(params, lambda _: None)
-            intervals.append(result.RevisedPublishingInterval)
-        return intervals
-
-    assert connected(small, work) == [100.0, 100.0, 10_000.0]
-
-
-def test_what_waits_is_sent_in_several_answers(small: Line) -> None:
-    """Queues of many items together are larger than an answer."""
-
-    async def work(client: Client) -> None:
-        heard = Heard()
-        subscription = await client.create_subscription(1000, heard)
-        nodes = [client.get_node(ua.NodeId(f"belts/zone1/{name}", 2)) for name in ("speed", "cmd_speed", "count", "mode")]
-        for _ in range(3):
-            await subscription.subscribe_data_change(nodes)
-        await until(lambda: len(heard.values) == 12)
-        (one,) = small.server._server.iserver.subscription_service.subscriptions.values()  # type: ignore[union-attr]
-        await until(lambda: sum(one._sizes.values()) <= SMALL.unacknowledged)
-        await asyncio.sleep(0.05)
-        assert len(heard.values) == 12
-
-    connected(small, work)
-
-
-def test_history_is_read_in_several_answers(small: Line) -> None:
-    for _ in range(25):
-        small.advance()
-    small.leave()
-
-    async def work(client: Client) -> int:
-        node, count, point = "machines/filler/produced", 0, None
-        nodes = client.uaclient.session
-        params = history(2, 1000)
-        results = await nodes.history_read(params)
-        assert all(len(each.HistoryData.DataValues) <= 5 for each in results)
-        return len(results)
-
-    assert connected(small, work) == 2
-
-
 def test_an_answer_that_is_too_large_is_refused(small: Line) -> None:
     large = next(
         node
@@ -397,127 +250,21 @@ def test_an_answer_that_is_too_large_is_refused(small: Line) -> None:
     assert connected(small, work) == [Codes.Good, Codes.BadResponseTooLarge]
 
 
-def test_conditions_are_refreshed_once_a_second(small: Line) -> None:
+def test_history_beyond_an_answer_waits_behind_continuation_points(small: Line) -> None:
+    node = small.server._server.get_node("ns=2;s=belts/zone1/cmd_speed")  # type: ignore[union-attr]
+    assert node is not None
+    kept = small.server._server.iserver.history_manager.storage._kept["belts/zone1/cmd_speed"]  # type: ignore[union-attr]
+    first = kept[-1]
+    for number in range(1, 12):
+        later = first.SourceTimestamp + timedelta(seconds=number)
+        kept.append(ua.DataValue(ua.Variant(float(number)), ua.StatusCode(), later, later))
+
     async def work(client: Client) -> list[int]:
-        subscription = await client.create_subscription(1000, Heard())
-        id = ua.Variant(subscription.subscription_id, ua.VariantType.UInt32)
-        kind = ua.NodeId(ua.ObjectIds.ConditionType)
-        ask = ua.CallMethodRequest(kind, ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh), [id])
-        results = await client.uaclient.session.call([ask, ask, ask])
-        return [each.StatusCode.value for each in results]
+        read = client.uaclient.session.history_read
+        counts = [len(each.HistoryData.DataValues) for each in await read(history(2, 1000))]
+        (result,) = await read(history(1, 1000))
+        counts.append(len(result.HistoryData.DataValues))
+        (result,) = await read(history(1, 1000, result.ContinuationPoint))
+        return [*counts, len(result.HistoryData.DataValues)]
 
-    assert connected(small, work) == [Codes.Good, Codes.BadRefreshInProgress, Codes.BadRefreshInProgress]
-
-
-def test_a_subscription_that_costs_too_much_ends_and_others_go_on(serve: Serve) -> None:
-    """The costliest of the session, with a notification that says so."""
-    line = serve(limits=Limits(subscription_units_per_second=200))
-
-    async def work(client: Client) -> tuple[Heard, Heard, Heard]:
-        async with client_of(line) as other:
-            cheap, costly, foreign = Heard(), Heard(), Heard()
-            for each, heard, count in ((client, cheap, 1), (client, costly, 20), (other, foreign, 1)):
-                subscription = await each.create_subscription(50, heard)
-                await each.uaclient.session.create_monitored_items(items_of(subscription, *[item()] * count))
-            await until(lambda: True)
-            for _ in range(40):
-                before = line.simulation.tick
-                line.source.before_tick()
-                line.simulation.advance()
-                line.source.after_tick()
-                await until(lambda before=before: line.server._updates._last.tick > before)  # type: ignore[misc, union-attr]
-            await until(lambda: bool(costly.status))
-            before = len(foreign.values)
-            return cheap, costly, foreign
-
-    cheap, costly, foreign = connected(line, work)
-    assert costly.status == [Codes.BadResourceUnavailable]
-    assert cheap.status == foreign.status == []
-    service: Any = line.server._server.iserver.subscription_service  # type: ignore[union-attr]
-    assert service.ended == 1
-
-
-def test_a_flood_of_sessions_and_sockets_leaves_room_for_an_operator(serve: Serve) -> None:
-    line = serve(quota=Quota(connections=12, connections_per_address=12, connections_per_user=2))
-
-    async def work() -> None:
-        guests: list[Client] = []
-        silent = [await asyncio.open_connection("127.0.0.1", line.server.port) for _ in range(20)]
-        with refused(Codes.BadTooManySessions):
-            for _ in range(12):
-                client = client_of(line)
-                await client.connect()
-                guests.append(client)
-        assert len(guests) == share_of_guests(12)
-        silent += [await asyncio.open_connection("127.0.0.1", line.server.port) for _ in range(20)]
-        for _ in range(2):
-            operator = client_of(line, "operator")
-            await operator.connect()
-            guests.append(operator)
-        with refused(Codes.BadTooManySessions):
-            await client_of(line, "operator").connect()
-        silent += [await asyncio.open_connection("127.0.0.1", line.server.port) for _ in range(20)]
-        for client in guests:  # nobody who has a session was dropped
-            assert await client.get_node(TICK).read_value() is not None
-            await client.disconnect()
-        for _, writer in silent:
-            writer.close()
-
-    alone(work())
-    line.until(lambda: line.server.status().clients == 0)
-
-
-def test_requests_beyond_the_budget_wait_and_hold_up_nobody(serve: Serve) -> None:
-    """Seconds of a client's own; another's requests are answered between them."""
-    line = serve(limits=Limits(request_units_per_second=2000))
-
-    async def work(client: Client) -> tuple[int, int]:
-        read = ua.ReadParameters(NodesToRead=[ua.ReadValueId(TICK, ua.AttributeIds.Value)] * 100)
-        answered = 0
-
-        async def flood() -> None:
-            nonlocal answered
-            while True:
-                await client.uaclient.session.read(read)
-                answered += 1
-
-        async with client_of(line) as other:
-            flooding = asyncio.create_task(flood())
-            await until(lambda: answered >= 2)
-            before, mine = answered, 0
-            for _ in range(50):
-                await other.get_node(TICK).read_value()
-                mine += 1
-            during = answered - before
-            flooding.cancel()
-            await asyncio.gather(flooding, return_exceptions=True)
-            return mine, during
-
-    mine, during = connected(line, work)
-    assert mine == 50 and during < 50
-
-
-def test_a_client_that_reads_no_answers_is_ended(small: Line) -> None:
-    """Answers of 60 kB, and none of them taken."""
-
-    async def work() -> None:
-        client = client_of(small)
-        await client.connect()
-        transport: Any = client.uaclient.protocol.transport
-        transport.pause_reading()
-        read = ua.ReadParameters(NodesToRead=[ua.ReadValueId(ua.NodeId(ua.ObjectIds.Server_NamespaceArray), 13)] * 6)
-        small_enough = SMALL.answer_bytes
-        tasks = []
-        for _ in range(20_000):
-            tasks.append(asyncio.ensure_future(client.uaclient.session.read(read)))
-            await asyncio.sleep(0)
-            if transport.is_closing() or small.server.status().clients == 0:
-                break
-        await until(lambda: small.server.status().clients == 0)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-        assert small_enough
-        client.tloop = None  # type: ignore[attr-defined]
-
-    alone(work())
+    assert connected(small, work) == [5, 5, 10, len(kept) - 10]
