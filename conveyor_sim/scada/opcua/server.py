@@ -94,7 +94,10 @@ class OpcUaServer:
         return f"opc.tcp://{host}:{port if self._server is None else self.port}"
 
     def status(self) -> Status:
-        """Connections, monitored items; writes and calls that were passed on, and those that were refused."""
+        """Return connections, monitored items, writes and calls that were passed on, and those that were refused.
+
+        Subscriptions that ended because they exceeded a budget count as refused.
+        """
         server, requests = self._server, self._requests
         if server is None or server.bserver is None:
             return Status(0, 0, requests.writes, requests.refused, 0.0)
@@ -103,9 +106,10 @@ class OpcUaServer:
         if self._updates is not None:
             longest, self._updates.longest = max(longest, self._updates.longest), 0.0
             left_out = self._updates.left_out
-        subscriptions = server.iserver.subscription_service.subscriptions.values()
-        items = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
-        return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest, left_out)
+        service = server.iserver.subscription_service
+        items = sum(len(each.monitored_item_srv) for each in service.subscriptions.values())
+        refused = requests.refused + service.ended
+        return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
         """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""

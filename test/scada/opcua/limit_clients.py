@@ -61,6 +61,7 @@ def item(filter: Any = None) -> ua.MonitoredItemCreateRequest:
     of_events = isinstance(filter, ua.EventFilter)
     attribute = ua.AttributeIds.EventNotifier if of_events else ua.AttributeIds.Value
     made = ua.MonitoredItemCreateRequest(ua.ReadValueId(SERVER if of_events else TICK, attribute))
+    made.MonitoringMode = ua.MonitoringMode.Reporting
     made.RequestedParameters = ua.MonitoringParameters(1, 0.0, filter, 10, True)
     return made
 
@@ -68,6 +69,21 @@ def item(filter: Any = None) -> ua.MonitoredItemCreateRequest:
 def items_of(subscription: Any, *items: ua.MonitoredItemCreateRequest) -> ua.CreateMonitoredItemsParameters:
     """Return a request for items of a subscription."""
     return ua.CreateMonitoredItemsParameters(subscription.subscription_id, ua.TimestampsToReturn.Both, list(items))
+
+
+def large_node(line: Line) -> ua.NodeId:
+    """Return a node of the standard whose value has more than 60 kB."""
+    server: Any = line.server._server
+    values = ((node, data.attributes.get(ua.AttributeIds.Value)) for node, data in server.iserver.aspace._nodes.items())
+    return next(
+        node
+        for node, value in values
+        if value and value.value and value.value.Value and _is_large(value.value.Value.Value)
+    )
+
+
+def _is_large(value: Any) -> bool:
+    return isinstance(value, bytes) and len(value) > 60_000
 
 
 class Heard:
