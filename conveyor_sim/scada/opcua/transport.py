@@ -141,7 +141,7 @@ class Connection(OPCUAProtocol):
             await asyncio.sleep(ACTIVATION)
             session = self.processor.session if self.processor else None
             if session is None or not session.is_activated():
-                self.transport.close()
+                self._close()
                 return
 
     async def _process_one_msg(self, header: Any, buf: Any) -> bool:
@@ -198,6 +198,15 @@ class Connection(OPCUAProtocol):
         if self.transport is not None and not self.transport.is_closing():
             message = ua.ErrorMessage(ua.StatusCode(code), reason[:200])
             self.transport.write(uatcp_to_binary(ua.MessageType.Error, message))
+            self._close()
+
+    def _close(self) -> None:
+        """Close the connection; at once if the client does not read what it was sent, as that could wait for ever."""
+        if self.transport is None:
+            return
+        if self.transport.get_write_buffer_size():
+            self.transport.abort()
+        else:
             self.transport.close()
 
 
