@@ -37,6 +37,7 @@ class Emitter:
                 self._service._conditions[condition] = event
             else:
                 self.forget(condition)
+        event.made_fields = {}
         units = 0
         for subscription in list(self._service.subscriptions.values()):
             await subscription.monitored_item_srv.trigger_event(event)

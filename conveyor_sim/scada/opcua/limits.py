@@ -56,7 +56,7 @@ class Limits:
     """Fields that one event filter selects."""
     where_operands: int = 256
     """Operands that one evaluation of an event filter visits."""
-    event_fields_per_session: int = 4000
+    event_fields_per_session: int = 2000
     """Fields and operands of all event filters of one session."""
     notifications_per_publish: int = 2000
     """Values and events of one Publish answer; the rest follows in the next one."""
