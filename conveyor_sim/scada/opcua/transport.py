@@ -37,6 +37,8 @@ class Connection(OPCUAProtocol):
     places: Places
     guests: Budget
     """Work of all sessions without a user."""
+    turn: asyncio.Lock
+    """Held by the session without a user whose request is next."""
     place: Place | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -180,8 +182,12 @@ class Connection(OPCUAProtocol):
 
     async def _wait(self) -> None:
         """Wait until the work of earlier messages is within the budget."""
-        while delay := max(self.work.delay(), self.guests.delay() if self._is_guest else 0.0):
-            await asyncio.sleep(delay)
+        await asyncio.sleep(self.work.delay())
+        if not self._is_guest:
+            return
+        async with self.turn:
+            # One at a time, so that others are answered between the requests of many guests that waited.
+            await asyncio.sleep(self.guests.delay())
 
     def _make_room(self) -> None:
         """Close the connection because another one needs its place, with its session."""
@@ -219,10 +225,12 @@ class _Port(BinaryServer):
     bounds: Limits
     places: Places
     guests: Budget
+    turn: asyncio.Lock
 
     def _make_protocol(self) -> OPCUAProtocol:
         made = Connection(self.iserver, self._policies, self.clients, self.closing_tasks, self.limits)
-        made.longest, made.bounds, made.places, made.guests = self.longest, self.bounds, self.places, self.guests
+        made.longest, made.bounds, made.places = self.longest, self.bounds, self.places
+        made.guests, made.turn = self.guests, self.turn
         return made
 
 
@@ -248,7 +256,7 @@ class BoundedServer(Server):
         rate = self.bounds.guest_units_per_second
         self.bserver = _Port(self.iserver, host, port, self.limits)
         self.bserver.longest, self.bserver.bounds, self.bserver.places = self.longest, self.bounds, self.places
-        self.bserver.guests = Budget(rate, 2 * rate)
+        self.bserver.guests, self.bserver.turn = Budget(rate, 2 * rate), asyncio.Lock()
         self.bserver.set_policies(self._policies)
         try:
             await self.bserver.start()
