@@ -97,6 +97,7 @@ _WHERE = {
     default=True,
     help="Whether all may read there (default: they may).",
 )
+@click.option("--limit", "limits", multiple=True, metavar="NAME=VALUE", help="A limit: 'opcua.nodes_per_read=500'.")
 @click.option("--bind", default="127.0.0.1", help="Address to listen on, for other machines (default: this one only).")
 @click.option("--stamps", type=click.Choice(["wall", "simulated"]), default="wall", help="What times of values are.")
 @click.option("--real-time-factor", type=Number(0.0, 1e6), default=1.0, help="0: as fast as possible.")
@@ -123,6 +124,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     with collected_later():
         from conveyor_sim.scada.face import Settings
         from conveyor_sim.scada.faces import FACES
+        from conveyor_sim.scada.limit_options import limit_settings
         from conveyor_sim.scada.serving import Serving
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
@@ -130,7 +132,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     chosen = chosen or [(kind, kind.port) for kind in FACES if kind.by_default and kind.installed]
     for kind, _ in chosen or [(FACES[0], 0)]:
         kind.require()
-    settings = Settings(bind, stamps, **{name: given[name] for name in OF_FACES})
+    settings = Settings(bind, stamps, **{name: given[name] for name in OF_FACES}, **limit_settings(given["limits"]))
     for kind, place in chosen:
         kind.require_place(place, settings)  # not only once everything has been compiled
     paused: SceneSource | None = None

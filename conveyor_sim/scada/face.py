@@ -10,6 +10,8 @@ from typing import Literal, Protocol
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.scada.opcua.limits import LIMITS, Limits
+from conveyor_sim.scada.quotas import QUOTA, Quota
 from conveyor_sim.scada.users import Role
 
 HERE = "127.0.0.1"
@@ -52,6 +54,14 @@ class Settings:
     """Patterns of the tags whose last values it keeps."""
     web_certificates: Path | None = None
     """Folder of the certificate and key of the page; None: where it needs them, those of the OPC UA face."""
+    opcua_limits: Limits = LIMITS
+    """Work that one OPC UA client may cause."""
+    opcua_quota: Quota = QUOTA
+    """Places of the OPC UA connections."""
+    modbus_quota: Quota = QUOTA
+    """Places of the Modbus connections."""
+    web_quota: Quota = QUOTA
+    """Places of the pages."""
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ def _modbus(source: TagSource, port: int, settings: Settings) -> Face:
 
     tags = source.about.tags
     rows = modbus_map(tags) if settings.modbus_map is None else keep_map(settings.modbus_map, tags)
-    return ModbusServer(source, rows, settings.modbus_role, settings.host, port)
+    return ModbusServer(source, rows, settings.modbus_role, settings.host, port, settings.modbus_quota)
 
 
 def _modbus_exposes(settings: Settings) -> str:
@@ -92,6 +92,8 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
         history=settings.opcua_history,
         host=settings.host,
         port=port,
+        limits=settings.opcua_limits,
+        quota=settings.opcua_quota,
     )
 
 
@@ -129,6 +131,7 @@ def _web(source: TagSource, port: int, settings: Settings) -> Face:
         secured=server_context(settings.web_certificates, settings.opcua_certificates) if secured else None,
         host=settings.host,
         port=port,
+        quota=settings.web_quota,
     )
 
 

@@ -33,13 +33,8 @@ from conveyor_sim.scada.hands import objection, refused_for_good
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET, TICK
 from conveyor_sim.scada.holding import Holding
 from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
+from conveyor_sim.scada.quotas import GUEST, QUOTA, Place, Places, Quota
 from conveyor_sim.scada.source import MODBUS, TagSource
-
-MOST_CLIENTS = 64
-"""Connections at once; for one more, the one makes room that has been silent for longest, or it is closed at once."""
-
-SILENCE = 30.0
-"""s of wall time without a request after which a client no longer holds the line, nor its place among the clients."""
 
 MOST_UNREAD = 64 * 1024
 """Bytes of answers that a client may leave lying; then its connection ends."""
@@ -86,14 +81,14 @@ class ModbusServer:
         role: WriterKind | None = None,
         host: str = HERE,
         port: int = 0,
-        silence: float = SILENCE,
+        quota: Quota = QUOTA,
     ) -> None:
         """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free.
-        silence: s of wall time without a request after which a client holds nothing any more.
+        quota: places of the connections. A client that is idle for longer than it says no longer holds the line.
         """
         self._image = _Image(source, rows, role)
         self._at = host, port
-        self._silence = silence
+        self._quota = quota
         self._server: _Server | None = None
         self._watch: asyncio.Task[None] | None = None
 
@@ -126,7 +121,8 @@ class ModbusServer:
         require_free(MODBUS, host, port)
         # The library wants a device of its own; the image takes its place at each request.
         server = _Server(SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS)), address=(host, port))
-        server.image, server.silence, server.holding = self._image, self._silence, self._image.holding
+        server.image, server.holding = self._image, self._image.holding
+        server.places = Places(self._quota, keeps_active=True)
         try:
             await server.serve_forever(background=True)
         except (OSError, RuntimeError) as error:
@@ -148,8 +144,8 @@ class ModbusServer:
 class _Server(ModbusTcpServer):
     image: Any
     """An _Image: to the library, what a request is done to."""
-    silence: float
     holding: Holding
+    places: Places
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -159,22 +155,12 @@ class _Server(ModbusTcpServer):
     def callback_new_connection(self) -> ServerRequestHandler:
         return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
 
-    def make_room(self) -> bool:
-        """For one more connection; whether there is."""
-        if len(self.connected) >= MOST_CLIENTS:
-            oldest = min(self.connected, key=lambda handler: handler.asked)
-            if time.monotonic() - oldest.asked < self.silence:
-                return False
-            self.connected.discard(oldest)
-            oldest.cut()
-        return True
-
     async def watch(self) -> None:
         """Have whoever is silent give the line up."""
         while True:
             await asyncio.sleep(_LOOK)
             now, holder = time.monotonic(), self.holding.holder
-            if holder and all(one.writer != holder or now > one.asked + self.silence for one in self.connected):
+            if holder and all(one.writer != holder or now > one.asked + self.places.idle for one in self.connected):
                 self.holding.leave(holder)
             self.holding.look()
 
@@ -185,6 +171,7 @@ class _Handler(ServerRequestHandler):
     server: _Server
     writer = ""
     """Who its client is on record."""
+    place: Place | None = None
     asked = 0.0
     """s of wall time, when it asked for something last."""
     _received = b""
@@ -193,12 +180,14 @@ class _Handler(ServerRequestHandler):
 
     def callback_connected(self) -> None:
         super().callback_connected()
-        if not self.server.make_room():
+        peer = self.transport.get_extra_info("peername")
+        self.place = self.server.places.take(str(peer[0]) if peer else "", self.cut)
+        if self.place is None:
             self.close()
             return
         self.server.connected.add(self)
         self.asked = time.monotonic()
-        if (peer := self.transport.get_extra_info("peername")) is not None:
+        if peer is not None:
             self.writer = f"{MODBUS} {peer[0]}:{peer[1]}"
         if (connection := self.transport.get_extra_info("socket")) is not None:
             # A client that is gone without a word is noticed.
@@ -209,6 +198,8 @@ class _Handler(ServerRequestHandler):
 
     def callback_disconnected(self, exc: Exception | None) -> None:
         self.server.connected.discard(self)
+        if self.place is not None:
+            self.server.places.leave(self.place)
         self.server.holding.leave(self.writer)
         super().callback_disconnected(exc)
 
@@ -219,6 +210,7 @@ class _Handler(ServerRequestHandler):
 
     def cut(self) -> None:
         """End the connection at once; what was not sent is lost."""
+        self.server.connected.discard(self)
         self._stream.abort()
 
     def data_received(self, data: bytes) -> None:
@@ -233,6 +225,8 @@ class _Handler(ServerRequestHandler):
         try:
             while self.is_active() and not self._stream.is_closing() and (asked := self._next()) is not None:
                 began, self.asked = time.perf_counter(), time.monotonic()
+                if self.place is not None:
+                    self.place.touch(GUEST)
                 if self._stream.get_write_buffer_size() > MOST_UNREAD:
                     self.cut()  # it asks, and does not read what it is answered
                     return

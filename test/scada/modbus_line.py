@@ -17,6 +17,7 @@ from pymodbus.client import ModbusTcpClient
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.modbus_map import Row, modbus_map
 from conveyor_sim.scada.modbus_server import ModbusServer
+from conveyor_sim.scada.quotas import Quota
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import TickSource
 from conveyor_sim.scene import load_scene
@@ -40,7 +41,7 @@ class Line:
     def lose_patience(self) -> None:
         """From now on with whoever has been silent."""
         assert self.server._server is not None
-        self.server._server.silence = SHORT
+        self.server._server.places.idle = SHORT
 
     def advance(self, ticks: int = 1) -> None:
         for _ in range(ticks):
@@ -91,7 +92,7 @@ def serving(role: WriterKind | None) -> Iterator[Line]:
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1)
     source = TickSource(simulation)
     rows = modbus_map(source.about.tags)
-    server = ModbusServer(source, rows, role, silence=LONG)
+    server = ModbusServer(source, rows, role, quota=Quota(idle=LONG))
     with ServerThread() as thread:
         thread.run(server.start())
         with ModbusTcpClient("127.0.0.1", port=server.port, timeout=60) as client:

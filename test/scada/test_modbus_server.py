@@ -32,6 +32,7 @@ from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.inputs import DISOWN, OWN
 from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.modbus_map import HANDSHAKE
+from conveyor_sim.scada.quotas import QUOTA
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import View
@@ -40,7 +41,7 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 
 from pymodbus.client import ModbusTcpClient
 
-from conveyor_sim.scada.modbus_server import MOST_CLIENTS, ModbusServer
+from conveyor_sim.scada.modbus_server import ModbusServer
 
 
 @pytest.fixture(params=["operator"])
@@ -155,12 +156,24 @@ def test_more_writes_than_can_wait_are_refused_and_no_more_is_kept(line: Line) -
     assert not line.write(SETPOINT, 0.2).isError()
 
 
+READ_COIL = struct.pack(">HHHBBHH", 1, 0, 6, 1, 1, 0, 1)
+"""MBAP header, function 1, address 0, one coil."""
+
+
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
     address = ("127.0.0.1", line.server.port)
-    many = [socket.create_connection(address, timeout=60) for _ in range(MOST_CLIENTS + 8)]
-    many[-1].settimeout(20)
-    assert many[-1].recv(1) == b""  # closed by the server
-    assert line.server.status().clients == MOST_CLIENTS
+    most = QUOTA.connections_per_address
+    assert line.read(SPEED) == line.read(SPEED)
+    many = [socket.create_connection(address, timeout=60) for _ in range(most - 1 + 8)]
+    for one in many[:8]:  # they have not asked for anything, and make room
+        one.settimeout(20)
+        assert one.recv(1) == b""
+    assert line.server.status().clients == most
+    for one in many[8:]:
+        one.sendall(READ_COIL)
+        assert len(one.recv(100)) == 10
+    with socket.create_connection(address, timeout=20) as late:
+        assert late.recv(1) == b""  # all others are active
     for one in many:
         one.close()
     assert line.read(SPEED) == line.read(SPEED)
@@ -295,7 +308,10 @@ def test_who_asks_and_never_reads_is_cut_off(line: Line) -> None:
 
 def test_who_is_connected_and_silent_makes_room(line: Line) -> None:
     address = ("127.0.0.1", line.server.port)
-    silent = [socket.create_connection(address, timeout=60) for _ in range(MOST_CLIENTS)]
+    silent = [socket.create_connection(address, timeout=60) for _ in range(QUOTA.connections_per_address - 1)]
+    for one in silent:
+        one.sendall(READ_COIL)
+        assert len(one.recv(100)) == 10
     line.lose_patience()
     time.sleep(2 * SHORT)
     with ModbusTcpClient(*address[:1], port=address[1], timeout=60) as another:

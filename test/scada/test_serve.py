@@ -151,6 +151,7 @@ def test_who_ends_it_while_it_compiles_finds_nothing_left(
             "--modbus-role: given with ., expected none: a recording can't be commanded",
         ),
         ([".", "--modbus", "0"], "metadata.yaml is missing"),
+        ([SCENE, "--limit", "opcua.nodes=5"], "--limit: opcua.nodes given, expected one of opcua.nodes_per_read"),
         (["none", "--modbus", "0"], "none"),
         (
             [SCENE, "--modbus", "0", "--bind", "no.such.host.invalid"],

@@ -22,9 +22,10 @@ pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install con
 from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeError
 
 from conveyor_sim.scada.face import FaceError, Settings
+from conveyor_sim.scada.quotas import QUOTA, share_of_guests
 from conveyor_sim.scada.serving import Serving
 from conveyor_sim.scada.web import feed, server
-from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, MOST_VIEWERS
+from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS
 from conveyor_sim.scada.web.viewer import MOST_WAITING, UNSEEN
 
 T = TypeVar("T")
@@ -316,16 +317,27 @@ def test_a_picture_is_packed_once_however_many_look(live: Live, monkeypatch: pyt
     assert len(packed) >= 20 and len(packed) == len(set(packed)), "none was packed anew for another page"
 
 
-def test_no_more_pages_look_than_may(live: Live) -> None:
+def test_a_flood_of_pages_leaves_a_place_for_a_user(live: Live) -> None:
+    """Guests hold three quarters of an address's places; of the other pages the oldest make room, but no user."""
+    most = QUOTA.connections_per_address
+    guests = share_of_guests(most)
+
     async def work() -> None:
         async with ClientSession() as session:
-            sockets = []
-            with pytest.raises(WSServerHandshakeError) as refused:
-                for _ in range(MOST_VIEWERS + 1):
-                    sockets.append(await session.ws_connect(f"{live.url}/live", origin=live.url))
-            assert refused.value.status == 503 and len(sockets) <= MOST_VIEWERS
-            for socket in sockets:
-                await socket.close()
+            pages = [await session.ws_connect(f"{live.url}/live", origin=live.url) for _ in range(guests + 1)]
+            await pages[-1].send_json({"do": "sign_in", "name": "jo", "password": PASSWORD, "id": 0})
+            reply = await next_text(pages[-1], "reply")
+            assert reply["person"]["name"] == "jo"
+            late = [await session.ws_connect(f"{live.url}/live", origin=live.url) for _ in range(most - guests + 4)]
+            await frames(late[-1], 1)
+            for page in late[:4]:
+                while (message := await page.receive()).type is WSMsgType.BINARY:
+                    pass
+                assert message.data == WSCloseCode.TRY_AGAIN_LATER
+            await pages[-1].send_json({"do": "ping", "sent": 1.0})
+            assert (await next_text(pages[-1], "pong"))["sent"] == 1.0
+            for page in [*pages, *late]:
+                await page.close()
 
     run(work())
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from datetime import datetime, timezone
 from typing import Any
 
 from asyncua import ua
 from asyncua.server.internal_server import InternalServer
+
+_AT_ONCE = 2000
+"""Work units of an event after which other tasks run."""
 
 
 class Emitter:
@@ -33,8 +37,14 @@ class Emitter:
                 self._service._conditions[condition] = event
             else:
                 self.forget(condition)
+        event.made_fields = {}
+        units = 0
         for subscription in list(self._service.subscriptions.values()):
             await subscription.monitored_item_srv.trigger_event(event)
+            units += subscription.monitored_item_srv.event_units
+            if units > _AT_ONCE:
+                units = 0
+                await asyncio.sleep(0)
 
     def forget(self, condition: ua.NodeId) -> None:
         """Have it not sent again at a refresh."""

@@ -20,16 +20,19 @@ from conveyor_sim.scada.opcua.certificates import default_folder, identity
 from conveyor_sim.scada.opcua.conditions import AlarmStates
 from conveyor_sim.scada.opcua.emitter import Emitter
 from conveyor_sim.scada.opcua.history import History, require_tags
+from conveyor_sim.scada.opcua.limits import LIMITS, Limits
 from conveyor_sim.scada.opcua.line_events import LineEvents
 from conveyor_sim.scada.opcua.methods import Methods, add_methods
 from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.scada.opcua.packml import PackMl
+from conveyor_sim.scada.opcua.published_limits import publish
 from conveyor_sim.scada.opcua.requests import Client, Requests, reader
 from conveyor_sim.scada.opcua.session import SafeServer
 from conveyor_sim.scada.opcua.transport import BoundedServer, channel
 from conveyor_sim.scada.opcua.tree import add_line
 from conveyor_sim.scada.opcua.updates import Updates
 from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
+from conveyor_sim.scada.quotas import QUOTA, Places, Quota
 from conveyor_sim.scada.source import OPCUA, TagSource
 from conveyor_sim.scada.users import Logins, User
 
@@ -56,10 +59,13 @@ class OpcUaServer:
         history: Sequence[str] = (),
         host: str = HERE,
         port: int = 0,
+        limits: Limits = LIMITS,
+        quota: Quota = QUOTA,
     ) -> None:
         """users: who may do more than read, by name. anonymous: whether those who give no name may read.
         stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
         history: patterns of the tags whose last values are kept. port: 0 for any that is free.
+        limits: of each client. quota: places of the connections.
 
         Raises FaceError for a pattern that no tag fits.
         """
@@ -67,6 +73,7 @@ class OpcUaServer:
         self._source, self._logins, self._anonymous, self._stamps = source, Logins(users or {}), anonymous, stamps
         self._certificates, self._history = certificates, history
         self._at = host, port
+        self._limits, self._quota = limits, quota
         self._requests = Requests(source)
         self._server: BoundedServer | None = None
         self._updates: Updates | None = None
@@ -87,7 +94,10 @@ class OpcUaServer:
         return f"opc.tcp://{host}:{port if self._server is None else self.port}"
 
     def status(self) -> Status:
-        """Connections, monitored items; writes and calls that were passed on, and those that were refused."""
+        """Return connections, monitored items, writes and calls that were passed on, and those that were refused.
+
+        Subscriptions that ended because they exceeded a budget count as refused.
+        """
         server, requests = self._server, self._requests
         if server is None or server.bserver is None:
             return Status(0, 0, requests.writes, requests.refused, 0.0)
@@ -96,9 +106,10 @@ class OpcUaServer:
         if self._updates is not None:
             longest, self._updates.longest = max(longest, self._updates.longest), 0.0
             left_out = self._updates.left_out
-        subscriptions = server.iserver.subscription_service.subscriptions.values()
-        items = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
-        return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest, left_out)
+        service = server.iserver.subscription_service
+        items = sum(len(each.monitored_item_srv) for each in service.subscriptions.values())
+        refused = requests.refused + service.ended
+        return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
         """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""
@@ -122,9 +133,9 @@ class OpcUaServer:
         """A server with the standard's nodes, and who may come in."""
         host, port = self._at
         own = identity(self._certificates or default_folder())
-        internal = SafeServer(self, own.trusted)
+        internal = SafeServer(self, own.trusted, self._limits)
         internal.bind_condition_methods = 1
-        server = BoundedServer(internal)
+        server = BoundedServer(internal, self._limits, Places(self._quota))
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
         server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
         await server.init()
@@ -139,6 +150,7 @@ class OpcUaServer:
     async def _fill(self, server: BoundedServer) -> Updates:
         """Add the nodes of the line; what keeps them as the source is."""
         internal, source, requests = server.iserver, self._source, self._requests
+        await publish(internal, self._limits, self._quota)
         if await server.register_namespace(NAMESPACE) != INDEX:
             raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
         clock = Clock(source.about, self._stamps)

@@ -20,21 +20,14 @@ from asyncua.crypto import uacrypto
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
-from asyncua.ua.uaprotocol_auto import DataChangeFilter
 
 from conveyor_sim.line.inputs import SET
-from conveyor_sim.scada.opcua.items import Items
+from conveyor_sim.scada.opcua.bounds import Bounds
+from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
 from conveyor_sim.scada.opcua.requests import Codes, Requests
+from conveyor_sim.scada.opcua.subscriptions import Subscriptions
 from conveyor_sim.scada.opcua.transport import Connection, channel
-
-MOST_ITEMS = 20_000
-"""Monitored items of all sessions; more are refused."""
-
-LONGEST_QUEUE, EVENTS_QUEUED, MOST_QUEUED = 1000, 100, 300_000
-"""Values that wait for a client: of one item, of one with events at least, of all items of all clients. Where they are
-used up, queues have room for one.
-"""
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""
@@ -62,9 +55,14 @@ Answer = Callable[[User, ua.CallMethodRequest], ua.CallMethodResult | None]
 class SafeServer(InternalServer):
     """The library's server with sessions of this kind."""
 
-    def __init__(self, user_manager: Any, trusted: Collection[bytes]) -> None:
-        """trusted: certificates of clients that are let in; empty: all are."""
+    subscription_service: Subscriptions
+
+    def __init__(self, user_manager: Any, trusted: Collection[bytes], limits: Limits) -> None:
+        """trusted: certificates of clients that are let in; empty: all are. limits: of each client."""
         super().__init__(user_manager)
+        self.limits = limits
+        self.subscription_service = Subscriptions(self.aspace, self, limits)
+        self.isession.subscription_service = self.subscription_service
         self._trusted = trusted
         self.requests: Requests | None = None
         self.answers: Sequence[Answer] = ()
@@ -140,6 +138,7 @@ class Session(InternalSession):
         super().__init__(server, aspace, subscriptions, name, user=user, external=True)
         self.peer = peer
         self._connection: Connection | None = None
+        self.bounds = Bounds(self, server.limits)
         server.unregister_external_session(self)
         self.auth_token = ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString)
         server.register_external_session(self)
@@ -158,6 +157,8 @@ class Session(InternalSession):
         if self._connection is not None and connection is not self._connection:
             self._connection.leave()
         self._connection = connection
+        if connection is not None:
+            connection.require_place(self.user.name)
         return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
@@ -185,6 +186,7 @@ class Session(InternalSession):
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         """With UserAccessLevel as it is for this user."""
         results = await super().read(params)
+        self.bounds.require_answer(results)
         requests = self.iserver.requests
         if requests is not None and not requests.may(self.user, SET):
             for place, asked in enumerate(params.NodesToRead):
@@ -194,20 +196,34 @@ class Session(InternalSession):
                     results[place] = replace(results[place], Value=level)
         return results
 
+    async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
+        """Return references within the limits, the others behind continuation points."""
+        return self.bounds.views.browse(params)
+
+    async def browse_next(self, parameters: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
+        """Return the references behind continuation points."""
+        return self.bounds.views.browse_next(parameters)
+
+    async def translate_browsepaths_to_nodeids(self, params: list[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
+        """Return the targets of paths within the limits."""
+        return self.bounds.views.translate(params)
+
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
         """The library would publish as often as it is asked to, and do nothing else; and keep what nobody fetches.
 
         A lifetime is at least three times the time after which a client hears that there is nothing new (OPC 10000-4,
         5.14.2.2).
         """
-        interval = params.RequestedPublishingInterval = _interval(params.RequestedPublishingInterval)
+        self.bounds.require_subscription()
+        interval = self.subscription_service.interval(self.session_id, _interval(params.RequestedPublishingInterval))
+        interval = params.RequestedPublishingInterval = min(interval, LONGEST_INTERVAL)
         kept = max(3, math.ceil(UNFETCHED * 1000.0 / interval))
         params.RequestedLifetimeCount = min(params.RequestedLifetimeCount or kept, kept)
         most = max(1, params.RequestedLifetimeCount // 3)
         params.RequestedMaxKeepAliveCount = min(params.RequestedMaxKeepAliveCount or most, most)
         result = await super().create_subscription(params, *others, **named)
         subscription = self.subscription_service.subscriptions[result.SubscriptionId]
-        subscription.monitored_item_srv = Items(subscription, self.aspace)
+        subscription.is_guest, subscription.party = self.bounds.is_guest, self.bounds.party
         return result
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
@@ -219,45 +235,22 @@ class Session(InternalSession):
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
         """A bounded number of them, and of what waits for those who do not fetch it."""
-        asked = params.ItemsToCreate or []
-        if len(self._items()) + len(asked) > MOST_ITEMS:
-            raise ServiceError(Codes.BadTooManyMonitoredItems)
-        for item in asked:
-            _require_filter(item, item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier)
-        self._bound_queues(asked)
+        self.bounds.require_new_items(params)
         return await super().create_monitored_items(params)
 
     async def modify_monitored_items(
         self, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
         """As when they were created."""
-        subscription = self.subscription_service.subscriptions.get(params.SubscriptionId)
-        known = {} if subscription is None else subscription.monitored_item_srv._monitored_items
-        for item in params.ItemsToModify or []:
-            if (old := known.get(item.MonitoredItemId)) is not None:
-                _require_filter(item, isinstance(old.filter, ua.EventFilter))
-        self._bound_queues(params.ItemsToModify or [])
+        self.bounds.require_changed_items(params)
         return await super().modify_monitored_items(params)
-
-    def _items(self) -> list[Any]:
-        """Monitored items of all sessions."""
-        subscriptions = self.subscription_service.subscriptions.values()
-        return [item for each in subscriptions for item in each.monitored_item_srv._monitored_items.values()]
-
-    def _bound_queues(self, asked: Sequence[Any]) -> None:
-        """The library takes 0 for as long a queue as there may be, or for one without end."""
-        left = MOST_QUEUED - sum(item.queue_size for item in self._items())
-        for item in asked:
-            given = item.RequestedParameters
-            least = EVENTS_QUEUED if isinstance(given.Filter, ua.EventFilter) else 1
-            given.QueueSize = max(1, min(max(given.QueueSize, least), LONGEST_QUEUE, left))
-            left -= given.QueueSize
 
     async def history_read(self, params: ua.HistoryReadParameters) -> list[ua.HistoryReadResult]:
         """Raw values, of tags that have a history."""
         raw = isinstance(params.HistoryReadDetails, ua.ReadRawModifiedDetails)
         if not raw or params.HistoryReadDetails.IsReadModified:
             raise ServiceError(Codes.BadHistoryOperationUnsupported)
+        self.bounds.require_history(params)
         results = await super().history_read(params)
         for asked, result in zip(params.NodesToRead, results, strict=True):
             if name_of(asked.NodeId) not in self.iserver.history_manager.storage:
@@ -283,13 +276,6 @@ class Session(InternalSession):
     async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
         """Refused."""
         raise ServiceError(Codes.BadUserAccessDenied)
-
-
-def _require_filter(item: Any, of_events: bool) -> None:
-    """With a filter of another kind an item would be made, and never be told of anything."""
-    given = item.RequestedParameters.Filter
-    if given and not isinstance(given, ua.EventFilter if of_events else DataChangeFilter):
-        raise ServiceError(Codes.BadMonitoredItemFilterUnsupported)
 
 
 def _interval(asked: float) -> float:

@@ -8,11 +8,13 @@ import logging
 import ssl
 import time
 from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
+from conveyor_sim.scada.quotas import GUEST, QUOTA, Place, Places, Quota
 from conveyor_sim.scada.source import WEB
 from conveyor_sim.scada.users import Logins, User
 from conveyor_sim.scada.view import PictureSource
@@ -22,9 +24,6 @@ from conveyor_sim.scada.web.viewer import Viewer
 from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.view.own_host import is_own, is_same_origin
 
-MOST_VIEWERS = 64
-"""Pages that look at once; one more is told so."""
-
 MOST_CONNECTIONS = 256
 """At once, of pages and whatever else: for one more the oldest makes room that is no page."""
 
@@ -33,6 +32,9 @@ HANDSHAKE = 5.0
 
 LONGEST_REQUEST = 16_384
 """Bytes that a page sends at once, at most; who sends more is cut off."""
+
+SIGN_IN = 60.0
+"""Seconds in which a user of a page has to sign in where guests hold all their places."""
 
 MOST_REQUESTS, RATE = 400, 200.0
 """Of a page: at once, and a second (of wall time) for longer; who sends more is cut off. Of each frame a page says that
@@ -66,10 +68,12 @@ class WebServer:
         secured: ssl.SSLContext | None = None,
         host: str = HERE,
         port: int = 0,
+        quota: Quota = QUOTA,
     ) -> None:
         """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
-        TLS; None: plain, which is for this machine only. port: 0 for any that is free.
+        TLS; None: plain, which is for this machine only. port: 0 for any that is free. quota: places of the pages.
         """
+        self._places = Places(quota)
         self._logins, self._anonymous, self._secured = Logins(dict(users or {})), anonymous, secured
         self._at = host, port
         self._commands = Commands(source)
@@ -81,6 +85,7 @@ class WebServer:
         self._listening: asyncio.Server | None = None
         self._sockets: set[web.WebSocketResponse] = set()
         self._pages: set[asyncio.BaseProtocol] = set()
+        self._closing: set[asyncio.Task[bool]] = set()
         self._password = asyncio.Lock()
 
     @property
@@ -178,11 +183,12 @@ class WebServer:
         headers = request.headers
         if not is_same_origin(headers.getall("Origin", []), headers.getall("Host", []), self._scheme):
             return web.Response(status=403, text="expected a page of this server", headers=HEADERS)
-        if len(self._sockets) >= MOST_VIEWERS:
-            return web.Response(status=503, text=f"{MOST_VIEWERS} pages look already", headers=HEADERS)
         socket = web.WebSocketResponse(
             heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False, timeout=CLOSING, autoping=False
         )
+        place = self._places.take(request.remote or "", partial(self._end, socket))
+        if place is None:
+            return web.Response(status=503, text="users hold all places for pages", headers=HEADERS)
         self._sockets.add(socket)
         self._pages.add(request.protocol)
         viewer = Viewer(socket)
@@ -190,10 +196,11 @@ class WebServer:
         try:
             await socket.prepare(request)
             sending = asyncio.create_task(viewer.send())
-            await self._answer_all(socket, viewer, request.remote or "")
+            await self._answer_all(socket, viewer, place)
         except ConnectionError:
             pass
         finally:
+            self._places.leave(place)
             self._sockets.discard(socket)
             self._pages.discard(request.protocol)
             self._feed.leave(viewer)
@@ -202,9 +209,38 @@ class WebServer:
                 await asyncio.gather(sending, return_exceptions=True)
         return socket
 
-    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, origin: str) -> None:
-        """Until the connection ends. origin: the machine that it comes from."""
-        person = NOBODY
+    def _end(self, socket: web.WebSocketResponse) -> None:
+        """Close a page because another one needs its place."""
+        closing = asyncio.create_task(
+            socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=b"another page needs the place")
+        )
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
+
+    def _expire(self, socket: web.WebSocketResponse, place: Place) -> None:
+        """Close a page that got no place as a guest, and whose user has not signed in."""
+        if place.stage < GUEST and not self._places.admit_guest(place):
+            self._end(socket)
+
+    def _sign_out(self, socket: web.WebSocketResponse, place: Place) -> None:
+        """Have a page go on as a guest, if it had a user."""
+        if place.user:
+            self._places.leave_user(place)
+            self._expire(socket, place)
+
+    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
+        """Until the connection ends. place: of the page."""
+        expiry = None
+        if not self._places.admit_guest(place):
+            expiry = asyncio.get_running_loop().call_later(SIGN_IN, self._expire, socket, place)
+        try:
+            await self._answer_requests(socket, viewer, place)
+        finally:
+            if expiry is not None:
+                expiry.cancel()
+
+    async def _answer_requests(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
+        person, origin = NOBODY, place.address
         if self._anonymous:
             self._feed.join(viewer)
         else:
@@ -222,6 +258,8 @@ class WebServer:
                 reason = "too many requests" if left < 0.0 else "expected an object in JSON"
                 await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason.encode())
                 break
+            if request.get("do") != "ping":  # a hidden page pings, and shows no frames
+                place.touch()
             match request.get("do"):
                 case "saw":
                     viewer.saw()
@@ -233,11 +271,16 @@ class WebServer:
                 case "sign_in":
                     person = await self._sign_in(request, origin)
                     refused = "" if person.name else "name or password are wrong"
+                    if person.name and not self._places.admit_user(place, person.name):
+                        refused, person = f"{person.name} has too many pages open", NOBODY
+                    if not person.name:
+                        self._sign_out(socket, place)
                     viewer.tell(_reply(request, refused, person))
                     if not self._anonymous and person.name:
                         self._feed.join(viewer)
                 case "sign_out":
                     person = NOBODY
+                    self._sign_out(socket, place)
                     viewer.tell(_reply(request, "", person))
                     if not self._anonymous:
                         self._feed.leave(viewer)

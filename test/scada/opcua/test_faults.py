@@ -14,9 +14,10 @@ from asyncua import ua
 
 from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.opcua import session, transport
+from conveyor_sim.scada.opcua.limits import Limits
+from conveyor_sim.scada.opcua.processor import CHUNK
 from conveyor_sim.scada.opcua.server import OpcUaServer
-from conveyor_sim.scada.opcua.session import LONGEST_QUEUE
-from conveyor_sim.scada.opcua.transport import CHUNK, MOST_CLIENTS
+from conveyor_sim.scada.quotas import QUOTA
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING
 from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone
@@ -91,9 +92,11 @@ def test_a_message_without_end_is_not_kept(line: Line) -> None:
 
 
 def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
-    many = [raw(line) for _ in range(MOST_CLIENTS + 8)]
-    assert closed(many[-1]) == b""
-    assert line.server.status().clients == MOST_CLIENTS
+    """The first ones make room: none of them has got further than the others."""
+    most = QUOTA.connections_per_address
+    many = [raw(line) for _ in range(most + 8)]
+    assert all(closed(one)[:3] == b"ERR" for one in many[:8])
+    line.until(lambda: line.server.status().clients == most)
     for one in many:
         one.close()
     line.until(lambda: line.server.status().clients == 0)
@@ -232,8 +235,9 @@ def test_a_server_that_is_started_again_is_found_where_it_was(serve: Serve, cert
     assert line.server.port == port and line.read(SETPOINT) == line.source.shown.values[SETPOINT]
 
 
-def test_what_waits_for_a_client_is_bounded(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The library takes a queue of 0 for one without end."""
+def test_what_waits_for_a_client_is_bounded(serve: Serve) -> None:
+    """The library takes a queue of 0 for one without end; of guests a quarter of all queues is kept free."""
+    line = serve(limits=Limits(queue_size=60, queued=120))
     subscription = line.client().create_subscription(60_000, None)
     node = line.node("run/tick")
 
@@ -247,15 +251,14 @@ def test_what_waits_for_a_client_is_bounded(line: Line, monkeypatch: pytest.Monk
 
     first = subscription.subscribe_data_change(node, queuesize=10**6)
     subscription.subscribe_data_change(node, queuesize=0)
-    assert sizes() == [LONGEST_QUEUE, 1]
+    assert sizes() == [60, 1]
     subscription.tloop.post(subscription.aio_obj.modify_monitored_item(first, 100.0, 0))
     assert sizes() == [1, 1]
-    monkeypatch.setattr(session, "MOST_QUEUED", 50)
-    for expected in (40, 8, 1):
+    for expected in (40, 40, 8, 1):
         subscription.subscribe_data_change(node, queuesize=40)
         assert sizes()[-1] == expected
     for _ in range(30):
         line.advance()
     service = line.server._server.iserver.subscription_service  # type: ignore[union-attr]
     (only,) = service.subscriptions.values()
-    assert sum(map(len, only._triggered_datachanges.values())) <= 51
+    assert sum(map(len, only._triggered_datachanges.values())) <= 91

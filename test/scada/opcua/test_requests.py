@@ -185,7 +185,8 @@ def test_calls_that_can_not_be_are_refused(line: Line) -> None:
         (("2:set_mode", "belts/zone1"), Codes.BadArgumentsMissing),
         (("2:set_mode", "belts/zone1", whole, whole), Codes.BadTooManyArguments),
         (("2:set_mode", "belts/zone1", 3.0), Codes.BadInvalidArgument),
-        (("2:acknowledge", "x" * 100_000), Codes.BadInvalidArgument),
+        (("2:acknowledge", "x" * 60_000), Codes.BadInvalidArgument),
+        (("2:acknowledge", "x" * 100_000), Codes.BadEncodingLimitsExceeded),
         (("2:force", "belts/zone1/speed", float("inf")), Codes.BadInvalidArgument),
         (("2:inject", "belts/zone1/cmd_speed", 1.0), Codes.BadInvalidArgument),
     ]

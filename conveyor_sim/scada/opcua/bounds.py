@@ -1,0 +1,143 @@
+"""`Bounds`: the checks of one session's requests against the limits, and the work units that they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from asyncua import ua
+from asyncua.common.utils import ServiceError
+
+from conveyor_sim.scada.opcua.browsing import Views
+from conveyor_sim.scada.opcua.filters import require_filter
+from conveyor_sim.scada.opcua.limits import Limits
+from conveyor_sim.scada.quotas import share_of_guests
+from conveyor_sim.scada.work import Budget
+
+Codes = ua.StatusCodes
+
+EVENTS_QUEUED = 100
+"""Events that an item queues at least."""
+
+_BASE_SIZE = 8
+"""Bytes of a value whose size is not looked at."""
+
+_HISTORY_UNITS = 2
+"""Work units of a value of the history."""
+
+
+class Bounds:
+    """Limits of one session."""
+
+    def __init__(self, session: Any, limits: Limits) -> None:
+        """session: an asyncua InternalSession."""
+        self._session, self.limits = session, limits
+        self.views = Views(session.aspace, limits)
+        rate = limits.subscription_units_per_second
+        self.subscription_work = Budget(rate, 2 * rate)
+        self._units = 0
+
+    @property
+    def units(self) -> int:
+        """Work units of the session's requests so far, beside those of decoding."""
+        return self._units + self.views.examined
+
+    @property
+    def is_guest(self) -> bool:
+        """True if the session has no user."""
+        return not self._session.user.name
+
+    @property
+    def party(self) -> str:
+        """User of the session, or the address of a session without one."""
+        name = self._session.name
+        return self._session.user.name or str(name[0] if isinstance(name, tuple) else name)
+
+    def require_answer(self, results: Iterable[ua.DataValue]) -> None:
+        """Raise ServiceError with BadResponseTooLarge for values that are too large together."""
+        size = sum(_bytes(result.Value.Value) for result in results if result.Value is not None)
+        self._units += size // 1000
+        if size > self.limits.answer_bytes:
+            raise ServiceError(Codes.BadResponseTooLarge)
+
+    def require_subscription(self) -> None:
+        """Raise ServiceError with BadTooManySubscriptions if the session may not have one more."""
+        self._service.require_room(self._session.session_id, self.party, self.is_guest)
+
+    def require_new_items(self, params: ua.CreateMonitoredItemsParameters) -> None:
+        """Raise ServiceError for too many or too costly items. Reduce queues to the room that is left."""
+        limits, asked = self.limits, params.ItemsToCreate
+        mine = self._items(lambda one: one.session_id == self._session.session_id)
+        guests = self._items(lambda one: one.is_guest) if self.is_guest else 0
+        if (
+            self._items(lambda _: True) + len(asked) > limits.items
+            or mine + len(asked) > limits.items_per_session
+            or guests + len(asked) > share_of_guests(limits.items)
+        ):
+            raise ServiceError(Codes.BadTooManyMonitoredItems)
+        fields = 0
+        for item in asked:
+            of_events = item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier
+            fields += require_filter(item.RequestedParameters.Filter, of_events, limits) if of_events else 0
+            if not of_events:
+                require_filter(item.RequestedParameters.Filter, False, limits)
+        self._require_fields(fields)
+        self._bound_queues(asked)
+
+    def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
+        """As `require_new_items`, for items that exist."""
+        asked = params.ItemsToModify
+        subscription = self._service.subscriptions.get(params.SubscriptionId)
+        known = {} if subscription is None else subscription.monitored_item_srv._monitored_items
+        fields = 0
+        for item in asked:
+            if (old := known.get(item.MonitoredItemId)) is not None:
+                of_events = isinstance(old.filter, ua.EventFilter)
+                cost = require_filter(item.RequestedParameters.Filter, of_events, self.limits)
+                fields += cost if of_events else 0
+        self._require_fields(fields)
+        self._bound_queues(asked)
+
+    def require_history(self, params: ua.HistoryReadParameters) -> None:
+        """Reduce the values per node to what one answer takes."""
+        details = params.HistoryReadDetails
+        most = max(1, self.limits.history_values // len(params.NodesToRead))
+        details.NumValuesPerNode = min(details.NumValuesPerNode or most, most)
+        self._units += _HISTORY_UNITS * most * len(params.NodesToRead)
+
+    def _require_fields(self, fields: int) -> None:
+        """Raise ServiceError if all event filters of the session together select too much."""
+        mine = (
+            each.monitored_item_srv.event_fields
+            for each in self._service.subscriptions.values()
+            if each.session_id == self._session.session_id
+        )
+        if fields and sum(mine) + fields > self.limits.event_fields_per_session:
+            raise ServiceError(Codes.BadTooManyOperations)
+
+    def _bound_queues(self, asked: Sequence[Any]) -> None:
+        """Grant queues. The library takes 0 for as long a queue as there may be, or for one without end."""
+        subscriptions = self._service.subscriptions.values()
+        most = share_of_guests(self.limits.queued) if self.is_guest else self.limits.queued
+        left = most - sum(each.monitored_item_srv.queued for each in subscriptions)
+        for item in asked:
+            given = item.RequestedParameters
+            least = EVENTS_QUEUED if isinstance(given.Filter, ua.EventFilter) else 1
+            given.QueueSize = max(1, min(max(given.QueueSize, least), self.limits.queue_size, left))
+            left -= given.QueueSize
+
+    def _items(self, wanted: Any) -> int:
+        """Return the number of monitored items of the subscriptions that a function accepts."""
+        subscriptions = self._service.subscriptions.values()
+        return sum(len(each.monitored_item_srv) for each in subscriptions if wanted(each))
+
+    @property
+    def _service(self) -> Any:
+        return self._session.subscription_service
+
+
+def _bytes(value: Any) -> int:
+    """Return the approximate size of a value in an answer."""
+    if isinstance(value, str | bytes):
+        return len(value)
+    return sum(map(_bytes, value)) if isinstance(value, list) else _BASE_SIZE

@@ -1,0 +1,156 @@
+"""`Processor`: the messages of one connection, with limits before, while and after they are decoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from asyncua import ua
+from asyncua.common.connection import SecureConnection, TransportLimits
+from asyncua.common.utils import ServiceError
+from asyncua.crypto.security_policies import SecurityPolicyNone
+from asyncua.server.uaprocessor import UaProcessor
+from asyncua.ua.ua_binary import struct_from_binary
+
+from conveyor_sim.scada.opcua.decoding import Allowance, BoundedBuffer
+from conveyor_sim.scada.opcua.limits import Limits
+from conveyor_sim.scada.opcua.operations import require_operations
+
+Codes = ua.StatusCodes
+
+CHUNK = 65_535
+"""Bytes of a part of a message, at most."""
+
+SMALLEST_CHUNK = 8192
+"""Bytes that a client must be able to receive and send at once (OPC 10000-6, 7.1.2.3)."""
+
+REQUEST_UNITS, CHANNEL_UNITS, LOGIN_UNITS = 10, 500, 5000
+"""Work units of any message, of opening a channel (RSA), and of a password (scrypt)."""
+
+_BROWSE_NEXT = ua.NodeId(ua.ObjectIds.BrowseNextRequest_Encoding_DefaultBinary)
+_REGISTER = ua.NodeId(ua.ObjectIds.RegisterNodesRequest_Encoding_DefaultBinary)
+_UNREGISTER = ua.NodeId(ua.ObjectIds.UnregisterNodesRequest_Encoding_DefaultBinary)
+_ACTIVATE = ua.NodeId(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
+
+
+@dataclass
+class ConnectionLimits(TransportLimits):
+    """Sizes of the messages of one connection; lower ones until its session is activated."""
+
+    is_logged_in: bool = False
+    before_login: int = 65_536
+    """Bytes of one message."""
+
+    @classmethod
+    def of(cls, limits: Limits) -> ConnectionLimits:
+        """Return the limits of a new connection."""
+        size = limits.message_bytes
+        return cls(CHUNK, CHUNK, -(-size // SMALLEST_CHUNK) + 1, size, before_login=limits.message_bytes_before_login)
+
+    def create_acknowledge_and_set_limits(self, msg: ua.Hello) -> ua.Acknowledge:
+        """Agree on sizes. Raise ServiceError for buffers in which answers would be cut into tiny parts."""
+        if min(msg.ReceiveBufferSize, msg.SendBufferSize) < SMALLEST_CHUNK:
+            raise ServiceError(Codes.BadConnectionRejected)
+        return super().create_acknowledge_and_set_limits(msg)
+
+    def is_msg_size_within_limit(self, sz: int) -> bool:
+        """Return True for a size within the limit. Raise ServiceError otherwise; the library has another code."""
+        if sz > self.max_message_size or not (self.is_logged_in or sz <= self.before_login):
+            raise ServiceError(Codes.BadTcpMessageTooLarge)
+        return True
+
+    def is_chunk_count_within_limit(self, sz: int) -> bool:
+        """Return True for a number of parts within the limit. Raise ServiceError otherwise."""
+        if sz > self.max_chunk_count or not (self.is_logged_in or sz <= self.before_login // SMALLEST_CHUNK + 1):
+            raise ServiceError(Codes.BadTcpMessageTooLarge)
+        return True
+
+
+class Processor(UaProcessor):
+    """Messages of one connection."""
+
+    _limits: ConnectionLimits
+    session: Any
+
+    def __init__(self, server: Any, transport: Any, limits: Limits) -> None:
+        """Start without a session."""
+        super().__init__(server, transport, ConnectionLimits.of(limits))
+        self._bounds = limits
+        self._connection = SecureConnection(SecurityPolicyNone(), self._limits)
+        self.units = 0
+        """Work units so far."""
+
+    async def process(self, header: Any, body: Any) -> bool:
+        """Process one part of a message. Raise ServiceError, after which the connection ends."""
+        self.units += CHANNEL_UNITS if header.MessageType == ua.MessageType.SecureOpen else REQUEST_UNITS
+        self._limits.is_logged_in = self._is_active
+        return await super().process(header, body)
+
+    def send_response(self, *arguments: Any, **options: Any) -> None:
+        """Send an answer; end the connection of a client that does not read its answers."""
+        super().send_response(*arguments, **options)
+        if self._transport.get_write_buffer_size() > self._bounds.answer_bytes:
+            self._transport.abort()
+
+    def open_secure_channel(self, algohdr: Any, seqhdr: Any, body: Any) -> None:
+        """Open a channel, by a message that is decoded within the limits before a login."""
+        super().open_secure_channel(algohdr, seqhdr, BoundedBuffer(bytes(body), self._allowance(False)))
+
+    async def process_message(self, seqhdr: Any, body: Any) -> bool:
+        """Answer one message. Raise ServiceError if it exceeds the limits of decoding."""
+        was_active, examined = self._is_active, self._examined
+        allowance = self._allowance(was_active)
+        try:
+            goes_on = bool(await super().process_message(seqhdr, BoundedBuffer(bytes(body), allowance)))
+        except RecursionError as error:
+            raise ServiceError(Codes.BadEncodingLimitsExceeded) from error
+        finally:
+            self.units += allowance.used + max(0, self._examined - examined)  # it may be another session
+        if allowance.exceeded and not was_active:  # a session goes on with the fault that it was sent
+            raise ServiceError(Codes.BadEncodingLimitsExceeded)
+        return goes_on
+
+    async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> bool:
+        """Answer services that the library does not pass to the session, or does not have."""
+        try:
+            if self._is_active:
+                self.units += require_operations(typeid, body, self._bounds)
+            if typeid in (_BROWSE_NEXT, _REGISTER, _UNREGISTER) and self._is_active:
+                self.session.touch()
+                response = await self._answer(typeid, body)
+                self.send_response(requesthdr.RequestHandle, seqhdr, response)
+                return True
+            if typeid == _ACTIVATE:
+                self.units += LOGIN_UNITS
+            return bool(await super()._process_message(typeid, requesthdr, seqhdr, body))
+        except RecursionError as error:  # nested deeper than the interpreter allows
+            body.allowance.exceeded = True
+            raise ServiceError(Codes.BadEncodingLimitsExceeded) from error
+
+    async def _answer(self, typeid: Any, body: Any) -> Any:
+        if typeid == _BROWSE_NEXT:
+            results = await self.session.browse_next(struct_from_binary(ua.BrowseNextParameters, body))
+            return ua.BrowseNextResponse(Parameters=ua.BrowseNextResult(results))
+        if typeid == _REGISTER:
+            nodes = struct_from_binary(ua.RegisterNodesParameters, body).NodesToRegister
+            return ua.RegisterNodesResponse(Parameters=ua.RegisterNodesResult(nodes))
+        return ua.UnregisterNodesResponse()
+
+    def _allowance(self, is_active: bool) -> Allowance:
+        limits = self._bounds
+        if is_active:
+            return Allowance(limits.decoding_steps, limits.array_length, limits.string_bytes)
+        return Allowance(
+            limits.decoding_steps_before_login,
+            limits.decoding_steps_before_login,
+            limits.string_bytes_before_login,
+        )
+
+    @property
+    def _is_active(self) -> bool:
+        return self.session is not None and bool(self.session.is_activated())
+
+    @property
+    def _examined(self) -> int:
+        """Work units of the services of the session so far."""
+        return 0 if self.session is None else int(self.session.bounds.units)
