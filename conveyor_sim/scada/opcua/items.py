@@ -6,7 +6,9 @@ from contextlib import suppress
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.monitored_item_service import MonitoredItemService, MonitoredItemValues
+from asyncua.server.monitored_item_service import MonitoredItemService, MonitoredItemValues, WhereClauseEvaluator
+
+from conveyor_sim.scada.opcua.filters import filter_code
 
 
 class Items(MonitoredItemService):
@@ -21,6 +23,30 @@ class Items(MonitoredItemService):
         if error is None and item.filter and last is not None and not _exceeds(last, value, item.filter):
             return
         await super().datachange_callback(handle, value, error)
+
+    async def resend(self) -> None:
+        """Queue the present value of each item once more, for a session that takes over (OPC 10000-4, 5.14.7)."""
+        for mid in self._monitored_datachange.values():
+            item = self._monitored_items[mid]
+            if item.mode == ua.MonitoringMode.Reporting and item.read_value_id is not None:
+                value = self.aspace.read_attribute_value(item.read_value_id.NodeId, item.read_value_id.AttributeId)
+                notification = ua.MonitoredItemNotification(item.client_handle, value)
+                await self.isub.enqueue_datachange_event(mid, notification, item.queue_size)
+
+    def _modify_monitored_item(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
+        """Change an item, its event filter included, which the library would go on evaluating as it was before."""
+        item = self._monitored_items.get(params.MonitoredItemId)
+        if item is None:
+            return ua.MonitoredItemModifyResult(ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid))
+        of_events = item.callback_handle is None
+        wanted = params.RequestedParameters.Filter or (item.filter if of_events else None)
+        if (code := filter_code(wanted, of_events=of_events)) != ua.StatusCodes.Good:
+            return ua.MonitoredItemModifyResult(ua.StatusCode(code))
+        params.RequestedParameters.Filter = wanted
+        if of_events:
+            item.where_clause_evaluator = WhereClauseEvaluator(self.logger, self.aspace, wanted.WhereClause)
+        item.client_handle = params.RequestedParameters.ClientHandle
+        return super()._modify_monitored_item(params)
 
     async def _trigger_event(self, event: Any, mid: int) -> None:
         with suppress(Exception):  # of one client's fields that can't be; to the others it goes all the same

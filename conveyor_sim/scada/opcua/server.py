@@ -87,7 +87,11 @@ class OpcUaServer:
         return f"opc.tcp://{host}:{port if self._server is None else self.port}"
 
     def status(self) -> Status:
-        """Connections, monitored items; writes and calls that were passed on, and those that were refused."""
+        """Return connections, monitored items, and counts of requests.
+
+        Requests that were passed on are writes and calls; those that were refused are also requests on subscriptions of
+        other sessions.
+        """
         server, requests = self._server, self._requests
         if server is None or server.bserver is None:
             return Status(0, 0, requests.writes, requests.refused, 0.0)
@@ -98,7 +102,8 @@ class OpcUaServer:
             left_out = self._updates.left_out
         subscriptions = server.iserver.subscription_service.subscriptions.values()
         items = sum(len(each.monitored_item_srv._monitored_items) for each in subscriptions)
-        return Status(len(server.bserver.clients), items, requests.writes, requests.refused, longest, left_out)
+        refused = requests.refused + server.iserver.owners.refusals.count
+        return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:
         """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""

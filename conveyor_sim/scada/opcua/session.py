@@ -20,13 +20,15 @@ from asyncua.crypto import uacrypto
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
-from asyncua.ua.uaprotocol_auto import DataChangeFilter
 
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.scada.opcua.items import Items
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
+from conveyor_sim.scada.opcua.ownership import REFRESH, OwnedSession, Owners
+from conveyor_sim.scada.opcua.refusals import Refusals
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.transport import Connection, channel
+from conveyor_sim.scada.opcua.well_formed import WellFormedSession, require_url
 
 MOST_ITEMS = 20_000
 """Monitored items of all sessions; more are refused."""
@@ -41,11 +43,6 @@ SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 
 UNFETCHED = 30.0
 """s for which a subscription is kept that nobody fetches anything of, or three of its intervals, if that is longer."""
-
-REFRESH = {
-    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
-    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh2),
-}
 
 _DECRYPTED = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": uacrypto.decrypt_rsa_oaep,
@@ -66,6 +63,7 @@ class SafeServer(InternalServer):
         """trusted: certificates of clients that are let in; empty: all are."""
         super().__init__(user_manager)
         self._trusted = trusted
+        self.owners = Owners(Refusals(), trusting=bool(trusted))
         self.requests: Requests | None = None
         self.answers: Sequence[Answer] = ()
         """Who may know a method that is called."""
@@ -80,7 +78,7 @@ class SafeServer(InternalServer):
         peer = None if connection is None else connection.peer
         if self._trusted and peer not in self._trusted:
             raise ServiceError(Codes.BadSecurityModeInsufficient if peer is None else Codes.BadCertificateUntrusted)
-        return Session(self, self.aspace, self.subscription_service, name, user, peer)
+        return ClientSession(self, self.aspace, self.subscription_service, name, user, peer)
 
     def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
         """For a client that comes back by another connection: who had another certificate is another client."""
@@ -88,6 +86,18 @@ class SafeServer(InternalServer):
         if not isinstance(found, Session) or connection is None or found.peer != connection.peer:
             return None
         return found
+
+    async def get_endpoints(self, params: Any = None, sockname: Any = None) -> list[ua.EndpointDescription]:
+        """Return all endpoints. Raise ServiceError for a URL that can't be parsed."""
+        if params is not None:
+            require_url(params.EndpointUrl)
+        return await super().get_endpoints(params, sockname)
+
+    def find_servers(self, params: ua.FindServersParameters, sockname: Any = None) -> list[Any]:
+        """Return this server, if it is wanted. Raise ServiceError for a URL that can't be parsed."""
+        require_url(params.EndpointUrl)
+        params.ServerUris = [uri for uri in params.ServerUris or () if uri is not None]
+        return list(super().find_servers(params, sockname))
 
     def register_server(self, *_: Any) -> None:
         """This is no discovery server; the library asks nobody who they are for this."""
@@ -138,7 +148,7 @@ class Session(InternalSession):
         its user, even without a password.
         """
         super().__init__(server, aspace, subscriptions, name, user=user, external=True)
-        self.peer = peer
+        self.peer, self.owners = peer, server.owners
         self._connection: Connection | None = None
         server.unregister_external_session(self)
         self.auth_token = ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString)
@@ -158,6 +168,8 @@ class Session(InternalSession):
         if self._connection is not None and connection is not self._connection:
             self._connection.leave()
         self._connection = connection
+        if connection is not None:
+            self.bind(connection.processor)
         return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
@@ -222,8 +234,6 @@ class Session(InternalSession):
         asked = params.ItemsToCreate or []
         if len(self._items()) + len(asked) > MOST_ITEMS:
             raise ServiceError(Codes.BadTooManyMonitoredItems)
-        for item in asked:
-            _require_filter(item, item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier)
         self._bound_queues(asked)
         return await super().create_monitored_items(params)
 
@@ -231,11 +241,6 @@ class Session(InternalSession):
         self, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
         """As when they were created."""
-        subscription = self.subscription_service.subscriptions.get(params.SubscriptionId)
-        known = {} if subscription is None else subscription.monitored_item_srv._monitored_items
-        for item in params.ItemsToModify or []:
-            if (old := known.get(item.MonitoredItemId)) is not None:
-                _require_filter(item, isinstance(old.filter, ua.EventFilter))
         self._bound_queues(params.ItemsToModify or [])
         return await super().modify_monitored_items(params)
 
@@ -285,11 +290,8 @@ class Session(InternalSession):
         raise ServiceError(Codes.BadUserAccessDenied)
 
 
-def _require_filter(item: Any, of_events: bool) -> None:
-    """With a filter of another kind an item would be made, and never be told of anything."""
-    given = item.RequestedParameters.Filter
-    if given and not isinstance(given, ua.EventFilter if of_events else DataChangeFilter):
-        raise ServiceError(Codes.BadMonitoredItemFilterUnsupported)
+class ClientSession(WellFormedSession, OwnedSession, Session):
+    """Session of one client: its requests are checked for their form, then for ownership, then for limits."""
 
 
 def _interval(asked: float) -> float:
