@@ -39,7 +39,7 @@ class Items(MonitoredItemService):
         if item is None:
             return ua.MonitoredItemModifyResult(ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid))
         of_events = item.callback_handle is None
-        wanted = params.RequestedParameters.Filter or (item.filter if of_events else None)
+        wanted: Any = params.RequestedParameters.Filter or (item.filter if of_events else None)
         if (code := filter_code(wanted, of_events=of_events)) != ua.StatusCodes.Good:
             return ua.MonitoredItemModifyResult(ua.StatusCode(code))
         params.RequestedParameters.Filter = wanted

@@ -43,12 +43,16 @@ class Owners:
 class OwnedSession(InternalSession):
     """Session whose services refuse subscriptions of other sessions."""
 
-    owners: Owners
     peer: bytes | None
     """DER certificate by which the client secures its channel; None on a channel without security."""
     application_uri = ""
     """Application that the client states."""
     _processor: Any = None
+
+    @property
+    def owners(self) -> Owners:
+        """Owners of all subscriptions of the server."""
+        raise NotImplementedError
 
     async def create_session(self, params: ua.CreateSessionParameters, *others: Any, **named: Any) -> Any:
         """Note which application the client states."""
@@ -119,7 +123,7 @@ class OwnedSession(InternalSession):
             raise ServiceError(Codes.BadMessageNotAvailable)
         return retained.NotificationMessage
 
-    async def transfer_subscriptions(  # type: ignore[override]
+    async def transfer_subscriptions(
         self, params: ua.TransferSubscriptionsParameters, callback: Callable[..., Any]
     ) -> list[ua.TransferResult]:
         """Take over subscriptions of this user's other sessions (OPC 10000-4, 5.14.7)."""

@@ -148,7 +148,7 @@ class Session(InternalSession):
         its user, even without a password.
         """
         super().__init__(server, aspace, subscriptions, name, user=user, external=True)
-        self.peer, self.owners = peer, server.owners
+        self.peer = peer
         self._connection: Connection | None = None
         server.unregister_external_session(self)
         self.auth_token = ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString)
@@ -168,8 +168,6 @@ class Session(InternalSession):
         if self._connection is not None and connection is not self._connection:
             self._connection.leave()
         self._connection = connection
-        if connection is not None:
-            self.bind(connection.processor)
         return result
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
@@ -292,6 +290,20 @@ class Session(InternalSession):
 
 class ClientSession(WellFormedSession, OwnedSession, Session):
     """Session of one client: its requests are checked for their form, then for ownership, then for limits."""
+
+    @property
+    def owners(self) -> Owners:
+        """Owners of all subscriptions of the server."""
+        return self.iserver.owners
+
+    def activate_session(
+        self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
+    ) -> ua.ActivateSessionResult:
+        """Activate the session, and send its notifications over the connection on which that succeeded."""
+        result = super().activate_session(params, peer_certificate)
+        if (connection := channel.get()) is not None:
+            self.bind(connection.processor)
+        return result
 
 
 def _interval(asked: float) -> float:

@@ -9,12 +9,13 @@ from urllib.parse import urlparse
 
 from asyncua import ua
 from asyncua.common.utils import ServiceError
-from asyncua.server.internal_session import InternalSession
+from asyncua.server.internal_session import InternalSession, SessionState
 
 from conveyor_sim.scada.opcua.filters import filter_code
 from conveyor_sim.scada.opcua.ownership import REFRESH
 
-Request, Result = TypeVar("Request"), TypeVar("Result")
+Request = TypeVar("Request")
+Result = TypeVar("Result")
 Codes = ua.StatusCodes
 
 _TIME = 8
@@ -136,7 +137,11 @@ class WellFormedSession(InternalSession):
         _require_some(params.SubscriptionIds)
         return await super().set_publishing_mode(params)
 
-    async def transfer_subscriptions(  # type: ignore[override]
+    async def delete_subscriptions(self, ids: list[int]) -> list[ua.StatusCode]:
+        """Raise ServiceError for a request without subscriptions; a session that closes may have none."""
+        return await super().delete_subscriptions(ids if self.state is SessionState.Closed else _require_some(ids))
+
+    async def transfer_subscriptions(
         self, params: ua.TransferSubscriptionsParameters, callback: Callable[..., Any]
     ) -> list[ua.TransferResult]:
         """Raise ServiceError for a request without subscriptions."""
