@@ -134,7 +134,8 @@ class Processor(UaProcessor):
         The library joins a session, and redirects its subscriptions, before it checks who asks for it.
         """
         session, self.session = self.iserver.lookup_external_session(requesthdr.AuthenticationToken), None
-        self._closing = True
+        if self._session_watchdog_task is not None:
+            self._session_watchdog_task.cancel()
         if isinstance(session, OwnedSession):
             session.return_notifications()
 

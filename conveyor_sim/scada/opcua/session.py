@@ -157,10 +157,17 @@ class Session(InternalSession):
     def activate_session(
         self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
     ) -> ua.ActivateSessionResult:
-        """Whoever does not prove who they are has nothing more to do with it."""
-        connection = channel.get()
+        """Activate the session. A client that fails to prove its identity has no session afterwards.
+
+        On another connection the user must be the same (OPC 10000-4, 5.6.3.1): a token that was overheard is no proof.
+        """
+        connection, user, nonce = channel.get(), self.user, self.nonce
+        moved = self._connection is not None and connection is not self._connection
         try:
             result = super().activate_session(params, peer_certificate)
+            if moved and self.user != user:
+                self.user, self.nonce = user, nonce
+                raise ServiceError(Codes.BadIdentityTokenRejected)
         except BaseException:
             if connection is not None and connection is not self._connection:
                 connection.leave()

@@ -1,7 +1,7 @@
 """Structured requests of all OPC UA services by strangers, while an operator's screen has to stay as it is.
 
-An operator subscribes. An anonymous client and a viewer, and a connection without a session, send random requests that name
-the operator's subscription and items as well as their own.
+An operator subscribes. An anonymous client, a viewer and a connection without a session send random requests, which
+name the operator's subscription and items as well as their own.
 """
 
 from __future__ import annotations
@@ -86,13 +86,17 @@ class Station:
 
     def play(self, rng: random.Random) -> str:
         """Play one case."""
-        before = self._state()
-        codes = self._clients.run(self._attack(rng))
-        if (after := self._state()) != before:
-            raise Violation("foreign subscription", f"{after} is {before} before")
-        self._advance()
-        if internal := codes & Counter(dict.fromkeys(INTERNAL, 10**9)):
-            raise Violation("internal error", f"{internal}")
+        try:
+            before = self._state()
+            codes = self._clients.run(self._attack(rng))
+            if (after := self._state()) != before:
+                raise Violation("foreign subscription", f"{after} is {before} before")
+            self._advance()
+            if internal := codes & Counter(dict.fromkeys(INTERNAL, 10**9)):
+                raise Violation("internal error", f"{internal}")
+        except Violation:
+            self.victim = self._clients.run(self._subscribe())
+            raise
         return ua.StatusCode(codes.most_common(1)[0][0]).name
 
     def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
@@ -165,6 +169,8 @@ class Station:
                 if kind in ENDING or rng.random() < 0.03:
                     client = stranger
                     await self._open_channel(client)
+                    overheard = self.victim[0].uaclient.protocol.authentication_token
+                    client.uaclient.protocol.authentication_token = rng.choice([overheard, overheard, ua.NodeId()])
                 elif client.uaclient.protocol.is_closed:
                     continue
                 answer = send(client, Requests(rng, self.pool).draw(kind), rng)
