@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -29,9 +30,9 @@ def where(operator: ua.FilterOperator, *operands: Any) -> ua.EventFilter:
     return ua.EventFilter([], ua.ContentFilter([ua.ContentFilterElement(operator, list(operands))]))
 
 
-def path(*names: str | None, start: ua.NodeId = ua.NodeId(ua.ObjectIds.Server)) -> ua.BrowsePath:
+def path(*names: str | None) -> ua.BrowsePath:
     elements = [ua.RelativePathElement(TargetName=ua.QualifiedName(name)) for name in names]
-    return ua.BrowsePath(start, ua.RelativePath(elements))
+    return ua.BrowsePath(ua.NodeId(ua.ObjectIds.Server), ua.RelativePath(elements))
 
 
 NOTHING: tuple[Any, ...] = (
@@ -190,7 +191,7 @@ def test_each_odd_item_has_its_own_code_and_the_others_are_made(line: Line) -> N
         ),
         (
             parameters(ua.BrowseRequest, NodesToBrowse=[ua.BrowseDescription(TICK, ua.BrowseDirection.Both)]),
-            lambda body: body[:-17] + b"\x4d\0\0\0" + body[-13:],
+            lambda body: body[:-15] + b"\x4d\0\0\0" + body[-11:],
             Codes.BadBrowseDirectionInvalid,
         ),
         (
@@ -207,7 +208,7 @@ def test_a_request_that_can_not_be_decoded(line: Line, request_of: Any, changed:
             protocol: Any = client.uaclient.protocol
             protocol._setup_request_header(request_of.RequestHeader, PATIENCE)
             protocol._request_id += 1
-            answer = protocol._callbackmap[protocol._request_id] = protocol.transport.loop.create_future()
+            answer = protocol._callbackmap[protocol._request_id] = asyncio.get_running_loop().create_future()
             body = changed(struct_to_binary(request_of))
             protocol.transport.write(protocol._connection.message_to_binary(body, request_id=protocol._request_id))
             fault = struct_from_binary(ua.ServiceFault, await answer)
