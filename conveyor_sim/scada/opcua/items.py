@@ -8,7 +8,7 @@ from typing import Any
 from asyncua import ua
 from asyncua.server.monitored_item_service import MonitoredItemService, MonitoredItemValues, WhereClauseEvaluator
 
-from conveyor_sim.scada.opcua.filters import filter_code
+from conveyor_sim.scada.opcua.filter_codes import filter_code
 
 
 class Items(MonitoredItemService):

@@ -59,6 +59,13 @@ class OwnedSession(InternalSession):
         self.application_uri = params.ClientDescription.ApplicationUri or ""
         return await super().create_session(params, *others, **named)
 
+    async def close_session(self, delete_subs: bool = True) -> None:
+        """Close the session. Subscriptions that stay keep their messages until the user takes them over."""
+        await super().close_session(delete_subs)
+        for each in self.subscription_service.subscriptions.values():
+            if each.session_id == self.session_id:
+                each.pub_request_callback = _no_request  # another session may begin on the same connection
+
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
         """Note who owns it; the owner outlives its session, for a later transfer."""
         result = await super().create_subscription(params, *others, **named)
@@ -140,7 +147,7 @@ class OwnedSession(InternalSession):
         )
 
     def bind(self, processor: Any) -> None:
-        """Send notifications of this session's subscriptions over the connection of a `Processor`."""
+        """Send notifications of this session's subscriptions over the connection of a `Dispatcher`."""
         self._processor = processor
         for each in self.subscription_service.subscriptions.values():
             if each.session_id == self.session_id:
@@ -231,6 +238,10 @@ async def _notify(subscription: InternalSubscription) -> None:
         change = ua.StatusChangeNotification(ua.StatusCode(Codes.GoodSubscriptionTransferred))
         message = ua.NotificationMessage(SequenceNumber=subscription._notification_seq, NotificationData=[change])
         await subscription.pub_result_callback(ua.PublishResult(number, NotificationMessage=message), request)
+
+
+def _no_request(number: int) -> None:
+    """Return no publish request of a session that is closed."""
 
 
 def _invalid() -> ua.StatusCode:

@@ -138,6 +138,8 @@ class Session(InternalSession):
     """Of one client."""
 
     iserver: SafeServer
+    user: User
+    nonce: bytes | None
 
     def __init__(
         self, server: SafeServer, aspace: Any, subscriptions: Any, name: str, user: User, peer: bytes | None

@@ -13,7 +13,7 @@ from asyncua.common.connection import TransportLimits
 from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.ua.ua_binary import uatcp_to_binary
 
-from conveyor_sim.scada.opcua.processor import Processor
+from conveyor_sim.scada.opcua.dispatch import Dispatcher
 
 MOST_CLIENTS = 64
 """Connections at once; one more is closed at once."""
@@ -45,7 +45,7 @@ class Connection(OPCUAProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
         if self.transport is not None:
-            self.processor = Processor(self.iserver, self.transport, self.limits)
+            self.processor = Dispatcher(self.iserver, self.transport, self.limits)
             self.processor.set_policies(self.policies)
         if self.transport is not None and (connection := transport.get_extra_info("socket")) is not None:
             # A client that is gone without a word is noticed.

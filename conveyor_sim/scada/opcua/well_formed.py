@@ -11,7 +11,7 @@ from asyncua import ua
 from asyncua.common.utils import ServiceError
 from asyncua.server.internal_session import InternalSession, SessionState
 
-from conveyor_sim.scada.opcua.filters import filter_code
+from conveyor_sim.scada.opcua.filter_codes import filter_code
 from conveyor_sim.scada.opcua.ownership import REFRESH
 
 Request = TypeVar("Request")

@@ -16,8 +16,8 @@ from asyncua.server.internal_session import InternalSession
 from asyncua.ua.ua_binary import struct_from_binary
 
 from conveyor_sim.scada.opcua import refusals
+from conveyor_sim.scada.opcua.dispatch import REQUESTS, SESSIONLESS
 from conveyor_sim.scada.opcua.ownership import OwnedSession
-from conveyor_sim.scada.opcua.processor import REQUESTS, SESSIONLESS
 from conveyor_sim.scada.opcua.session import Session
 from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone
 from test.scada.opcua.test_security import own_certificate
@@ -74,7 +74,7 @@ def test_every_method_of_a_session_is_accounted_for() -> None:
     accounted = [CHECKED, REFUSED, WITHOUT_IDS, UNREACHABLE]
     assert public - {"max_connections"} == set().union(*accounted)
     assert sum(map(len, accounted)) == len(set().union(*accounted))
-    assert CHECKED | {"create_subscription", "create_session"} == {
+    assert CHECKED | {"create_subscription", "create_session", "close_session"} == {
         name for name in vars(OwnedSession) if name in public
     }
     assert set(vars(Session)) >= REFUSED

@@ -1,4 +1,4 @@
-"""`Processor`: messages of one connection, each answered with the status code that fits what is wrong with it.
+"""`Dispatcher`: messages of one connection, each answered with the status code that fits what is wrong with it.
 
 The library answers every request that it can't decode or does not expect with BadInternalError.
 """
@@ -60,7 +60,7 @@ REQUESTS = {
 """Request types by encoding id: all services that the library can answer."""
 
 
-class Processor(UaProcessor):
+class Dispatcher(UaProcessor):
     """Decodes, checks and dispatches the requests of one connection."""
 
     _message: Any = None
@@ -115,6 +115,7 @@ class Processor(UaProcessor):
     async def _register(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> bool:
         """Answer RegisterNodes or UnregisterNodes; the library would not pass them to the session."""
         assert self.session is not None
+        self.session.touch()
         response: Any
         if typeid == _REGISTER:
             response = ua.RegisterNodesResponse()
@@ -147,6 +148,8 @@ class Processor(UaProcessor):
             request: Any = struct_from_binary(REQUESTS[typeid], self._message.copy())
         except RecursionError:
             return int(Codes.BadEncodingLimitsExceeded)
+        except (ServiceError, ua.UaStatusCodeError) as problem:
+            return int(problem.code)
         except Exception as problem:
             kinds = (code for kind, code in _ENUMERATIONS.items() if str(problem).endswith(f"valid {kind.__name__}"))
             return int(next(kinds, Codes.BadDecodingError))
