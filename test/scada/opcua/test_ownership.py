@@ -232,6 +232,34 @@ def test_nobody_acts_on_the_subscription_of_another_session(line: Line, user: st
     assert line.server.status().refused - before == len(ACTS)
 
 
+def test_another_session_of_the_same_user_owns_nothing_either(line: Line) -> None:
+    """It may take the subscription over first. Methods of the server that would tell of its items are not offered."""
+
+    async def come() -> tuple[dict[str, int], list[int]]:
+        victim, other, screen = await connected(line, "operator"), await connected(line, "operator"), Screen()
+        subscription, item = await screen.follow(victim)
+        number = subscription.subscription_id
+        codes = {
+            service: await single(other, act(number, item))
+            for service, act in ACTS.items()
+            if service != "TransferSubscriptions"
+        }
+        offered = [
+            await single(other, refresh(method, number))
+            for method in (ua.ObjectIds.Server_GetMonitoredItems, ua.ObjectIds.Server_ResendData)
+        ]
+        await asyncio.to_thread(line.advance)
+        await screen.see(1)
+        for client in (other, victim):
+            await client.disconnect()
+        return codes, offered
+
+    line.client()
+    codes, offered = alone(come())
+    assert codes == dict.fromkeys(codes, Codes.BadSubscriptionIdInvalid)
+    assert offered == [Codes.BadMethodInvalid] * 2
+
+
 def test_of_several_ids_only_the_own_ones_are_acted_on(line: Line) -> None:
     async def come() -> tuple[list[int], list[int], list[int]]:
         victim, stranger, screen = await connected(line, "operator"), await connected(line), Screen()
