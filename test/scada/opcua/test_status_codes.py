@@ -109,7 +109,6 @@ OTHERS: tuple[tuple[Any, int], ...] = (
     (ua.FindServersRequest(Parameters=ua.FindServersParameters("opc.tcp://[::1")), Codes.BadTcpEndpointUrlInvalid),
     (ua.GetEndpointsRequest(Parameters=ua.GetEndpointsParameters("opc.tcp://h:port")), Codes.BadTcpEndpointUrlInvalid),
     (ua.FindServersRequest(Parameters=ua.FindServersParameters(ServerUris=[None])), Codes.Good),
-    (parameters(ua.BrowseNextRequest), Codes.BadServiceUnsupported),
     (parameters(ua.SetTriggeringRequest), Codes.BadServiceUnsupported),
     (parameters(ua.QueryFirstRequest), Codes.BadServiceUnsupported),
     (ua.CancelRequest(), Codes.BadServiceUnsupported),
