@@ -79,6 +79,8 @@ class Dispatcher(UaProcessor):
             return bool(await super().process_message(seqhdr, body))
         except (ServiceError, ua.UaStatusCodeError):
             raise
+        except RecursionError as error:
+            raise ServiceError(Codes.BadEncodingLimitsExceeded) from error
         except Exception as error:
             raise ServiceError(Codes.BadDecodingError) from error
 
