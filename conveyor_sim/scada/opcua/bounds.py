@@ -9,7 +9,7 @@ from asyncua import ua
 from asyncua.common.utils import ServiceError
 
 from conveyor_sim.scada.opcua.browsing import Views
-from conveyor_sim.scada.opcua.filters import require_filter
+from conveyor_sim.scada.opcua.filters import filter_units
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import share_of_guests
 from conveyor_sim.scada.work import Budget
@@ -75,27 +75,15 @@ class Bounds:
             or guests + len(asked) > share_of_guests(limits.items)
         ):
             raise ServiceError(Codes.BadTooManyMonitoredItems)
-        fields = 0
-        for item in asked:
-            of_events = item.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier
-            fields += require_filter(item.RequestedParameters.Filter, of_events, limits) if of_events else 0
-            if not of_events:
-                require_filter(item.RequestedParameters.Filter, False, limits)
-        self._require_fields(fields)
+        filters = (item.RequestedParameters.Filter for item in asked)
+        self._require_fields(sum(filter_units(one, limits) for one in filters if isinstance(one, ua.EventFilter)))
         self._bound_queues(asked)
 
     def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
         """As `require_new_items`, for items that exist."""
         asked = params.ItemsToModify
-        subscription = self._service.subscriptions.get(params.SubscriptionId)
-        known = {} if subscription is None else subscription.monitored_item_srv._monitored_items
-        fields = 0
-        for item in asked:
-            if (old := known.get(item.MonitoredItemId)) is not None:
-                of_events = isinstance(old.filter, ua.EventFilter)
-                cost = require_filter(item.RequestedParameters.Filter, of_events, self.limits)
-                fields += cost if of_events else 0
-        self._require_fields(fields)
+        filters = (item.RequestedParameters.Filter for item in asked)
+        self._require_fields(sum(filter_units(one, self.limits) for one in filters if isinstance(one, ua.EventFilter)))
         self._bound_queues(asked)
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:

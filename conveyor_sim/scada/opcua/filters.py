@@ -1,4 +1,4 @@
-"""Checks of the filters of monitored items, before an item is created or changed (OPC 10000-4, 7.22)."""
+"""Cost of the filters of monitored items, before an item is created or changed (OPC 10000-4, 7.22)."""
 
 from __future__ import annotations
 
@@ -7,28 +7,25 @@ from typing import Any
 
 from asyncua import ua
 from asyncua.common.utils import ServiceError
-from asyncua.ua.uaprotocol_auto import DataChangeFilter
 
 from conveyor_sim.scada.opcua.limits import Limits
 
 Codes = ua.StatusCodes
 
 
-def require_filter(given: Any, of_events: bool, limits: Limits) -> int:
-    """Return the work units per event or change. Raise ServiceError for a filter that does not fit or costs too much.
+def filter_units(wanted: Any, limits: Limits) -> int:
+    """Return the work units per event or change. Raise ServiceError for a filter that costs too much.
 
-    given: the filter of one item; None: no filter. of_events: True for an item that monitors events.
+    wanted: the filter of one item; None: no filter. `filter_code` checks its form.
     """
-    if given and not isinstance(given, ua.EventFilter if of_events else DataChangeFilter):
-        raise ServiceError(Codes.BadMonitoredItemFilterUnsupported)
-    if not isinstance(given, ua.EventFilter):
+    if not isinstance(wanted, ua.EventFilter):
         return 1
-    clauses = given.SelectClauses or []
+    clauses = wanted.SelectClauses or []
     if len(clauses) > limits.select_clauses:
         raise ServiceError(Codes.BadTooManyOperations)
     if any(len(clause.BrowsePath or []) > limits.path_elements for clause in clauses):
         raise ServiceError(Codes.BadTooManyOperations)
-    return len(clauses) + _evaluation(given.WhereClause.Elements or [], limits)
+    return len(clauses) + _evaluation(wanted.WhereClause.Elements or [], limits)
 
 
 def _evaluation(elements: Sequence[ua.ContentFilterElement], limits: Limits) -> int:
@@ -47,9 +44,7 @@ def _evaluation(elements: Sequence[ua.ContentFilterElement], limits: Limits) -> 
         costs[place], depths[place] = 1, 1
         for operand in elements[place].FilterOperands or []:
             costs[place] += 1
-            if isinstance(operand, ua.ElementOperand):
-                if not place < operand.Index < len(elements):
-                    raise ServiceError(Codes.BadFilterOperandInvalid)
+            if isinstance(operand, ua.ElementOperand) and place < operand.Index < len(elements):
                 costs[place] += costs[operand.Index]
                 depths[place] = max(depths[place], 1 + depths[operand.Index])
         if costs[place] > 2 * limits.where_operands or depths[place] > limits.path_elements:

@@ -7,9 +7,10 @@ from contextlib import suppress
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.monitored_item_service import MonitoredItemService
+from asyncua.server.monitored_item_service import MonitoredItemService, WhereClauseEvaluator
 
-from conveyor_sim.scada.opcua.filters import require_filter
+from conveyor_sim.scada.opcua.filter_codes import filter_code
+from conveyor_sim.scada.opcua.filters import filter_units
 from conveyor_sim.scada.opcua.limits import Limits
 
 CHANGE_UNITS, FIELD_UNITS = 4, 2
@@ -66,6 +67,15 @@ class Items(MonitoredItemService):
             notification = ua.MonitoredItemNotification(item.client_handle, value)
             await self.isub.enqueue_datachange_event(id, notification, item.queue_size)
 
+    async def resend(self) -> None:
+        """Queue the present value of each item once more, for a session that takes over (OPC 10000-4, 5.14.7)."""
+        for mid in self._monitored_datachange.values():
+            item = self._monitored_items[mid]
+            if item.mode == ua.MonitoringMode.Reporting and item.read_value_id is not None:
+                value = self.aspace.read_attribute_value(item.read_value_id.NodeId, item.read_value_id.AttributeId)
+                notification = ua.MonitoredItemNotification(item.client_handle, value)
+                await self.isub.enqueue_datachange_event(mid, notification, item.queue_size)
+
     async def _trigger_event(self, event: Any, mid: int) -> None:
         item = self._monitored_items.get(mid)
         if item is None or item.mode == ua.MonitoringMode.Disabled or not self.isub.spend(self._units[mid]):
@@ -81,13 +91,18 @@ class Items(MonitoredItemService):
             self._count(mdata, 1)
 
     def _modify_monitored_item(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
+        """Change an item, its event filter included, which the library would go on evaluating as it was before."""
         item = self._monitored_items.get(params.MonitoredItemId)
         if item is None:
             return ua.MonitoredItemModifyResult(ua.StatusCode(ua.StatusCodes.BadMonitoredItemIdInvalid))
-        asked = params.RequestedParameters
+        asked, of_events = params.RequestedParameters, item.callback_handle is None
+        wanted: Any = asked.Filter or (item.filter if of_events else None)
+        if (code := filter_code(wanted, of_events=of_events)) != ua.StatusCodes.Good:
+            return ua.MonitoredItemModifyResult(ua.StatusCode(code))
         self._count(item, -1)
-        item.filter = item.filter if asked.Filter is None else asked.Filter
-        item.queue_size = asked.QueueSize
+        item.filter, item.queue_size, item.client_handle = wanted, asked.QueueSize, asked.ClientHandle
+        if of_events:
+            item.where_clause_evaluator = WhereClauseEvaluator(self.logger, self.aspace, wanted.WhereClause)
         self._count(item, 1)
         return ua.MonitoredItemModifyResult(ua.StatusCode(), asked.SamplingInterval, asked.QueueSize)
 
@@ -113,7 +128,7 @@ class Items(MonitoredItemService):
         """Add an item to the totals, or take it out of them (sign: 1 or -1)."""
         fields = 0
         if isinstance(item.filter, ua.EventFilter):
-            fields = 1 + require_filter(item.filter, True, self._limits)
+            fields = 1 + filter_units(item.filter, self._limits)
             self._names[item.monitored_item_id] = [_name(clause) for clause in item.filter.SelectClauses or []]
         self._units[item.monitored_item_id] = FIELD_UNITS * fields
         if sign < 0:

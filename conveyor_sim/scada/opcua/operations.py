@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from asyncua import ua
-from asyncua.common.utils import Buffer, NotEnoughData, ServiceError
+from asyncua.common.utils import Buffer, ServiceError
 from asyncua.ua.ua_binary import Primitives, extensionobject_from_binary, struct_from_binary
 
 from conveyor_sim.scada.opcua.limits import Limits
@@ -73,7 +73,9 @@ def require_operations(type_id: ua.NodeId, body: Buffer, limits: Limits) -> int:
     try:
         skip(ahead)
         count = int(Primitives.Int32.unpack(ahead))
-    except NotEnoughData as error:
+    except (ServiceError, RecursionError):
+        raise
+    except Exception as error:  # the library raises several kinds
         raise ServiceError(Codes.BadDecodingError) from error
     if count <= 0:
         raise ServiceError(Codes.BadNothingToDo)

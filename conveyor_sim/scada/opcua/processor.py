@@ -9,10 +9,9 @@ from asyncua import ua
 from asyncua.common.connection import SecureConnection, TransportLimits
 from asyncua.common.utils import ServiceError
 from asyncua.crypto.security_policies import SecurityPolicyNone
-from asyncua.server.uaprocessor import UaProcessor
-from asyncua.ua.ua_binary import struct_from_binary
 
 from conveyor_sim.scada.opcua.decoding import Allowance, BoundedBuffer
+from conveyor_sim.scada.opcua.dispatch import Dispatcher
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.opcua.operations import require_operations
 
@@ -27,9 +26,6 @@ SMALLEST_CHUNK = 8192
 REQUEST_UNITS, CHANNEL_UNITS, LOGIN_UNITS = 10, 500, 5000
 """Work units of any message, of opening a channel (RSA), and of a password (scrypt)."""
 
-_BROWSE_NEXT = ua.NodeId(ua.ObjectIds.BrowseNextRequest_Encoding_DefaultBinary)
-_REGISTER = ua.NodeId(ua.ObjectIds.RegisterNodesRequest_Encoding_DefaultBinary)
-_UNREGISTER = ua.NodeId(ua.ObjectIds.UnregisterNodesRequest_Encoding_DefaultBinary)
 _ACTIVATE = ua.NodeId(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
 
 
@@ -66,8 +62,8 @@ class ConnectionLimits(TransportLimits):
         return True
 
 
-class Processor(UaProcessor):
-    """Messages of one connection."""
+class Processor(Dispatcher):
+    """Messages of one connection, within its limits."""
 
     _limits: ConnectionLimits
     session: Any
@@ -101,40 +97,25 @@ class Processor(UaProcessor):
         was_active, examined = self._is_active, self._examined
         allowance = self._allowance(was_active)
         try:
-            goes_on = bool(await super().process_message(seqhdr, BoundedBuffer(bytes(body), allowance)))
-        except RecursionError as error:
-            raise ServiceError(Codes.BadEncodingLimitsExceeded) from error
+            goes_on = await super().process_message(seqhdr, BoundedBuffer(bytes(body), allowance))
         finally:
             self.units += allowance.used + max(0, self._examined - examined)  # it may be another session
         if allowance.exceeded and not was_active:  # a session goes on with the fault that it was sent
             raise ServiceError(Codes.BadEncodingLimitsExceeded)
         return goes_on
 
-    async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> bool:
-        """Answer services that the library does not pass to the session, or does not have."""
+    async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
         try:
+            self._require_session(typeid, requesthdr)
             if self._is_active:
                 self.units += require_operations(typeid, body, self._bounds)
-            if typeid in (_BROWSE_NEXT, _REGISTER, _UNREGISTER) and self._is_active:
-                self.session.touch()
-                response = await self._answer(typeid, body)
-                self.send_response(requesthdr.RequestHandle, seqhdr, response)
-                return True
             if typeid == _ACTIVATE:
                 self.units += LOGIN_UNITS
-            return bool(await super()._process_message(typeid, requesthdr, seqhdr, body))
-        except RecursionError as error:  # nested deeper than the interpreter allows
-            body.allowance.exceeded = True
-            raise ServiceError(Codes.BadEncodingLimitsExceeded) from error
-
-    async def _answer(self, typeid: Any, body: Any) -> Any:
-        if typeid == _BROWSE_NEXT:
-            results = await self.session.browse_next(struct_from_binary(ua.BrowseNextParameters, body))
-            return ua.BrowseNextResponse(Parameters=ua.BrowseNextResult(results))
-        if typeid == _REGISTER:
-            nodes = struct_from_binary(ua.RegisterNodesParameters, body).NodesToRegister
-            return ua.RegisterNodesResponse(Parameters=ua.RegisterNodesResult(nodes))
-        return ua.UnregisterNodesResponse()
+            return await super()._process_message(typeid, requesthdr, seqhdr, body)
+        except ServiceError as error:
+            if error.code == Codes.BadEncodingLimitsExceeded:  # also nesting deeper than the interpreter allows
+                body.allowance.exceeded = True
+            raise
 
     def _allowance(self, is_active: bool) -> Allowance:
         limits = self._bounds

@@ -94,9 +94,10 @@ class OpcUaServer:
         return f"opc.tcp://{host}:{port if self._server is None else self.port}"
 
     def status(self) -> Status:
-        """Return connections, monitored items, writes and calls that were passed on, and those that were refused.
+        """Return connections, monitored items, and counts of requests.
 
-        Subscriptions that ended because they exceeded a budget count as refused.
+        Requests that were passed on are writes and calls. Refused are also requests on subscriptions of other sessions,
+        and subscriptions that exceeded a budget.
         """
         server, requests = self._server, self._requests
         if server is None or server.bserver is None:
@@ -108,7 +109,7 @@ class OpcUaServer:
             left_out = self._updates.left_out
         service = server.iserver.subscription_service
         items = sum(len(each.monitored_item_srv) for each in service.subscriptions.values())
-        refused = requests.refused + service.ended
+        refused = requests.refused + service.ended + server.iserver.owners.refusals.count
         return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
 
     async def start(self) -> None:

@@ -25,20 +25,18 @@ from conveyor_sim.line.inputs import SET
 from conveyor_sim.scada.opcua.bounds import Bounds
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
+from conveyor_sim.scada.opcua.ownership import REFRESH, OwnedSession, Owners
+from conveyor_sim.scada.opcua.refusals import Refusals
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.subscriptions import Subscriptions
 from conveyor_sim.scada.opcua.transport import Connection, channel
+from conveyor_sim.scada.opcua.well_formed import WellFormedSession, require_url
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""
 
 UNFETCHED = 30.0
 """s for which a subscription is kept that nobody fetches anything of, or three of its intervals, if that is longer."""
-
-REFRESH = {
-    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
-    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh2),
-}
 
 _DECRYPTED = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": uacrypto.decrypt_rsa_oaep,
@@ -64,6 +62,7 @@ class SafeServer(InternalServer):
         self.subscription_service = Subscriptions(self.aspace, self, limits)
         self.isession.subscription_service = self.subscription_service
         self._trusted = trusted
+        self.owners = Owners(Refusals(), trusting=bool(trusted))
         self.requests: Requests | None = None
         self.answers: Sequence[Answer] = ()
         """Who may know a method that is called."""
@@ -78,7 +77,7 @@ class SafeServer(InternalServer):
         peer = None if connection is None else connection.peer
         if self._trusted and peer not in self._trusted:
             raise ServiceError(Codes.BadSecurityModeInsufficient if peer is None else Codes.BadCertificateUntrusted)
-        return Session(self, self.aspace, self.subscription_service, name, user, peer)
+        return ClientSession(self, self.aspace, self.subscription_service, name, user, peer)
 
     def lookup_external_session(self, auth_token: ua.NodeId) -> InternalSession | None:
         """For a client that comes back by another connection: who had another certificate is another client."""
@@ -86,6 +85,18 @@ class SafeServer(InternalServer):
         if not isinstance(found, Session) or connection is None or found.peer != connection.peer:
             return None
         return found
+
+    async def get_endpoints(self, params: Any = None, sockname: Any = None) -> list[ua.EndpointDescription]:
+        """Return all endpoints. Raise ServiceError for a URL that can't be parsed."""
+        if params is not None:
+            require_url(params.EndpointUrl)
+        return await super().get_endpoints(params, sockname)
+
+    def find_servers(self, params: ua.FindServersParameters, sockname: Any = None) -> list[Any]:
+        """Return this server, if it is wanted. Raise ServiceError for a URL that can't be parsed."""
+        require_url(params.EndpointUrl)
+        params.ServerUris = [uri for uri in params.ServerUris or () if uri is not None]
+        return list(super().find_servers(params, sockname))
 
     def register_server(self, *_: Any) -> None:
         """This is no discovery server; the library asks nobody who they are for this."""
@@ -126,6 +137,8 @@ class Session(InternalSession):
     """Of one client."""
 
     iserver: SafeServer
+    user: User
+    nonce: bytes | None
 
     def __init__(
         self, server: SafeServer, aspace: Any, subscriptions: Any, name: str, user: User, peer: bytes | None
@@ -146,10 +159,17 @@ class Session(InternalSession):
     def activate_session(
         self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
     ) -> ua.ActivateSessionResult:
-        """Whoever does not prove who they are has nothing more to do with it."""
-        connection = channel.get()
+        """Activate the session. A client that fails to prove its identity has no session afterwards.
+
+        On another connection the user must be the same (OPC 10000-4, 5.6.3.1): a token that was overheard is no proof.
+        """
+        connection, user, nonce = channel.get(), self.user, self.nonce
+        moved = self._connection is not None and connection is not self._connection
         try:
             result = super().activate_session(params, peer_certificate)
+            if moved and self.user != user:
+                self.user, self.nonce = user, nonce
+                raise ServiceError(Codes.BadIdentityTokenRejected)
         except BaseException:
             if connection is not None and connection is not self._connection:
                 connection.leave()
@@ -276,6 +296,24 @@ class Session(InternalSession):
     async def delete_references(self, params: list[ua.DeleteReferencesItem]) -> list[ua.StatusCode]:
         """Refused."""
         raise ServiceError(Codes.BadUserAccessDenied)
+
+
+class ClientSession(WellFormedSession, OwnedSession, Session):
+    """Session of one client: its requests are checked for their form, then for ownership, then for limits."""
+
+    @property
+    def owners(self) -> Owners:
+        """Owners of all subscriptions of the server."""
+        return self.iserver.owners
+
+    def activate_session(
+        self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
+    ) -> ua.ActivateSessionResult:
+        """Activate the session, and send its notifications over the connection on which that succeeded."""
+        result = super().activate_session(params, peer_certificate)
+        if (connection := channel.get()) is not None:
+            self.bind(connection.processor)
+        return result
 
 
 def _interval(asked: float) -> float:

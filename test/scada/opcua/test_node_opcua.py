@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import shutil
 import subprocess
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from conveyor_sim.line.packml import STATE_TEXTS
-from test.scada.opcua.conftest import PASSWORD
+from conveyor_sim.scada.opcua.server import OpcUaServer
+from test.scada.opcua.conftest import PASSWORD, PATIENCE
 
 if TYPE_CHECKING:
-    from test.scada.opcua.conftest import Line
+    from test.scada.opcua.conftest import Line, Serve
 
 CLIENT = Path(__file__).parent / "node_client"
 
@@ -68,3 +71,59 @@ def test_an_operator_takes_a_belt_by_writing_only(line: Line, tmp_path: Path) ->
 def test_it_is_refused_with_a_wrong_password(line: Line, tmp_path: Path) -> None:
     done = run(line, "controller", "open sesam", tmp_path)
     assert done.returncode == 1 and "BadUserAccessDenied" in done.stderr
+
+
+class Follower:
+    """node-opcua, following the tick of a line."""
+
+    def __init__(self, line: Line, folder: Path) -> None:
+        command = ["node", str(CLIENT / "follow.js"), line.server.address]
+        home = {**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder)}
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, env=home)
+        self.lines: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def see(self, wanted: str) -> None:
+        """Wait until it prints that."""
+        while self.lines.get(timeout=PATIENCE) != wanted:
+            pass
+
+    def end(self) -> None:
+        """Have it go away, and wait for that."""
+        with self.process:
+            assert self.process.stdin is not None
+            self.process.stdin.close()
+            try:
+                self.process.wait(PATIENCE)
+            finally:
+                self.process.kill()
+
+    def _read(self) -> None:
+        for row in self.process.stdout or ():
+            self.lines.put(row.strip())
+
+
+def test_it_sees_values_again_after_the_server_was_restarted(serve: Serve, certificates: Path, tmp_path: Path) -> None:
+    """Its subscription is gone, and its id is that of somebody else: it has to make a new one."""
+    line = serve()
+    line.client()
+    line.advance(3)
+    follower = Follower(line, tmp_path)
+    try:
+        follower.see("3")
+        line.advance()
+        follower.see("4")
+        port = line.server.port
+        line.open.clear()
+        line.thread.run(line.server.stop())
+        line.server = OpcUaServer(line.source, certificates=certificates, port=port)
+        line.thread.run(line.server.start())
+        others = [line.client().create_subscription(20, None) for _ in range(3)]
+        follower.see("again")
+        follower.see("4")
+        line.advance()
+        follower.see("5")
+        assert len(others) == 3 and line.clients[1] == 4
+    finally:
+        follower.end()

@@ -1,0 +1,82 @@
+"""Checks of the filters of monitored items (OPC 10000-4, 7.7, 7.22): the library evaluates whatever it gets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from asyncua import ua
+from asyncua.ua.uaprotocol_auto import DataChangeFilter
+
+Codes = ua.StatusCodes
+Operators = ua.FilterOperator
+
+_LEAST_OPERANDS = {
+    Operators.IsNull: 1,
+    Operators.Not: 1,
+    Operators.OfType: 1,
+    Operators.Between: 3,
+    Operators.InList: 2,
+}
+"""Operands of an operator; two of those that are not named, and at least these of InList."""
+
+_UNSUPPORTED = {
+    Operators.Like,
+    Operators.InView,
+    Operators.RelatedTo,
+    Operators.BitwiseAnd,
+    Operators.BitwiseOr,
+}
+"""Operators that the library does not evaluate."""
+
+
+def filter_code(wanted: Any, *, of_events: bool) -> int:
+    """Return the status code of the filter of a monitored item.
+
+    wanted: decoded filter; None or an empty extension object: without a filter. of_events: the item monitors events.
+    """
+    if not wanted:
+        return int(Codes.BadEventFilterInvalid if of_events else Codes.Good)
+    if of_events:
+        known = isinstance(wanted, ua.EventFilter)
+        return _event_code(wanted) if known else int(Codes.BadMonitoredItemFilterUnsupported)
+    if not isinstance(wanted, DataChangeFilter):
+        return int(Codes.BadMonitoredItemFilterUnsupported)
+    valid = wanted.DeadbandType in set(ua.DeadbandType) and 0.0 <= wanted.DeadbandValue < math.inf
+    return int(Codes.Good if valid else Codes.BadDeadbandFilterInvalid)
+
+
+def _event_code(wanted: ua.EventFilter) -> int:
+    for clause in wanted.SelectClauses:
+        if any(not name.Name for name in clause.BrowsePath):
+            return int(Codes.BadBrowseNameInvalid)
+        if clause.AttributeId not in set(ua.AttributeIds):
+            return int(Codes.BadAttributeIdInvalid)
+    return _content_code(wanted.WhereClause.Elements)
+
+
+def _content_code(elements: Sequence[ua.ContentFilterElement]) -> int:
+    """An element may refer to later elements only, so that the evaluation ends (OPC 10000-4, 7.7.1)."""
+    for place, element in enumerate(elements):
+        if element.FilterOperator in _UNSUPPORTED:
+            return int(Codes.BadFilterOperatorUnsupported)
+        operands, least = element.FilterOperands, _LEAST_OPERANDS.get(element.FilterOperator, 2)
+        if len(operands) < least or (len(operands) > least and element.FilterOperator != Operators.InList):
+            return int(Codes.BadFilterOperandCountMismatch)
+        for operand in operands:
+            if (code := _operand_code(operand, place, len(elements))) != Codes.Good:
+                return code
+    return int(Codes.Good)
+
+
+def _operand_code(operand: Any, place: int, count: int) -> int:
+    if isinstance(operand, ua.ElementOperand):
+        return int(Codes.Good if place < operand.Index < count else Codes.BadFilterOperandInvalid)
+    if isinstance(operand, ua.SimpleAttributeOperand):
+        names = [name.Name for name in operand.BrowsePath]
+    elif isinstance(operand, ua.AttributeOperand):
+        names = [element.TargetName.Name for element in operand.BrowsePath.Elements]
+    else:
+        return int(Codes.Good if isinstance(operand, ua.LiteralOperand) else Codes.BadFilterOperandInvalid)
+    return int(Codes.Good if all(names) else Codes.BadBrowseNameInvalid)
