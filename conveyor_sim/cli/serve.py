@@ -150,7 +150,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
                 _require_lockstep(settings)
             paused = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
             source = paused
-        with Serving(source, chosen, settings) as serving:
+        with Serving(source, chosen, settings, console.print) as serving:
             in_lockstep = [IN_LOCKSTEP] if given["lockstep"] else []
             if paused is not None and not in_lockstep:
                 paused.control("resume", 0.0, "")

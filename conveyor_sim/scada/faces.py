@@ -9,6 +9,7 @@ from typing import Any
 
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.face import HERE, Face, FaceError, Settings, require_free
+from conveyor_sim.scada.shared import Shared
 from conveyor_sim.scada.source import MODBUS, MQTT, OPCUA, WEB, TagSource
 
 
@@ -22,7 +23,7 @@ class Kind:
     """By default; its usual one may be for root only."""
     libraries: tuple[str, ...]
     """Without which it can't be."""
-    make: Callable[[TagSource, Any, Settings], Face]
+    make: Callable[[TagSource, Any, Settings, Shared], Face]
     """A face on what its option takes, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
     """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
@@ -32,6 +33,8 @@ class Kind:
     """Of this package, that brings the libraries."""
     whoever: str = ""
     """Who can do that, where it is not those who reach its port."""
+    isolated: bool = True
+    """True if it runs in a process of its own. It is then made there, by its name in FACES."""
 
     @property
     def installed(self) -> bool:
@@ -64,13 +67,13 @@ def _is_here(library: str) -> bool:
         return False
 
 
-def _modbus(source: TagSource, port: int, settings: Settings) -> Face:
+def _modbus(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.modbus_map import keep_map, modbus_map
     from conveyor_sim.scada.modbus_server import ModbusServer
 
     tags = source.about.tags
     rows = modbus_map(tags) if settings.modbus_map is None else keep_map(settings.modbus_map, tags)
-    return ModbusServer(source, rows, settings.modbus_role, settings.host, port)
+    return ModbusServer(source, rows, settings.modbus_role, settings.host, port, holding=shared.holding)
 
 
 def _modbus_exposes(settings: Settings) -> str:
@@ -79,13 +82,12 @@ def _modbus_exposes(settings: Settings) -> str:
     return f"read all, and write as {settings.modbus_role}, for Modbus asks nobody who they are"
 
 
-def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
+def _opcua(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.users import read_users
 
     return OpcUaServer(
         source,
-        {} if settings.users is None else read_users(settings.users),
+        logins=shared.logins,
         anonymous=settings.anonymous,
         stamps=settings.stamps,
         certificates=settings.opcua_certificates,
@@ -95,11 +97,12 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
     )
 
 
-def _mqtt(source: TagSource, url: str, settings: Settings) -> Face:
+def _mqtt(source: TagSource, url: str, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.mqtt.broker import broker_of
     from conveyor_sim.scada.mqtt.edge_node import EdgeNode
 
-    return EdgeNode(source, broker_of(url, settings), _mqtt_writes(settings), settings.stamps)
+    broker, writes = broker_of(url, settings), _mqtt_writes(settings)
+    return EdgeNode(source, broker, writes, settings.stamps, holding=shared.holding)
 
 
 def _mqtt_writes(settings: Settings) -> WriterKind | None:
@@ -113,8 +116,7 @@ def _mqtt_exposes(settings: Settings) -> str:
     return f"read all, and write as {settings.mqtt_role}, for commands by Sparkplug say nothing of who gave them"
 
 
-def _web(source: TagSource, port: int, settings: Settings) -> Face:
-    from conveyor_sim.scada.users import read_users
+def _web(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.view import View
     from conveyor_sim.scada.web.server import WebServer
     from conveyor_sim.scada.web.tls import server_context
@@ -124,7 +126,7 @@ def _web(source: TagSource, port: int, settings: Settings) -> Face:
     secured = settings.host != HERE or settings.web_certificates is not None
     return WebServer(
         source,
-        {} if settings.users is None else read_users(settings.users),
+        logins=shared.logins,
         anonymous=settings.anonymous,
         secured=server_context(settings.web_certificates, settings.opcua_certificates) if secured else None,
         host=settings.host,
@@ -132,7 +134,7 @@ def _web(source: TagSource, port: int, settings: Settings) -> Face:
     )
 
 
-def _foxglove(source: TagSource, port: int, settings: Settings) -> Face:
+def _foxglove(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.foxglove_server import FoxgloveServer
     from conveyor_sim.scada.view import View
 

@@ -31,7 +31,7 @@ from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.hands import objection
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET, TICK
-from conveyor_sim.scada.holding import Holding
+from conveyor_sim.scada.holding import Holding, HoldingService
 from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
 from conveyor_sim.scada.source import MODBUS, TagSource
 
@@ -78,11 +78,13 @@ class ModbusServer:
         host: str = HERE,
         port: int = 0,
         silence: float = SILENCE,
+        holding: HoldingService | None = None,
     ) -> None:
         """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free.
         silence: s of wall time without a request after which a client holds nothing any more.
+        holding: decides which client holds the line; None: a new one.
         """
-        self._image = _Image(source, rows, role)
+        self._image = _Image(source, rows, role, holding or Holding(source, MODBUS))
         self._at = host, port
         self._silence = silence
         self._server: _Server | None = None
@@ -140,7 +142,7 @@ class _Server(ModbusTcpServer):
     image: Any
     """An _Image: to the library, what a request is done to."""
     silence: float
-    holding: Holding
+    holding: HoldingService
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -274,9 +276,10 @@ class _Handler(ServerRequestHandler):
 class _Image:
     """What the library asks for values, in place of a device's memory."""
 
-    def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None) -> None:
-        self._source, self._role = source, role
-        self.holding = Holding(source, MODBUS)
+    def __init__(
+        self, source: TagSource, rows: Sequence[Row], role: WriterKind | None, holding: HoldingService
+    ) -> None:
+        self._source, self._role, self.holding = source, role, holding
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
@@ -324,10 +327,12 @@ class _Image:
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
         if names and refusal(self._commands, "command", names, numbers):
             return ExcCodes.ILLEGAL_VALUE
-        writer = _writer.get()
+        writer = claimant = _writer.get()
+        if self._role == "controller" and self._source.shown.owner not in ("", writer):
+            claimant = self.holding.judged_as(writer)
         commands = [self._commands[name] for name in names]
         if any(
-            objection(self._source, tag, value, self._role, writer)
+            objection(self._source, tag, value, self._role, claimant)
             for tag, value in zip(commands, numbers, strict=True)
         ):
             return ExcCodes.DEVICE_BUSY

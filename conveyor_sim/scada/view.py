@@ -7,12 +7,14 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
@@ -22,8 +24,9 @@ from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
 from conveyor_sim.observe.read_back import ReadBackColumns
+from conveyor_sim.scada.face import Health
 from conveyor_sim.scada.past import Past
-from conveyor_sim.scada.source import About, Listeners, RecentEvents, Shown, TagSource
+from conveyor_sim.scada.source import About, Control, Listeners, RecentEvents, Shown, TagSource
 
 HEARD = ("line", "run_state", "signals", "events", "readback", "alarm_states")
 """Topics that it takes."""
@@ -68,6 +71,8 @@ class PictureSource(TagSource, Protocol):
     def newest(self) -> Mapping[str, bytes]:
         """By topic, the last message as it came."""
 
+    servers: tuple[Health, ...]
+
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on; what is returned ends that."""
 
@@ -86,6 +91,8 @@ class View:
 
     takes_inputs = True
     """Whether anything that is given may ever act."""
+    recording: Path | None = None
+    """Recording that is played back; None: the line is simulated."""
     _run_id: str
     _tick: int
     _line: Any
@@ -110,8 +117,12 @@ class View:
         self._shown = Shown(0, {}, lost=NOTHING)
         self._picture: Picture | None = None
         self._watchers = 0
-        self._hearers: tuple[Callable[[str, bytes], None], ...] = ()
+        self._watching = threading.Lock()
+        self._hearers = Listeners()
         self._newest: dict[str, bytes] = {}
+        self._era = 0
+        self.servers: tuple[Health, ...] = ()
+        """Health of the protocol servers of the line, as far as it is known here."""
         self._forget("")
 
     @property
@@ -138,10 +149,20 @@ class View:
         """By topic, the last message as it came."""
         return self._newest
 
+    @property
+    def era(self) -> int:
+        """Number that changes when messages from before no longer hold: after a reset, or a seek in a recording."""
+        return self._era
+
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on, if that costs anything; what is returned ends that."""
         self._count_watchers(1)
         return lambda: self._count_watchers(-1)
+
+    @property
+    def controls(self) -> frozenset[Control]:
+        """Requests that `control` accepts; none unless a subclass says so."""
+        return frozenset()
 
     @property
     def past(self) -> Past | None:
@@ -150,12 +171,7 @@ class View:
 
     def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
         """Have a function called with topic and bytes of each message from now on; what is returned ends that."""
-        self._hearers = (*self._hearers, heard)
-
-        def end() -> None:
-            self._hearers = tuple(other for other in self._hearers if other is not heard)
-
-        return end
+        return self._hearers.add(heard)
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events were heard of, and those after so many."""
@@ -164,6 +180,14 @@ class View:
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
         """Have a function called whenever something new is shown; what is returned ends that."""
         return self._listeners.add(heard)
+
+    def give(self, given: Input) -> str:
+        """Return the reason why an input is refused: always, unless a subclass takes inputs."""
+        return "nothing can be commanded here"
+
+    def control(self, what: Control, value: float, by: str) -> str:
+        """Return the reason why a request is refused: always, unless a subclass has controls."""
+        return f"{what}: nothing can be controlled here"
 
     def wait(self, seconds: float) -> bool:
         """Until the line is known and there is something to show, or so long, s of wall time; whether it is."""
@@ -203,8 +227,7 @@ class View:
     def pass_on(self, topic: str, data: bytes) -> None:
         """A message as it came, of one of HEARD and DRAWN."""
         self._newest[topic] = data
-        for heard in self._hearers:
-            heard(topic, data)
+        self._hearers.tell(topic, data)
 
     def keep(self, topic: str, decode: Callable[[], Any]) -> None:
         """What decodes a message of one of DRAWN, in any thread."""
@@ -255,15 +278,18 @@ class View:
         self._events.add([event])
 
     def _count_watchers(self, more: int) -> None:
-        """Of one thread."""
-        before, self._watchers = self._watchers, self._watchers + more
-        if (before > 0) != (self._watchers > 0):
-            self._watched(self._watchers > 0)
+        """Add to the number of watchers. From any thread."""
+        with self._watching:
+            before, self._watchers = self._watchers, self._watchers + more
+            if (before > 0) != (self._watchers > 0):
+                self._watched(self._watchers > 0)
 
     def _watched(self, on: bool) -> None:
         """Somebody looks, or nobody any more."""
 
     def _forget(self, run_id: str) -> None:
+        self._newest = {topic: data for topic, data in self._newest.items() if topic == "line"}
+        self._era += 1
         self._run_id = run_id
         self._tick = 0
         self._drawn = {}
@@ -312,6 +338,11 @@ class View:
             return self._initial
         values: list[float] = self._read_back.value.tolist()
         return values
+
+
+def decoded(topic: str, data: bytes) -> Any:
+    """Return the message of a topic, serialized as this version does it."""
+    return typestore().deserialize_cdr(data, TOPICS[topic].type)
 
 
 def about_line(message: Any) -> About:
