@@ -16,16 +16,18 @@ from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.scada.past import Past
 from conveyor_sim.scada.server_messages import Answer, Call, Frame, ServerTask, What
 from conveyor_sim.scada.source import Control
 from conveyor_sim.scada.users import User
 from conveyor_sim.scada.view import DRAWN, HEARD, View
 from conveyor_sim.support.printable import SENTENCE, printable
+
+if TYPE_CHECKING:
+    from conveyor_sim.scada.past import Past
 
 PATIENCE, LOGIN_PATIENCE = 1.0, 3.0
 """s of wall time that the parent has for an answer; a password takes it about 0.05 s of a processor."""

@@ -13,12 +13,10 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from multiprocessing.connection import Connection
 
-from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scada.child import die_with_parent, pipes_of_child
 from conveyor_sim.scada.face import Face
 from conveyor_sim.scada.faces import FACES
-from conveyor_sim.scada.past import Past
 from conveyor_sim.scada.pulse import beat
 from conveyor_sim.scada.remote_source import SILENCE, Calls, RemoteHolding, RemoteLogins, RemoteSource
 from conveyor_sim.scada.server_messages import Answer, Beat, End, Failed, ServerTask, Started
@@ -33,11 +31,7 @@ class _Process:
     def __init__(self, task: ServerTask, frames: Connection, pipe: Connection, stack: ExitStack) -> None:
         self._task, self._frames, self._pipe = task, frames, pipe
         self._calls = Calls(pipe)
-        decode, past = decoded, None
-        if task.bag is not None:
-            decode, past = stack.enter_context(open_bag(task.bag)).decode, Past(task.bag)
-            stack.callback(past.close)
-        self._source = RemoteSource(task, self._calls, decode, past)
+        self._source = _source(task, self._calls, stack)
         self._source.apply(frames.recv())
 
     def run(self) -> None:
@@ -86,6 +80,17 @@ class _Process:
                 self._loop.call_soon_threadsafe(wanted.set)
 
 
+def _source(task: ServerTask, calls: Calls, stack: ExitStack) -> RemoteSource:
+    if task.bag is None:
+        return RemoteSource(task, calls, decoded, None)
+    from conveyor_sim.bag.reader import open_bag
+    from conveyor_sim.scada.past import Past
+
+    past = Past(task.bag)
+    stack.callback(past.close)
+    return RemoteSource(task, calls, stack.enter_context(open_bag(task.bag)).decode, past)
+
+
 def _or_end(follow: Callable[[], None]) -> None:
     """Read a pipe until the parent is gone, then end this process at once, whatever the protocol server does."""
     try:
@@ -112,3 +117,4 @@ def main() -> None:
         except Exception as error:
             pipe.send(Failed(f"{task.kind}: {type(error).__name__}: {error}"))
             raise
+    os._exit(0)  # to free thousands of nodes takes longer than to close all connections

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
@@ -25,8 +25,10 @@ from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
 from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.scada.face import Health
-from conveyor_sim.scada.past import Past
 from conveyor_sim.scada.source import About, Control, Listeners, RecentEvents, Shown, TagSource
+
+if TYPE_CHECKING:
+    from conveyor_sim.scada.past import Past
 
 HEARD = ("line", "run_state", "signals", "events", "readback", "alarm_states")
 """Topics that it takes."""

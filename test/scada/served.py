@@ -58,9 +58,19 @@ class Served:
     @property
     def simulator(self) -> int:
         """The process that simulates."""
+        (pid,) = self._children("scene_process")
+        return pid
+
+    @property
+    def servers(self) -> list[int]:
+        """Processes of protocol servers."""
+        return self._children("server_process")
+
+    def _children(self, module: str) -> list[int]:
+        """Child processes that run a module."""
         tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
-        (pid,) = {pid for task in tasks for pid in task.read_text().split()}
-        return int(pid)
+        pids = {int(pid) for task in tasks for pid in task.read_text().split()}
+        return [pid for pid in sorted(pids) if module in Path(f"/proc/{pid}/cmdline").read_text()]
 
     def end(self, number: int = signal.SIGINT) -> str:
         """What it printed, after a signal."""
