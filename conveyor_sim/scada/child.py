@@ -13,14 +13,16 @@ CODE = "import sys; sys.path[:] = {path!r}; from {module} import main; main()"
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
-def start_child(module: str, *pipes: Connection) -> subprocess.Popen[bytes]:
-    """Start a Python that runs `main()` of a module. Its arguments are the descriptors of `pipes`, which it inherits.
+def start_child(module: str, *pipes: Connection, name: str = "") -> subprocess.Popen[bytes]:
+    """Start a Python that runs `main()` of a module. It inherits `pipes`; its arguments are their descriptors, and
+    `name`, which says in a list of processes what it is for.
 
     It has a session of its own, because a Ctrl-C at the terminal is for the parent alone, which ends its children.
     """
     numbers = [pipe.fileno() for pipe in pipes]
+    arguments = [*map(str, numbers), *([name] if name else [])]
     return subprocess.Popen(
-        [sys.executable, "-c", CODE.format(path=sys.path, module=module), *map(str, numbers)],
+        [sys.executable, "-c", CODE.format(path=sys.path, module=module), *arguments],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         start_new_session=True,
@@ -30,7 +32,7 @@ def start_child(module: str, *pipes: Connection) -> subprocess.Popen[bytes]:
 
 def pipes_of_child() -> list[Connection]:
     """Return the pipes that this process was started with, as the child."""
-    return [Connection(int(number)) for number in sys.argv[1:]]
+    return [Connection(int(argument)) for argument in sys.argv[1:] if argument.isdigit()]
 
 
 def die_with_parent() -> None:

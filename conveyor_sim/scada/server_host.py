@@ -29,10 +29,12 @@ from conveyor_sim.scada.source import WEB
 from conveyor_sim.scada.users import Logins
 from conveyor_sim.scada.view import View
 
+PROCESS = "conveyor_sim.scada.server_process"
+
 STALLED = 5.0
 """s of wall time without a heartbeat after which a protocol server is killed and restarted."""
 
-START = 60.0
+START = 120.0
 """s of wall time that a protocol server has for its start."""
 
 CLOSING = 1.5
@@ -215,7 +217,7 @@ class ServerHost:
         its_frames, sending = Pipe(duplex=False)
         with pipe, sending:
             with its_pipe, its_frames:
-                self._process = process = start_child("conveyor_sim.scada.server_process", its_frames, its_pipe)
+                self._process = process = start_child(PROCESS, its_frames, its_pipe, name=name)
             self._frames = frames = Frames(view, self._everyone)
             sender = threading.Thread(target=_send_all, args=(frames, sending), name=f"frames of {name}", daemon=True)
             with self._sending:
