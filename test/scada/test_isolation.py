@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import socket
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from scada.waiting import PATIENCE, until
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
+from conveyor_sim.scada.server_messages import BEAT
 from conveyor_sim.scada.users import MOST_WRONG, line_of, new_user
 
 pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
@@ -176,6 +178,7 @@ def test_the_line_stays_with_its_controller_through_a_restart(line: Line) -> Non
         assert code_of(plc, 0.25) == 0
         until(lambda: speed_of(plc) == 0.25, "the speed")
         assert code_of(other, 0.3) == BUSY
+        time.sleep(5 * BEAT)  # counts are as of the last heartbeat
         kill(line, "modbus")
         until(lambda: speed_of(other) is not None, "the other server")
         assert code_of(other, 0.3) == BUSY
