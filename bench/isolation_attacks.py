@@ -95,7 +95,7 @@ def _open_channel() -> bytes:
     request.Parameters.SecurityMode = ua.MessageSecurityMode.None_
     request.Parameters.RequestedLifetime, request.Parameters.ClientNonce = 3_600_000, b""
     head = struct.pack("<I", 0) + struct.pack("<i", len(policy)) + policy + struct.pack("<iiII", -1, -1, 1, 1)
-    body = head + struct_to_binary(request)
+    body = head + bytes(struct_to_binary(request))
     return b"OPNF" + struct.pack("<I", len(body) + 8) + body
 
 

@@ -12,6 +12,8 @@ from urllib.parse import urlsplit
 
 from aiohttp import ClientSession
 
+BEGIN = 1.0
+"""s of wall time in which a page is sent all that it begins with, which is not measured."""
 POLL, PING, GET = 0.01, 0.02, 0.1
 """s of wall time between two requests: of Modbus; of the page by websocket; of the page by HTTP."""
 TICK = struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, 65_534, 2)
@@ -36,16 +38,18 @@ def modbus(address: str, seconds: float) -> dict[str, list[float]]:
 async def page(address: str, seconds: float) -> dict[str, list[float]]:
     """Look at the page, and get its files meanwhile."""
     url, pings, gets = address.rstrip("/"), list[float](), list[float]()
-    end = time.monotonic() + seconds
+    end = time.monotonic() + BEGIN + seconds
     async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url, max_msg_size=0) as socket:
 
         async def ping() -> None:
+            await asyncio.sleep(BEGIN)
             while time.monotonic() < end:
                 await socket.send_json({"do": "ping", "sent": time.perf_counter()})
                 await asyncio.sleep(PING)
             await socket.close()
 
         async def get() -> None:
+            await asyncio.sleep(BEGIN)
             while time.monotonic() < end:
                 began = time.perf_counter()
                 async with session.get(url) as answer:

@@ -83,7 +83,7 @@ class Health(NamedTuple):
     lag: float
     """s of wall time, the longest by which the event loop was late lately."""
     silent: float
-    """s of wall time for which the event loop has not run at all; 0: it runs."""
+    """s of wall time for which the event loop has given no sign of life; 0: it runs."""
     restarts: int
     """Number of times that the protocol server was restarted."""
 
@@ -91,8 +91,8 @@ class Health(NamedTuple):
     def text(self) -> str:
         """Words for people."""
         times = "" if not self.restarts else f", restarted {'once' if self.restarts == 1 else f'{self.restarts} times'}"
-        stalled = f", stalled for {self.silent:.1f} s" if self.silent else ""
-        return f"lag {self.lag * 1e3:.0f} ms{stalled}{times}"
+        silent = f", no answer for {self.silent:.1f} s" if self.silent else ""
+        return f"lag {self.lag * 1e3:.0f} ms{silent}{times}"
 
 
 class Face(Protocol):

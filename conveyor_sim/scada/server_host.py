@@ -179,8 +179,9 @@ class ServerHost:
         self._holding.end()
 
     def _wait(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0.0 and not self._ending.wait(min(LOOK, left)):
+        began = time.monotonic()
+        while (left := began + seconds - time.monotonic()) > 0.0 and not self._ending.wait(min(LOOK, left)):
+            self._silent = time.monotonic() - began
             self._holding.look()
 
     def _account(self) -> None:

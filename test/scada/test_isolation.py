@@ -35,6 +35,8 @@ from pymodbus.client import ModbusTcpClient
 SCENE = "scenarios/zoned_line"
 PASSWORD = "open sesame"
 BUSY = 6
+TICK = 65_534
+"""Address of its two registers."""
 
 
 class Line(Served):
@@ -189,6 +191,19 @@ def test_the_line_stays_with_its_controller_through_a_restart(line: Line) -> Non
     assert "modbus: the protocol server was killed by signal 9; it is restarted on modbus://" in line.told
 
 
+def test_a_parent_that_does_not_answer_refuses_what_then_never_acts(line: Line) -> None:
+    with line.modbus() as client:
+        before = speed_of(client)
+        line.process.send_signal(signal.SIGSTOP)
+        try:
+            assert code_of(client, 0.125) == BUSY
+        finally:
+            line.process.send_signal(signal.SIGCONT)
+        ticks = client.read_input_registers(TICK, count=2).registers
+        until(lambda: client.read_input_registers(TICK, count=2).registers > ticks, "ticks")
+        assert speed_of(client) == before
+
+
 def test_wrong_passwords_count_for_all_servers_and_through_a_restart(line: Line) -> None:
     assert line.signs_in("op") and line.lets_in("op")
     for number in range(MOST_WRONG - 2):
@@ -216,7 +231,7 @@ def test_ctrl_c_ends_it_in_order_though_a_server_is_stalled(line: Line) -> None:
     out = line.end()
     assert line.process.returncode == 0
     assert re.search(
-        r"modbus 2 written, 3 refused, restarted 1 time, web 0 written, 0 refused; recorded to bag\n$", out
+        r"modbus 2 written, 4 refused, restarted 1 time, web 0 written, 0 refused; recorded to bag\n$", out
     )
     assert not any(Path(f"/proc/{pid}").exists() for pid in children)
     bag = line.folder / "bag"
