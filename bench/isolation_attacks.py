@@ -28,7 +28,7 @@ _LITERAL_OPERAND = 597
 
 
 async def filters(address: str) -> None:
-    """Two event items with very many select clauses each; then the client goes."""
+    """Two event items with very many select clauses each, as long as the server answers."""
     async with Client(address, timeout=PATIENCE) as client:
         wanted = ua.CreateSubscriptionParameters()
         wanted.RequestedPublishingInterval, wanted.PublishingEnabled = 1000, True
@@ -38,7 +38,7 @@ async def filters(address: str) -> None:
         clause.TypeDefinitionId, clause.AttributeId = ua.NodeId(ua.ObjectIds.BaseEventType), ua.AttributeIds.Value
         clause.BrowsePath = [ua.QualifiedName("a", 0)]
         for _ in range(2):
-            item = ua.MonitoredItemCreateRequest()
+            item = ua.MonitoredItemCreateRequest(MonitoringMode=ua.MonitoringMode.Reporting)
             item.ItemToMonitor = ua.ReadValueId(
                 NodeId=ua.NodeId(ua.ObjectIds.Server), AttributeId=ua.AttributeIds.EventNotifier
             )
@@ -47,6 +47,9 @@ async def filters(address: str) -> None:
             items = ua.CreateMonitoredItemsParameters()
             items.SubscriptionId, items.ItemsToCreate = subscription.SubscriptionId, [item]
             await client.uaclient.create_monitored_items(items)
+        while True:
+            await client.get_node("ns=2;s=run/tick").read_value()
+            await asyncio.sleep(PAUSE)
 
 
 async def browse(address: str) -> None:
