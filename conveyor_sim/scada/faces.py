@@ -12,6 +12,8 @@ from conveyor_sim.scada.face import HERE, Face, FaceError, Settings, require_fre
 from conveyor_sim.scada.shared import Shared
 from conveyor_sim.scada.source import MODBUS, MQTT, OPCUA, WEB, TagSource
 
+_HERE = "conveyor_sim.scada"
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -23,6 +25,8 @@ class Kind:
     """By default; its usual one may be for root only."""
     libraries: tuple[str, ...]
     """Without which it can't be."""
+    module: str
+    """Module of the face, which `make` imports."""
     make: Callable[[TagSource, Any, Settings, Shared], Face]
     """A face on what its option takes, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
@@ -149,18 +153,28 @@ def _users_can(settings: Settings) -> str:
 
 
 FACES: tuple[Kind, ...] = (
-    Kind(OPCUA, 4840, ("asyncua",), _opcua, _users_can),
-    Kind(MODBUS, 5020, ("pymodbus",), _modbus, _modbus_exposes),
+    Kind(OPCUA, 4840, ("asyncua",), f"{_HERE}.opcua.server", _opcua, _users_can),
+    Kind(MODBUS, 5020, ("pymodbus",), f"{_HERE}.modbus_server", _modbus, _modbus_exposes),
     Kind(
         MQTT,
         1883,
         ("paho", "google.protobuf"),
+        f"{_HERE}.mqtt.edge_node",
         _mqtt,
         _mqtt_exposes,
         by_default=False,
         extra="mqtt",
         whoever="whoever the broker lets in",
     ),
-    Kind(WEB, 8080, ("aiohttp",), _web, _users_can, by_default=False),
-    Kind("foxglove", 8765, ("foxglove",), _foxglove, lambda _: "read all", by_default=False, extra="foxglove"),
+    Kind(WEB, 8080, ("aiohttp",), f"{_HERE}.web.server", _web, _users_can, by_default=False),
+    Kind(
+        "foxglove",
+        8765,
+        ("foxglove",),
+        f"{_HERE}.foxglove_server",
+        _foxglove,
+        lambda _: "read all",
+        by_default=False,
+        extra="foxglove",
+    ),
 )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from conveyor_sim.scada.face import Health
 from conveyor_sim.scada.server_messages import LIFE_SIGN, Frame
 from conveyor_sim.scada.source import MOST_EVENTS
-from conveyor_sim.scada.view import DRAWN, View
+from conveyor_sim.scada.view import DRAWN, PictureSource
 
 MOST_FRAMES, MOST_BYTES = 100, 16 * 1024 * 1024
 """Frames that wait to be sent, and bytes of their messages; beyond either, the newest ones are merged."""
@@ -26,7 +26,7 @@ class Frames:
     to MOST_EVENTS events.
     """
 
-    def __init__(self, view: View, servers: Callable[[], tuple[Health, ...]] | None = None) -> None:
+    def __init__(self, view: PictureSource, servers: Callable[[], tuple[Health, ...]] | None = None) -> None:
         """Collect from now on; the first frame holds everything that the view shows.
 
         servers: returns the health of all protocol servers, which frames then carry every HEALTH seconds.

@@ -14,22 +14,20 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
-from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 from urllib.parse import urlsplit
 
-from conveyor_sim.scada.child import how_it_ended, start_child
+from conveyor_sim.scada.child import how_it_ended
 from conveyor_sim.scada.face import FaceError, Health, Settings, Status
 from conveyor_sim.scada.faces import Kind
 from conveyor_sim.scada.frames import Frames
 from conveyor_sim.scada.holding import Holding
+from conveyor_sim.scada.server_child import ServerChild
 from conveyor_sim.scada.server_messages import Answer, Beat, Call, End, Failed, Report, ServerTask, Started, What
 from conveyor_sim.scada.source import WEB
 from conveyor_sim.scada.users import Logins
-from conveyor_sim.scada.view import View
-
-PROCESS = "conveyor_sim.scada.server_process"
+from conveyor_sim.scada.view import PictureSource
 
 STALLED = 5.0
 """s of wall time without a heartbeat after which a protocol server is killed and restarted."""
@@ -65,13 +63,15 @@ class ServerHost:
         kind: Kind,
         place: Any,
         settings: Settings,
-        view: View,
+        view: PictureSource,
         logins: Logins,
         say: Callable[[str], object],
         everyone: Callable[[], tuple[Health, ...]],
+        ready: ServerChild | None,
     ) -> None:
         """Return at once; `wait_until_started` waits. place: port or URL. say: takes sentences for people.
-        everyone: returns the health of all protocol servers, for those that show it.
+        everyone: returns the health of all protocol servers, for those that show it. ready: process for the first
+        start; None: it is started here.
         """
         self.kind = kind
         self._place, self._settings, self._view, self._logins, self._say = place, settings, view, logins, say
@@ -92,6 +92,7 @@ class ServerHost:
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._frames: Frames | None = None
+        self._ready = ready
         self._end_watch: Callable[[], None] | None = None
         self._thread = threading.Thread(target=self._supervise, name=f"server {kind.name}", daemon=True)
         self._thread.start()
@@ -214,28 +215,26 @@ class ServerHost:
             self._logins.has_users,
             view.recording,
         )
-        pipe, its_pipe = Pipe()
-        its_frames, sending = Pipe(duplex=False)
-        with pipe, sending:
-            with its_pipe, its_frames:
-                self._process = process = start_child(PROCESS, its_frames, its_pipe, name=name)
-            self._frames = frames = Frames(view, self._everyone)
-            sender = threading.Thread(target=_send_all, args=(frames, sending), name=f"frames of {name}", daemon=True)
+        child, self._ready = self._ready or ServerChild(name), None
+        self._process, pipe = child.process, child.pipe
+        self._frames = frames = Frames(view, self._everyone)
+        sender = threading.Thread(target=_send_all, args=(frames, child.frames), name=f"frames of {name}", daemon=True)
+        with self._sending:
+            self._pipe = pipe
+        sender.start()
+        try:
+            pipe.send(task)
+            reason = self._hear(pipe, child.process)
+        except (EOFError, OSError):
+            reason = ""
+        finally:
             with self._sending:
-                self._pipe = pipe
-            sender.start()
-            try:
-                pipe.send(task)
-                reason = self._hear(pipe, process)
-            except (EOFError, OSError):
-                reason = ""
-            finally:
-                with self._sending:
-                    self._pipe = None
-                frames.end()
-                _end_process(process, 0.0 if self._ending.is_set() else LOOK)
-                sender.join()
-        return reason or f"{name}: the protocol server {how_it_ended(process.returncode)}"
+                self._pipe = None
+            frames.end()
+            child.kill(0.0 if self._ending.is_set() else LOOK)
+            sender.join()
+            child.close()
+        return reason or f"{name}: the protocol server {how_it_ended(child.process.returncode)}"
 
     def _hear(self, pipe: Connection, process: subprocess.Popen[bytes]) -> str:
         """Answer the process until it fails or must be killed; return why. Raises EOFError when it has ended."""
@@ -331,11 +330,3 @@ def _send_all(frames: Frames, pipe: Connection) -> None:
     with suppress(OSError):
         while (frame := frames.fetch()) is not None:
             pipe.send(frame)
-
-
-def _end_process(process: subprocess.Popen[bytes], patience: float) -> None:
-    """Return once a process has ended, which was asked to; kill it if it has not within `patience` seconds."""
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(patience)
-    process.kill()
-    process.wait()

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import os
+import sys
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
+from importlib import import_module
 from multiprocessing.connection import Connection
 
 from conveyor_sim.errors import ConveyorError
@@ -45,8 +47,7 @@ class _Process:
         task, calls = self._task, self._calls
         shared = Shared(RemoteLogins(calls, task.has_users), RemoteHolding(calls))
         (kind,) = (kind for kind in FACES if kind.name == task.kind)
-        with collected_later():
-            server = kind.make(self._source, task.place, task.settings, shared)
+        server = kind.make(self._source, task.place, task.settings, shared)
         await server.start()
         calls.send(Started(server.address))
         beating = asyncio.create_task(beat(lambda lag: calls.send(Beat(lag, server.status()))))
@@ -100,9 +101,11 @@ def _or_end(follow: Callable[[], None]) -> None:
 
 
 def main() -> None:
-    """Be that process; the arguments are the descriptors of two pipes: of frames, and of calls and answers."""
+    """Be that process. Arguments: descriptors of two pipes, of frames, and of calls and answers; name in FACES."""
     die_with_parent()
     frames, pipe = pipes_of_child()
+    with collected_later():
+        import_module(next(kind.module for kind in FACES if kind.name == sys.argv[-1]))
     try:
         task = pipe.recv()
     except (EOFError, OSError):  # the parent has ended before it could say

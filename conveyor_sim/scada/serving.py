@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from types import MappingProxyType
 from typing import Any
 
 from conveyor_sim.scada.face import HERE, Health, Settings, Status
 from conveyor_sim.scada.faces import Kind
+from conveyor_sim.scada.server_child import ServerChild
 from conveyor_sim.scada.server_host import ServerHost
 from conveyor_sim.scada.source import TagSource
 from conveyor_sim.scada.thread_host import ThreadHost
@@ -24,13 +26,15 @@ class Serving(AbstractContextManager["Serving"]):
         chosen: Sequence[tuple[Kind, Any]],
         settings: Settings,
         say: Callable[[str], object] = lambda sentence: None,
+        ready: Mapping[str, ServerChild] = MappingProxyType({}),
     ) -> None:
         """chosen: protocols and their ports, 0 for any that is free; of MQTT the URL of the broker.
         say: called with a sentence for people when a protocol server is restarted, by a thread.
+        ready: processes that were started for protocols, by name. They are ended with this.
 
         Raises ConveyorError, in one sentence, if one of them can't be served; then none is.
         """
-        self._source, self._settings = source, settings
+        self._source, self._settings, self._ready = source, settings, ready
         self._hosts: list[ServerHost | ThreadHost] = []
         logins = Logins({} if settings.users is None else read_users(settings.users))
         try:
@@ -47,7 +51,8 @@ class Serving(AbstractContextManager["Serving"]):
         """Start one protocol server: the only place that chooses where it runs."""
         if not kind.isolated or not isinstance(self._source, View):
             return ThreadHost(kind, place, self._settings, self._source, logins)
-        return ServerHost(kind, place, self._settings, self._source, logins, say, self.health)
+        ready = self._ready.get(kind.name)
+        return ServerHost(kind, place, self._settings, self._source, logins, say, self.health, ready)
 
     @property
     def faces(self) -> Sequence[ServerHost | ThreadHost]:

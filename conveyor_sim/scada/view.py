@@ -25,7 +25,7 @@ from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
 from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.scada.face import Health
-from conveyor_sim.scada.source import About, Control, Listeners, RecentEvents, Shown, TagSource
+from conveyor_sim.scada.source import About, Listeners, RecentEvents, Shown, TagSource
 
 if TYPE_CHECKING:
     from conveyor_sim.scada.past import Past
@@ -74,6 +74,11 @@ class PictureSource(TagSource, Protocol):
         """By topic, the last message as it came."""
 
     servers: tuple[Health, ...]
+    recording: Path | None
+
+    @property
+    def era(self) -> int:
+        """Number that changes when messages from before no longer hold."""
 
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on; what is returned ends that."""
@@ -162,11 +167,6 @@ class View:
         return lambda: self._count_watchers(-1)
 
     @property
-    def controls(self) -> frozenset[Control]:
-        """Requests that `control` accepts; none unless a subclass says so."""
-        return frozenset()
-
-    @property
     def past(self) -> Past | None:
         """Nobody knows."""
         return None
@@ -182,14 +182,6 @@ class View:
     def listen(self, heard: Callable[[], None]) -> Callable[[], None]:
         """Have a function called whenever something new is shown; what is returned ends that."""
         return self._listeners.add(heard)
-
-    def give(self, given: Input) -> str:
-        """Return the reason why an input is refused: always, unless a subclass takes inputs."""
-        return "nothing can be commanded here"
-
-    def control(self, what: Control, value: float, by: str) -> str:
-        """Return the reason why a request is refused: always, unless a subclass has controls."""
-        return f"{what}: nothing can be controlled here"
 
     def wait(self, seconds: float) -> bool:
         """Until the line is known and there is something to show, or so long, s of wall time; whether it is."""

@@ -178,4 +178,4 @@ def of_plc(
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
     # It is alone, and made of functions of this process.
-    return Kind(PLC, 0, (library,), make, lambda _: "command it", isolated=False)
+    return Kind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)
