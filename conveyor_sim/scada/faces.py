@@ -106,7 +106,7 @@ def _mqtt(source: TagSource, url: str, settings: Settings, shared: Shared) -> Fa
     from conveyor_sim.scada.mqtt.edge_node import EdgeNode
 
     broker, writes = broker_of(url, settings), _mqtt_writes(settings)
-    return EdgeNode(source, broker, writes, settings.stamps, holding=shared.holding)
+    return EdgeNode(source, broker, writes, settings.stamps, holding=shared.holding, before=shared.counts)
 
 
 def _mqtt_writes(settings: Settings) -> WriterKind | None:

@@ -214,6 +214,7 @@ class ServerHost:
             view.takes_inputs,
             self._logins.has_users,
             view.recording,
+            (self._before.writes, self._before.refused),
         )
         child, self._ready = self._ready or ServerChild(name), None
         self._process, pipe = child.process, child.pipe
@@ -303,7 +304,10 @@ class ServerHost:
             "look": self._holding.look,
             "watch": self._watch,
         }
-        answer = todo[call.what](*call.arguments)
+        try:
+            answer = todo[call.what](*call.arguments)
+        except Exception as error:  # rather a refusal than no answer
+            answer = f"{type(error).__name__}: {error}"
         if call.number:
             self._send(Answer(call.number, answer))
 

@@ -37,6 +37,8 @@ class ServerTask:
     """True if there are users who can log in."""
     bag: Path | None
     """Recording that is played back. It defines the messages, and holds the history; None: not a recording."""
+    counts: tuple[int, int]
+    """Requests that were passed on, and that were refused, by earlier processes of this protocol server."""
 
 
 class Frame(NamedTuple):

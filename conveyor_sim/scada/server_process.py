@@ -45,7 +45,7 @@ class _Process:
         for name, follow in (("frames", self._apply), ("answers", self._listen)):
             threading.Thread(target=_or_end, args=(follow,), name=name, daemon=True).start()
         task, calls = self._task, self._calls
-        shared = Shared(RemoteLogins(calls, task.has_users), RemoteHolding(calls))
+        shared = Shared(RemoteLogins(calls, task.has_users), RemoteHolding(calls), task.counts)
         (kind,) = (kind for kind in FACES if kind.name == task.kind)
         server = kind.make(self._source, task.place, task.settings, shared)
         await server.start()
@@ -119,5 +119,4 @@ def main() -> None:
             pipe.send(Failed(str(error)))
         except Exception as error:
             pipe.send(Failed(f"{task.kind}: {type(error).__name__}: {error}"))
-            raise
     os._exit(0)  # to free thousands of nodes takes longer than to close all connections

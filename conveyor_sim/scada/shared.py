@@ -16,3 +16,5 @@ class Shared:
     """One for all protocol servers."""
     holding: HoldingService
     """One for each protocol."""
+    counts: tuple[int, int] = (0, 0)
+    """Requests that were passed on, and that were refused, before the protocol server was restarted."""

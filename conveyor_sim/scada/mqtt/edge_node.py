@@ -52,14 +52,17 @@ class EdgeNode:
         stamps: Stamps = "wall",
         silence: float = SILENCE,
         holding: HoldingService | None = None,
+        before: tuple[int, int] = (0, 0),
     ) -> None:
         """role: in which hosts command; None: they may not. stamps: what times of values are.
         silence: s of wall time without a command after which a controller holds nothing any more.
-        holding: decides whether hosts hold the line; None: a new one.
+        holding: decides whether hosts hold the line; None: a new one. before: commands that were passed on, and that
+        were refused, before a restart.
         """
         self._source, self._broker = source, broker
         self._names = Names(*broker.named(source.about))
         self._commands = Commands(source, role, f"{broker.host}:{broker.port}", silence, holding)
+        self._commands.before = before
         self._line = LineMetrics(source.about, Clock(source.about, stamps), writes=role is not None)
         self._number = 0  # of the next connection
         self._version = NEWEST
