@@ -147,9 +147,10 @@ class ServerHost:
         self._thread.join()
         self._passwords.shutdown(cancel_futures=True)
 
-    def _send(self, message: Any) -> None:
+    def _send(self, message: Any, pipe: Connection | None = None) -> None:
+        """Send to the present process. pipe: that of the process that it is for; another one must not get it."""
         with self._sending, suppress(OSError):
-            if self._pipe is not None:
+            if self._pipe is not None and pipe in (None, self._pipe):
                 self._pipe.send(message)
 
     # The thread that supervises, which starts all processes: they die with it
@@ -290,7 +291,7 @@ class ServerHost:
     def _do(self, call: Call) -> None:
         """Carry out a request, and answer it if an answer is expected."""
         if call.what == "enter":
-            self._passwords.submit(self._enter, call)
+            self._passwords.submit(self._enter, call, self._pipe)
             return
         if time.monotonic() > call.deadline:
             return  # it has been refused already
@@ -311,13 +312,13 @@ class ServerHost:
         if call.number:
             self._send(Answer(call.number, answer))
 
-    def _enter(self, call: Call) -> None:
+    def _enter(self, call: Call, pipe: Connection | None) -> None:
         if time.monotonic() > call.deadline:
             return
         name, password, origin = call.arguments
         user = self._logins.enter(name, password, origin, time.monotonic())
         answer = None if user is None else user._replace(salt=b"", hash=b"")  # which stay here
-        self._send(Answer(call.number, answer))
+        self._send(Answer(call.number, answer), pipe)
 
     def _watch(self, on: bool) -> None:
         if on and self._end_watch is None:
