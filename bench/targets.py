@@ -11,6 +11,7 @@ from bench import (
     control,
     dense,
     growth,
+    isolation,
     lockstep,
     node,
     plant,
@@ -105,6 +106,18 @@ def _two_processes(rows: Rows) -> float | None:
 
 def _beside(rows: Rows) -> float | None:
     return _middle(rows.spread(studies.BESIDE, 0.0, studies.ONE, studies.OVERHEAD))
+
+
+def _attacked(quantity: str) -> Callable[[Rows], float | None]:
+    """Greatest of all attacks and of what is measured during each."""
+
+    def figure(rows: Rows) -> float | None:
+        attacks = {row.contestant for row in rows.all} - {isolation.NONE}
+        names = [f"{name}: {quantity}" for name in isolation.SERVED]
+        found = [_middle(rows.spread(isolation.CASE, 0, attack, name)) for attack in attacks for name in names]
+        return max((value for value in found if value is not None), default=None)
+
+    return figure
 
 
 def _scan(rows: Rows) -> float | None:
@@ -205,6 +218,12 @@ TARGETS = (
     *(
         Target(f"ms of CPU a frame of the page, N = {n}", "view", MOST, v, _view(view.FRAME, n, "page", view.CPU))
         for n, v in ((1_000, 1e3 / 60.0), (10_000, 1e3 / 20.0))
+    ),
+    *(
+        Target(
+            f"{quantity}, of Modbus and the page while OPC UA is attacked", "isolation", MOST, 50.0, _attacked(quantity)
+        )
+        for quantity in (isolation.P99, isolation.WORST)
     ),
     Target("us a scan of a program of 200 statements", "st", MOST, 100.0, _scan),
     Target("s to compile a program of 10 000 statements", "st", MOST, 2.0, _compiling),

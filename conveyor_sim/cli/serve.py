@@ -125,6 +125,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
         from conveyor_sim.scada.face import Settings
         from conveyor_sim.scada.faces import FACES
         from conveyor_sim.scada.limit_options import limit_settings
+        from conveyor_sim.scada.server_child import ServerChild
         from conveyor_sim.scada.serving import Serving
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
@@ -139,6 +140,9 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     with ExitStack() as stack:
         if (what is None) == (node is None):
             raise ConveyorError("serve: expected one of SCENE, BAG and --node")
+        ready = {kind.name: ServerChild(kind.name) for kind, _ in chosen}  # they import while the line is loaded
+        for child in ready.values():
+            stack.callback(child.end)
         if what is None:
             _require_not_given("--node", (*OF_SCENE, *OF_BAG, "real_time_factor"))
             drawn = any(given[face] is not None for face in DRAWING)
@@ -152,7 +156,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
                 _require_lockstep(settings)
             paused = stack.enter_context(scene_source(what, console, **{name: given[name] for name in TAKEN_BY_SCENE}))
             source = paused
-        with Serving(source, chosen, settings) as serving:
+        with Serving(source, chosen, settings, console.print, ready) as serving:
             in_lockstep = [IN_LOCKSTEP] if given["lockstep"] else []
             if paused is not None and not in_lockstep:
                 paused.control("resume", 0.0, "")

@@ -16,7 +16,6 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.observe.events import Event
@@ -25,7 +24,7 @@ from conveyor_sim.ros.direct import Aside, WaitSet, take_message
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.spinner import Spinner
 from conveyor_sim.scada.source import MOST_WAITING, Control
-from conveyor_sim.scada.view import DRAWN, HEARD, View, ViewError
+from conveyor_sim.scada.view import DRAWN, HEARD, View, ViewError, decoded
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LOOK = 1.0
@@ -194,7 +193,7 @@ class NodeSource(View, AbstractContextManager["NodeSource"]):
             for data in taken if name == "events" else taken[-1:]:
                 came = True
                 self.pass_on(name, data)
-                decode = partial(typestore().deserialize_cdr, data, TOPICS[name].type)
+                decode = partial(decoded, name, data)
                 if name in DRAWN:
                     self.keep(name, decode)
                     continue

@@ -40,6 +40,7 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         Raises ConveyorError if it can't be read, or holds nothing that can be shown.
         """
         super().__init__()
+        self.recording = path
         self._path, self._say, self._loop = path, say, loop
         self._states: dict[str, bytes] = {}
         self._new_events: list[bytes] = []

@@ -6,7 +6,7 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
@@ -83,6 +83,26 @@ class Status:
     """Ticks so far that it never showed, being too far behind: their changes are missed by whoever follows all."""
     state: str = ""
     """Of a client of a broker: how it is with the broker, in words that stand in place of its clients."""
+
+
+class Health(NamedTuple):
+    """Condition of the event loop that runs a protocol server."""
+
+    name: str
+    """Of the protocol server."""
+    lag: float
+    """s of wall time, the longest by which the event loop was late lately."""
+    silent: float
+    """s of wall time for which the event loop has given no sign of life; 0: it runs."""
+    restarts: int
+    """Number of times that the protocol server was restarted."""
+
+    @property
+    def text(self) -> str:
+        """Words for people."""
+        times = "" if not self.restarts else f", restarted {'once' if self.restarts == 1 else f'{self.restarts} times'}"
+        silent = f", no answer for {self.silent:.1f} s" if self.silent else ""
+        return f"lag {self.lag * 1e3:.0f} ms{silent}{times}"
 
 
 class Face(Protocol):

@@ -9,7 +9,10 @@ from typing import Any
 
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.face import HERE, Face, FaceError, Settings, require_free
+from conveyor_sim.scada.shared import Shared
 from conveyor_sim.scada.source import MODBUS, MQTT, OPCUA, WEB, TagSource
+
+_HERE = "conveyor_sim.scada"
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,9 @@ class Kind:
     """By default; its usual one may be for root only."""
     libraries: tuple[str, ...]
     """Without which it can't be."""
-    make: Callable[[TagSource, Any, Settings], Face]
+    module: str
+    """Module of the face, which `make` imports."""
+    make: Callable[[TagSource, Any, Settings, Shared], Face]
     """A face on what its option takes, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
     """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
@@ -32,6 +37,8 @@ class Kind:
     """Of this package, that brings the libraries."""
     whoever: str = ""
     """Who can do that, where it is not those who reach its port."""
+    isolated: bool = True
+    """True if it runs in a process of its own. It is then made there, by its name in FACES."""
 
     @property
     def installed(self) -> bool:
@@ -64,13 +71,14 @@ def _is_here(library: str) -> bool:
         return False
 
 
-def _modbus(source: TagSource, port: int, settings: Settings) -> Face:
+def _modbus(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.modbus_map import keep_map, modbus_map
     from conveyor_sim.scada.modbus_server import ModbusServer
 
     tags = source.about.tags
     rows = modbus_map(tags) if settings.modbus_map is None else keep_map(settings.modbus_map, tags)
-    return ModbusServer(source, rows, settings.modbus_role, settings.host, port, settings.modbus_quota)
+    quota, holding = settings.modbus_quota, shared.holding
+    return ModbusServer(source, rows, settings.modbus_role, settings.host, port, quota, holding=holding)
 
 
 def _modbus_exposes(settings: Settings) -> str:
@@ -79,13 +87,12 @@ def _modbus_exposes(settings: Settings) -> str:
     return f"read all, and write as {settings.modbus_role}, for Modbus asks nobody who they are"
 
 
-def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
+def _opcua(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.users import read_users
 
     return OpcUaServer(
         source,
-        {} if settings.users is None else read_users(settings.users),
+        logins=shared.logins,
         anonymous=settings.anonymous,
         stamps=settings.stamps,
         certificates=settings.opcua_certificates,
@@ -97,11 +104,12 @@ def _opcua(source: TagSource, port: int, settings: Settings) -> Face:
     )
 
 
-def _mqtt(source: TagSource, url: str, settings: Settings) -> Face:
+def _mqtt(source: TagSource, url: str, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.mqtt.broker import broker_of
     from conveyor_sim.scada.mqtt.edge_node import EdgeNode
 
-    return EdgeNode(source, broker_of(url, settings), _mqtt_writes(settings), settings.stamps)
+    broker, writes = broker_of(url, settings), _mqtt_writes(settings)
+    return EdgeNode(source, broker, writes, settings.stamps, holding=shared.holding, before=shared.counts)
 
 
 def _mqtt_writes(settings: Settings) -> WriterKind | None:
@@ -115,8 +123,7 @@ def _mqtt_exposes(settings: Settings) -> str:
     return f"read all, and write as {settings.mqtt_role}, for commands by Sparkplug say nothing of who gave them"
 
 
-def _web(source: TagSource, port: int, settings: Settings) -> Face:
-    from conveyor_sim.scada.users import read_users
+def _web(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.view import View
     from conveyor_sim.scada.web.server import WebServer
     from conveyor_sim.scada.web.tls import server_context
@@ -126,7 +133,7 @@ def _web(source: TagSource, port: int, settings: Settings) -> Face:
     secured = settings.host != HERE or settings.web_certificates is not None
     return WebServer(
         source,
-        {} if settings.users is None else read_users(settings.users),
+        logins=shared.logins,
         anonymous=settings.anonymous,
         secured=server_context(settings.web_certificates, settings.opcua_certificates) if secured else None,
         host=settings.host,
@@ -135,7 +142,7 @@ def _web(source: TagSource, port: int, settings: Settings) -> Face:
     )
 
 
-def _foxglove(source: TagSource, port: int, settings: Settings) -> Face:
+def _foxglove(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
     from conveyor_sim.scada.foxglove_server import FoxgloveServer
     from conveyor_sim.scada.view import View
 
@@ -150,18 +157,28 @@ def _users_can(settings: Settings) -> str:
 
 
 FACES: tuple[Kind, ...] = (
-    Kind(OPCUA, 4840, ("asyncua",), _opcua, _users_can),
-    Kind(MODBUS, 5020, ("pymodbus",), _modbus, _modbus_exposes),
+    Kind(OPCUA, 4840, ("asyncua",), f"{_HERE}.opcua.server", _opcua, _users_can),
+    Kind(MODBUS, 5020, ("pymodbus",), f"{_HERE}.modbus_server", _modbus, _modbus_exposes),
     Kind(
         MQTT,
         1883,
         ("paho", "google.protobuf"),
+        f"{_HERE}.mqtt.edge_node",
         _mqtt,
         _mqtt_exposes,
         by_default=False,
         extra="mqtt",
         whoever="whoever the broker lets in",
     ),
-    Kind(WEB, 8080, ("aiohttp",), _web, _users_can, by_default=False),
-    Kind("foxglove", 8765, ("foxglove",), _foxglove, lambda _: "read all", by_default=False, extra="foxglove"),
+    Kind(WEB, 8080, ("aiohttp",), f"{_HERE}.web.server", _web, _users_can, by_default=False),
+    Kind(
+        "foxglove",
+        8765,
+        ("foxglove",),
+        f"{_HERE}.foxglove_server",
+        _foxglove,
+        lambda _: "read all",
+        by_default=False,
+        extra="foxglove",
+    ),
 )

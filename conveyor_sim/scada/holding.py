@@ -1,13 +1,40 @@
 """`Holding`: which of several clients that nobody knows by name is the controller of the line.
 
 Modbus has no sessions and no names. So the first write of a client takes the line, and the end of its connection gives
-it up, or its silence: a line that a client left behind must not be nobody's for ever.
+it up, or its silence: a line that a client left behind must not be nobody's for ever. A restart of the protocol server
+ends all connections, but gives nothing up: for GRACE seconds only the holder's machine can go on with the line.
 """
 
 from __future__ import annotations
 
+import time
+from typing import Protocol
+
 from conveyor_sim.line.inputs import DISOWN, OWN, Input
 from conveyor_sim.scada.source import Shown, TagSource
+
+GRACE = 30.0
+"""s of wall time after a restart of the protocol server in which the holder of the line can come back."""
+
+
+class HoldingService(Protocol):
+    """Place where it is decided which client holds the line. The members are those of `Holding`."""
+
+    @property
+    def holder(self) -> str:
+        """Writer that holds the line; empty: none."""
+
+    def judged_as(self, writer: str) -> str:
+        """Return the name by which a writer's claim on the line is judged."""
+
+    def take(self, writer: str) -> str:
+        """Have the line be a writer's from the next tick on. Return the reason for a refusal, "" if there is none."""
+
+    def leave(self, writer: str) -> None:
+        """Have a writer give the line up, if it holds it."""
+
+    def look(self) -> None:
+        """Do what was put off for want of room."""
 
 
 class Holding:
@@ -19,6 +46,7 @@ class Holding:
         self._holder = ""
         self._run_id = ""  # in which it took the line
         self._leaving = False
+        self._away_until = 0.0  # s of wall time, while the holder may come back after a restart; 0: it is not away
 
     @property
     def holder(self) -> str:
@@ -29,25 +57,48 @@ class Holding:
         """Have the line be a writer's, from the next tick on. Why that can't be, "" if it is or will be."""
         holder, shown = self.holder, self._source.shown
         if holder == writer:
-            self._leaving = False
+            self._leaving, self._away_until = False, 0.0
             return ""
-        if holder:
+        if holder and self.judged_as(writer) == holder:
+            if self._is_owner(shown) and (reason := self._give(holder, DISOWN)):
+                return reason
+            self._holder, self._away_until = "", 0.0
+        elif holder:
             return f"the line is owned by controller {holder}"
         if shown.owner == writer:
             return ""
         if reason := self._give(writer, OWN):
             return reason
-        self._holder, self._run_id, self._leaving = writer, shown.run_id, False
+        self._holder, self._run_id, self._leaving, self._away_until = writer, shown.run_id, False, 0.0
         return ""
 
+    def judged_as(self, writer: str) -> str:
+        """Return the name by which a writer's claim on the line is judged: after a restart of the protocol server, the
+        holder's for each client of the holder's machine.
+        """
+        holder = self.holder
+        return holder if holder and self._away_until and _machine(writer) == _machine(holder) else writer
+
+    def restart(self) -> None:
+        """Keep the line for the holder, whose connection has ended because the protocol server restarts."""
+        if self.holder and not self._leaving and not self._away_until:
+            self._away_until = time.monotonic() + GRACE
+
+    def end(self) -> None:
+        """Have the holder give the line up, because the protocol server ends for good."""
+        self._away_until = 0.0
+        self.leave(self.holder)
+
     def leave(self, writer: str) -> None:
-        """Have a writer give it up, if it is its own."""
-        if writer == self.holder:
+        """Have a writer give it up, if it is its own and it is not to come back after a restart."""
+        if writer == self.holder and not self._away_until:
             self._leaving = True
             self.look()
 
     def look(self) -> None:
         """Whoever is to give it up does so, as soon as there is room for that among the inputs."""
+        if self._away_until and time.monotonic() > self._away_until:
+            self._leaving, self._away_until = True, 0.0
         if self._leaving and not (self.holder and self._is_owner(self._source.shown)):
             self._leaving, self._holder = False, ""
         if self._leaving and not self._give(self._holder, DISOWN):
@@ -59,3 +110,8 @@ class Holding:
 
     def _give(self, writer: str, operation: str) -> str:
         return self._source.give(Input(self._face, writer, "controller", operation, (), ()))
+
+
+def _machine(writer: str) -> str:
+    """Return a writer such as "modbus 10.0.0.7:49152" without its port."""
+    return writer.rpartition(":")[0]

@@ -31,7 +31,7 @@ from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.hands import objection, refused_for_good
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET, TICK
-from conveyor_sim.scada.holding import Holding
+from conveyor_sim.scada.holding import Holding, HoldingService
 from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
 from conveyor_sim.scada.quotas import GUEST, QUOTA, Place, Places, Quota
 from conveyor_sim.scada.source import MODBUS, TagSource
@@ -82,11 +82,13 @@ class ModbusServer:
         host: str = HERE,
         port: int = 0,
         quota: Quota = QUOTA,
+        holding: HoldingService | None = None,
     ) -> None:
         """rows: the map. role: in which clients write; None: they may not. port: 0 for any that is free.
         quota: places of the connections. A client that is idle for longer than it says no longer holds the line.
+        holding: decides which client holds the line; None: a new one.
         """
-        self._image = _Image(source, rows, role)
+        self._image = _Image(source, rows, role, holding or Holding(source, MODBUS))
         self._at = host, port
         self._quota = quota
         self._server: _Server | None = None
@@ -144,7 +146,7 @@ class ModbusServer:
 class _Server(ModbusTcpServer):
     image: Any
     """An _Image: to the library, what a request is done to."""
-    holding: Holding
+    holding: HoldingService
     places: Places
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -277,10 +279,11 @@ class _Handler(ServerRequestHandler):
 class _Image:
     """What the library asks for values, in place of a device's memory."""
 
-    def __init__(self, source: TagSource, rows: Sequence[Row], role: WriterKind | None) -> None:
-        self._source, self._role = source, role
+    def __init__(
+        self, source: TagSource, rows: Sequence[Row], role: WriterKind | None, holding: HoldingService
+    ) -> None:
+        self._source, self._role, self.holding = source, role, holding
         self._receipt = Receipt(source.about.tags, source.about.where)
-        self.holding = Holding(source, MODBUS)
         self._commands = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._rows: Mapping[tuple[Table, int], Row] = {(row.table, at): row for row in rows for at in row.addresses}
         self.writes = self.refused = 0
@@ -326,13 +329,15 @@ class _Image:
             return self._put_into_mode(names, numbers)
         # It has the last address, so it is the last that one request writes.
         target = numbers.pop() if names[-1] == TARGET and names.pop() else None
-        writer = _writer.get()
+        writer = claimant = _writer.get()
         given = Input(MODBUS, writer, self._role, SET, tuple(names), tuple(numbers))
         if names and (refusal := refused_for_good(self._source, self._receipt, given)):
             return _EXCEPTIONS[refusal.cause]
+        if self._role == "controller" and self._source.shown.owner not in ("", writer):
+            claimant = self.holding.judged_as(writer)
         commands = [self._commands[name] for name in names]
         if any(
-            objection(self._source, tag, value, self._role, writer)
+            objection(self._source, tag, value, self._role, claimant)
             for tag, value in zip(commands, numbers, strict=True)
         ):
             return ExcCodes.DEVICE_BUSY

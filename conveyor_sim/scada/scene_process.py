@@ -7,7 +7,6 @@ slowly or not at all, holds up no tick and fills no memory.
 from __future__ import annotations
 
 import os
-import sys
 import threading
 import time
 from collections import deque
@@ -28,6 +27,7 @@ from conveyor_sim.live.lockstep import Refused
 from conveyor_sim.live.session import Session
 from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.runs.compilation import Cancelled, Compilation
+from conveyor_sim.scada.child import pipes_of_child
 from conveyor_sim.scada.handshake import HANDSHAKE
 from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
 from conveyor_sim.scada.source import MOST_EVENTS, Control
@@ -321,7 +321,7 @@ class _Process:
 
 def main() -> None:
     """Be that process; the argument is the descriptor of the pipe."""
-    pipe = Connection(int(sys.argv[1]))
+    (pipe,) = pipes_of_child()
     with StopRequest() as stop:
         try:
             task = pipe.recv()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -17,15 +16,14 @@ from queue import SimpleQueue
 from typing import Any
 
 from conveyor_sim.bag.folder import bag_folder
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
+from conveyor_sim.scada.child import how_it_ended, start_child
 from conveyor_sim.scada.handshake import TARGET, problem
 from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
 from conveyor_sim.scada.source import MOST_WAITING, Control
-from conveyor_sim.scada.view import DRAWN, HEARD, View
+from conveyor_sim.scada.view import DRAWN, HEARD, View, decoded
 
 RUNNING_FREE: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
 IN_LOCKSTEP: frozenset[Control] = frozenset({"target"})
@@ -37,8 +35,6 @@ LOOK = 0.5
 """s of wall time between two looks at that."""
 
 ENDED_HERE = "serving has ended"
-
-CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.scada.scene_process import main; main()"
 
 
 class SceneSource(View, AbstractContextManager["SceneSource"]):
@@ -229,14 +225,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 self._requests = SimpleQueue()
                 self._requests.put(replace(self._task, number=len(self.recordings)))
                 self._requests.put(Watch(self._watchers > 0))
-                # A session of its own: Ctrl-C at the terminal is this process's affair.
-                self._process = process = subprocess.Popen(
-                    [sys.executable, "-c", CODE.format(path=sys.path), str(there.fileno())],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    start_new_session=True,
-                    pass_fds=[there.fileno()],
-                )
+                self._process = process = start_child("conveyor_sim.scada.scene_process", there)
             there.close()
             threading.Thread(target=_pass_on, args=(self._requests, here), name="requests", daemon=True).start()
             with suppress(EOFError, OSError):
@@ -248,8 +237,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         code = process.wait()
         if failure or self._closing:
             return failure or ENDED_HERE
-        how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-        return f"the process that simulates {self._task.scene.name} {how}"
+        return f"the process that simulates {self._task.scene.name} {how_it_ended(code)}"
 
     def _hear(self, pipe: Connection) -> str:
         """What it sends until it fails, and why that was; EOFError when it ends otherwise."""
@@ -272,24 +260,20 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
     def _take_copy(self, copy: Copy) -> None:
         for topic in HEARD:
             if (data := copy.states.get(topic)) is not None:
-                self.take(topic, _decoded(topic, data))
+                self.take(topic, decoded(topic, data))
                 self.pass_on(topic, data)
         for topic in DRAWN:
             if (data := copy.states.get(topic)) is not None:
-                self.keep(topic, partial(_decoded, topic, data))
+                self.keep(topic, partial(decoded, topic, data))
                 self.pass_on(topic, data)
         for data in copy.events:
-            self.take("events", _decoded("events", data))
+            self.take("events", decoded("events", data))
             self.pass_on("events", data)
         with self._lock:
             self._handed, self._waiting = copy.handed, copy.waiting
         self._begun = self._begun or bool(copy.states)
         if copy.states or copy.events or self.shown.lost:
             self.show(copy.at)
-
-
-def _decoded(topic: str, data: bytes) -> Any:
-    return typestore().deserialize_cdr(data, TOPICS[topic].type)
 
 
 def _pass_on(requests: SimpleQueue[Any], pipe: Connection) -> None:

@@ -1,71 +1,103 @@
-"""`Serving`: the faces of one source, in a thread of their own, and what is told of them."""
+"""`Serving`: the protocol servers of one source, each by itself, and the lines that report on them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from types import MappingProxyType
 from typing import Any
 
-from conveyor_sim.scada.face import HERE, Face, Settings, Status
+from conveyor_sim.scada.face import HERE, Health, Settings, Status
 from conveyor_sim.scada.faces import Kind
-from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.scada.server_child import ServerChild
+from conveyor_sim.scada.server_host import ServerHost
 from conveyor_sim.scada.source import TagSource
+from conveyor_sim.scada.thread_host import ThreadHost
+from conveyor_sim.scada.users import Logins, read_users
+from conveyor_sim.scada.view import View
 
 
 class Serving(AbstractContextManager["Serving"]):
     """Serves from the start to close()."""
 
-    def __init__(self, source: TagSource, chosen: Sequence[tuple[Kind, Any]], settings: Settings) -> None:
+    def __init__(
+        self,
+        source: TagSource,
+        chosen: Sequence[tuple[Kind, Any]],
+        settings: Settings,
+        say: Callable[[str], object] = lambda sentence: None,
+        ready: Mapping[str, ServerChild] = MappingProxyType({}),
+    ) -> None:
         """chosen: protocols and their ports, 0 for any that is free; of MQTT the URL of the broker.
+        say: called with a sentence for people when a protocol server is restarted, by a thread.
+        ready: processes that were started for protocols, by name. They are ended with this.
 
         Raises ConveyorError, in one sentence, if one of them can't be served; then none is.
         """
-        self._source, self._settings = source, settings
-        self._kinds = [kind for kind, _ in chosen]
-        self._faces: list[Face] = []
-        self._thread = ServerThread()
+        self._source, self._settings, self._ready = source, settings, ready
+        self._hosts: list[ServerHost | ThreadHost] = []
+        logins = Logins({} if settings.users is None else read_users(settings.users))
         try:
             for kind, place in chosen:
                 kind.require()
-                face = kind.make(source, place, settings)
-                self._thread.run(face.start())
-                self._faces.append(face)
+                self._hosts.append(self._host(kind, place, logins, say))
+            for host in self._hosts:
+                host.wait_until_started()
         except BaseException:
             self.close()
             raise
 
+    def _host(self, kind: Kind, place: Any, logins: Logins, say: Callable[[str], object]) -> ServerHost | ThreadHost:
+        """Start one protocol server: the only place that chooses where it runs."""
+        if not kind.isolated or not isinstance(self._source, View):
+            return ThreadHost(kind, place, self._settings, self._source, logins)
+        ready = self._ready.get(kind.name)
+        return ServerHost(kind, place, self._settings, self._source, logins, say, self.health, ready)
+
     @property
-    def faces(self) -> Sequence[Face]:
+    def faces(self) -> Sequence[ServerHost | ThreadHost]:
         """All of them, in the order in which they were chosen."""
-        return self._faces
+        return self._hosts
 
     @property
     def greeting(self) -> list[str]:
         """A sentence for each: where clients find it, and what they can do there."""
         whoever = "clients" if self._settings.host == HERE else "whoever reaches this machine there"
-        pairs = zip(self._kinds, self._faces, strict=True)
-        return [f"{face.address}: {kind.whoever or whoever} can {kind.exposes(self._settings)}" for kind, face in pairs]
+        return [
+            f"{host.address}: {host.kind.whoever or whoever} can {host.kind.exposes(self._settings)}"
+            for host in self._hosts
+        ]
 
     def progress(self) -> str:
         """How the line and its faces are, in one line."""
         shown = self._source.shown
         state = f"lost: {shown.lost}" if shown.lost else shown.run.text
-        return " | ".join([f"{self._time:.1f} s {state}", *(_told(*one) for one in self._statuses())])
+        told = [_told(host.kind.name, host.status(), host.health(since_asked=True)) for host in self._hosts]
+        return " | ".join([f"{self._time:.1f} s {state}", *told])
 
     def summary(self) -> str:
         """What has been served, in one line."""
-        counts = [f"{name} {_writes(status)}" for name, status in self._statuses()]
+        counts = []
+        for host in self._hosts:
+            restarts = host.health().restarts
+            times = f", restarted {_many(restarts, 'time')}" if restarts else ""
+            counts.append(f"{host.kind.name} {_writes(host.status(fresh=True))}{times}")
         return f"served up to {self._time:g} s; {', '.join(counts)}"
 
     def latencies(self) -> dict[str, float]:
         """s of wall time by protocol, the longest since somebody asked."""
-        return {name: status.latency for name, status in self._statuses()}
+        return {host.kind.name: host.status().latency for host in self._hosts}
+
+    def health(self) -> tuple[Health, ...]:
+        """Return the health of each protocol server."""
+        return tuple(host.health() for host in list(self._hosts))
 
     def close(self) -> None:
-        """End all of them."""
-        for face in self._faces:
-            self._thread.run(face.stop())
-        self._thread.close()
+        """End all of them, within two seconds even if one is stalled."""
+        for host in self._hosts:
+            host.end()
+        for host in self._hosts:
+            host.join()
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -74,18 +106,12 @@ class Serving(AbstractContextManager["Serving"]):
     def _time(self) -> float:
         return self._source.shown.tick * self._source.about.tick
 
-    def _statuses(self) -> list[tuple[str, Status]]:
-        async def ask() -> list[Status]:
-            return [face.status() for face in self._faces]
 
-        return [(kind.name, status) for kind, status in zip(self._kinds, self._thread.run(ask()), strict=True)]
-
-
-def _told(name: str, status: Status) -> str:
+def _told(name: str, status: Status, health: Health) -> str:
     subscriptions = f", {_many(status.subscriptions, 'subscription')}" if status.subscriptions else ""
     left_out = f", {_many(status.left_out, 'tick')} left out" if status.left_out else ""
     clients = status.state or f"{_many(status.clients, 'client')}{subscriptions}"
-    return f"{name}: {clients}, {_writes(status)}, {status.latency * 1e3:.1f} ms{left_out}"
+    return f"{name}: {clients}, {_writes(status)}, {status.latency * 1e3:.1f} ms, {health.text}{left_out}"
 
 
 def _many(count: int, what: str) -> str:

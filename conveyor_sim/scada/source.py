@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -123,25 +124,28 @@ class TagSource(Protocol):
 
 
 class Listeners:
-    """Functions that want to know that something has changed."""
+    """Functions that are called when something has changed. From any thread."""
 
     def __init__(self) -> None:
-        """Nobody listens."""
-        self._all: tuple[Callable[[], None], ...] = ()
+        """Start without any."""
+        self._all: tuple[Callable[..., None], ...] = ()
+        self._changing = threading.Lock()
 
-    def add(self, heard: Callable[[], None]) -> Callable[[], None]:
-        """Call this one, too, from now on; what is returned ends that."""
-        self._all = (*self._all, heard)
+    def add(self, heard: Callable[..., None]) -> Callable[[], None]:
+        """Call this one, too, from now on. Return a function that ends that."""
+        with self._changing:
+            self._all = (*self._all, heard)
 
         def end() -> None:
-            self._all = tuple(other for other in self._all if other is not heard)
+            with self._changing:
+                self._all = tuple(other for other in self._all if other is not heard)
 
         return end
 
-    def tell(self) -> None:
-        """Call them all."""
+    def tell(self, *news: object) -> None:
+        """Call them all with `news`."""
         for heard in self._all:
-            heard()
+            heard(*news)
 
 
 class RecentEvents:
@@ -156,6 +160,12 @@ class RecentEvents:
         if events:
             total, last = self._kept
             self._kept = total + len(events), (*last, *events)[-MOST_EVENTS:]
+
+    def bring(self, total: int, newest: Sequence[Event]) -> None:
+        """Continue up to `total` events, of which these are the newest; others in between are unknown."""
+        if newest:
+            _, last = self._kept
+            self._kept = total, (*last, *newest)[-MOST_EVENTS:]
 
     def after(self, count: int) -> tuple[int, Sequence[Event]]:
         """How many there were so far, and those after so many."""

@@ -11,10 +11,11 @@ import hashlib
 import hmac
 import os
 import re
+import threading
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
@@ -118,11 +119,26 @@ def authenticate(users: Mapping[str, User], name: str, password: str) -> User | 
     return user if hmac.compare_digest(given, user.hash) and user is not _NOBODY else None
 
 
+class LoginService(Protocol):
+    """Place where passwords are checked. Its method may be called from any thread."""
+
+    has_users: bool
+    """True if there are users who can log in."""
+
+    def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
+        """Return the user if the password is right, None otherwise. The arguments are those of `Logins.enter`."""
+
+
 class Logins:
-    """Those who want to come in, and how often they were wrong lately: guessing passwords is to take years."""
+    """The one `LoginService` of all protocol servers of a line. It counts wrong passwords: guessing takes years.
+
+    One password is checked at a time, because that takes a processor.
+    """
 
     def __init__(self, users: Mapping[str, User]) -> None:
-        """Nobody was wrong yet."""
+        """Start without a wrong password."""
+        self.has_users = bool(users)
+        self._checking = threading.Lock()
         self._users = users
         self._wrong: dict[tuple[str, str], tuple[int, float]] = {}  # how often, and s when first, the latest at last
 
@@ -130,6 +146,10 @@ class Logins:
         """As `authenticate`; who was wrong too often is not even looked at. origin: the client's machine.
         now: s of any steady clock.
         """
+        with self._checking:
+            return self._enter(name, password, origin, now)
+
+    def _enter(self, name: str, password: str, origin: str, now: float) -> User | None:
         who = (name[:_LONGEST_NAME], origin)
         count, since = self._wrong.get(who, (0, now))
         if now > since + PERIOD:

@@ -7,12 +7,14 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
@@ -22,8 +24,11 @@ from conveyor_sim.observe.alarms import AlarmColumns
 from conveyor_sim.observe.events import Event, EventColumns
 from conveyor_sim.observe.image import Image
 from conveyor_sim.observe.read_back import ReadBackColumns
-from conveyor_sim.scada.past import Past
+from conveyor_sim.scada.face import Health
 from conveyor_sim.scada.source import About, Listeners, RecentEvents, Shown, TagSource
+
+if TYPE_CHECKING:
+    from conveyor_sim.scada.past import Past
 
 HEARD = ("line", "run_state", "signals", "events", "readback", "alarm_states")
 """Topics that it takes."""
@@ -68,6 +73,13 @@ class PictureSource(TagSource, Protocol):
     def newest(self) -> Mapping[str, bytes]:
         """By topic, the last message as it came."""
 
+    servers: tuple[Health, ...]
+    recording: Path | None
+
+    @property
+    def era(self) -> int:
+        """Number that changes when messages from before no longer hold."""
+
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on; what is returned ends that."""
 
@@ -86,6 +98,8 @@ class View:
 
     takes_inputs = True
     """Whether anything that is given may ever act."""
+    recording: Path | None = None
+    """Recording that is played back; None: the line is simulated."""
     _run_id: str
     _tick: int
     _line: Any
@@ -110,8 +124,12 @@ class View:
         self._shown = Shown(0, {}, lost=NOTHING)
         self._picture: Picture | None = None
         self._watchers = 0
-        self._hearers: tuple[Callable[[str, bytes], None], ...] = ()
+        self._watching = threading.Lock()
+        self._hearers = Listeners()
         self._newest: dict[str, bytes] = {}
+        self._era = 0
+        self.servers: tuple[Health, ...] = ()
+        """Health of the protocol servers of the line, as far as it is known here."""
         self._forget("")
 
     @property
@@ -138,6 +156,11 @@ class View:
         """By topic, the last message as it came."""
         return self._newest
 
+    @property
+    def era(self) -> int:
+        """Number that changes when messages from before no longer hold: after a reset, or a seek in a recording."""
+        return self._era
+
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on, if that costs anything; what is returned ends that."""
         self._count_watchers(1)
@@ -150,12 +173,7 @@ class View:
 
     def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
         """Have a function called with topic and bytes of each message from now on; what is returned ends that."""
-        self._hearers = (*self._hearers, heard)
-
-        def end() -> None:
-            self._hearers = tuple(other for other in self._hearers if other is not heard)
-
-        return end
+        return self._hearers.add(heard)
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
         """How many events were heard of, and those after so many."""
@@ -203,8 +221,7 @@ class View:
     def pass_on(self, topic: str, data: bytes) -> None:
         """A message as it came, of one of HEARD and DRAWN."""
         self._newest[topic] = data
-        for heard in self._hearers:
-            heard(topic, data)
+        self._hearers.tell(topic, data)
 
     def keep(self, topic: str, decode: Callable[[], Any]) -> None:
         """What decodes a message of one of DRAWN, in any thread."""
@@ -255,15 +272,18 @@ class View:
         self._events.add([event])
 
     def _count_watchers(self, more: int) -> None:
-        """Of one thread."""
-        before, self._watchers = self._watchers, self._watchers + more
-        if (before > 0) != (self._watchers > 0):
-            self._watched(self._watchers > 0)
+        """Add to the number of watchers. From any thread."""
+        with self._watching:
+            before, self._watchers = self._watchers, self._watchers + more
+            if (before > 0) != (self._watchers > 0):
+                self._watched(self._watchers > 0)
 
     def _watched(self, on: bool) -> None:
         """Somebody looks, or nobody any more."""
 
     def _forget(self, run_id: str) -> None:
+        self._newest = {topic: data for topic, data in self._newest.items() if topic == "line"}
+        self._era += 1
         self._run_id = run_id
         self._tick = 0
         self._drawn = {}
@@ -312,6 +332,11 @@ class View:
             return self._initial
         values: list[float] = self._read_back.value.tolist()
         return values
+
+
+def decoded(topic: str, data: bytes) -> Any:
+    """Return the message of a topic, serialized as this version does it."""
+    return typestore().deserialize_cdr(data, TOPICS[topic].type)
 
 
 def about_line(message: Any) -> About:

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 
@@ -21,7 +22,7 @@ class Served:
 
     def __init__(self, folder: Path, *arguments: str, fresh: bool = False, **environment: str) -> None:
         """In a folder of its own. fresh: by a Python of its own, as it is where an environment is given."""
-        self._log = folder / "log"
+        self.folder, self._log = folder, folder / "log"
         self._out = TemporaryFile("w+")  # noqa: SIM115  # read at the end
         with self._log.open("w") as log:
             if fresh or environment:  # which may be read while modules are imported
@@ -58,9 +59,22 @@ class Served:
     @property
     def simulator(self) -> int:
         """The process that simulates."""
-        tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
-        (pid,) = {pid for task in tasks for pid in task.read_text().split()}
-        return int(pid)
+        (pid,) = (pid for pid, command in self.children.items() if "scene_process" in command)
+        return pid
+
+    def server(self, protocol: str) -> int:
+        """The process of a protocol server."""
+        (pid,) = (pid for pid, command in self.children.items() if command.split("\0")[-2] == protocol)
+        return pid
+
+    @property
+    def children(self) -> dict[int, str]:
+        """Child processes, with their command lines."""
+        found = {}
+        for task in Path(f"/proc/{self.process.pid}/task").glob("*/children"):
+            with suppress(FileNotFoundError):  # a thread, or a child, that has just ended
+                found |= {int(pid): Path(f"/proc/{pid}/cmdline").read_text() for pid in task.read_text().split()}
+        return found
 
     def end(self, number: int = signal.SIGINT) -> str:
         """What it printed, after a signal."""

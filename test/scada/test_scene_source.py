@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +21,14 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPED
+from conveyor_sim.scada.face import Settings
+from conveyor_sim.scada.frames import MOST_FRAMES, Frames
+from conveyor_sim.scada.remote_source import Calls, RemoteSource
 from conveyor_sim.scada.scene_messages import Task
 from conveyor_sim.scada.scene_source import SceneSource
+from conveyor_sim.scada.server_messages import ServerTask
 from conveyor_sim.scada.source import MOST_WAITING, Shown
+from conveyor_sim.scada.view import decoded
 from conveyor_sim.scene import Scene, load_scene
 
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
@@ -113,6 +120,72 @@ def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneSource)
     end()
     assert ticks == sorted(ticks)
     assert len(set(ticks)) > 50  # of a busy machine
+
+
+def mirror(source: SceneSource, pipe: Connection) -> RemoteSource:
+    """What the process of a protocol server has of it."""
+    task = ServerTask("modbus", 0, Settings(), source.controls, True, False, None, (0, 0))
+    return RemoteSource(task, Calls(pipe), decoded, None)
+
+
+def catch_up(frames: Frames, view: RemoteSource) -> int:
+    """Apply all frames that wait; how many there were."""
+    count = 0
+    while (frame := frames.fetch()) is not None and frame.shown:
+        view.apply(frame)
+        count += 1
+    return count
+
+
+def test_a_mirror_shows_what_its_source_does(running: SceneSource) -> None:
+    frames, (pipe, _) = Frames(running), Pipe()
+    view = mirror(running, pipe)
+    view.apply(frames.fetch())
+    assert view.about == running.about
+    assert running.give(setpoint(0.25)) == ""
+    until(lambda: running.shown.values[SPEED] == 0.25, "the speed")
+    pause(running)
+    catch_up(frames, view)
+    assert view.shown.values == running.shown.values and view.shown.forced == running.shown.forced
+    assert (view.shown.tick, view.shown.run, view.shown.run_id) == (
+        running.shown.tick,
+        running.shown.run,
+        running.shown.run_id,
+    )
+    assert view.shown.read_back is not None and "me" in view.shown.read_back.writers
+    assert view.events(0) == running.events(0)
+    run = running.shown.run_id
+    assert running.control("reset", 0.0, "a test") == "" and running.control("resume", 0.0, "a test") == ""
+    until(lambda: running.shown.run_id != run and running.shown.run.state == RUNNING, "the reset")
+    catch_up_until(frames, view, lambda: view.shown.run_id == running.shown.run_id)
+    frames.end()
+    assert frames.fetch() is None
+
+
+def catch_up_until(frames: Frames, view: RemoteSource, condition: Callable[[], bool]) -> None:
+    def step() -> bool:
+        view.apply(frames.fetch())
+        return condition()
+
+    until(step, "the mirror")
+
+
+def test_who_fetches_nothing_misses_ticks_and_fills_no_memory(running: SceneSource) -> None:
+    frames, (pipe, _) = Frames(running), Pipe()
+    view = mirror(running, pipe)
+    until(lambda: frames.left_out > 10, "more ticks than wait")
+    pause(running)
+    tick = running.shown.tick
+    assert catch_up(frames, view) == MOST_FRAMES
+    assert view.shown.tick == tick and view.shown.values == running.shown.values
+    assert view.events(0) == running.events(0), "none of them is missing"
+    frames.end()
+
+
+def test_who_gets_no_answer_is_refused(running: SceneSource) -> None:
+    pipe, _unread = Pipe()
+    view = mirror(running, pipe)
+    assert "gave no answer within 1 s" in view.give(setpoint(0.25))
 
 
 def test_what_is_given_acts_and_is_on_record_and_replays(served: Served, tmp_path: Path) -> None:

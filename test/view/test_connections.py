@@ -7,9 +7,9 @@ import json
 import os
 import signal
 import socket
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AsyncExitStack, ExitStack, suppress
+from contextlib import AsyncExitStack, ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,9 +23,11 @@ from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeErro
 
 from conveyor_sim.scada.face import FaceError, Settings
 from conveyor_sim.scada.quotas import QUOTA, share_of_guests
+from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.serving import Serving
 from conveyor_sim.scada.web import feed, server
-from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS
+from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
+from conveyor_sim.scada.web.tls import server_context
 from conveyor_sim.scada.web.viewer import MOST_WAITING, UNSEEN
 
 T = TypeVar("T")
@@ -70,6 +72,16 @@ def run(work: Coroutine[Any, Any, T]) -> T:
     """In a thread of its own: the browser's driver has a loop in this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, asyncio.wait_for(work, PATIENCE)).result()
+
+
+@contextmanager
+def served_here(source: Any, **options: Any) -> Iterator[WebServer]:
+    """The page, served by this process, in which a test can change or watch how that is done."""
+    with ServerThread() as thread:
+        page = WebServer(source, **options)
+        thread.run(page.start())
+        yield page
+        thread.run(page.stop())
 
 
 def test_pages_of_others_are_refused(live: Live) -> None:
@@ -275,11 +287,12 @@ def test_connections_that_only_wait_make_room(live: Live) -> None:
 
 def test_who_does_not_agree_on_tls_is_not_waited_for(live: Live, users: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "HANDSHAKE", 0.05)
-    settings = Settings("127.0.0.2", users=users / "users", opcua_certificates=users / "certificates")
-    with Serving(live.source, [(WEB, 0)], settings) as serving:
-        port = int(serving.faces[0].address.rstrip("/").rpartition(":")[2])
-        with socket.create_connection(("127.0.0.2", port), timeout=PATIENCE / 2) as waiting:
-            assert waiting.recv(1) == b""
+    secured = server_context(None, users / "certificates")
+    with (
+        served_here(live.source, secured=secured, host="127.0.0.2") as page,
+        socket.create_connection(("127.0.0.2", page.port), timeout=PATIENCE / 2) as waiting,
+    ):
+        assert waiting.recv(1) == b""
 
 
 def test_who_shows_no_frames_gets_no_more_and_all_that_happened(live: Live) -> None:
@@ -307,13 +320,14 @@ def test_a_picture_is_packed_once_however_many_look(live: Live, monkeypatch: pyt
 
     monkeypatch.setattr(feed, "_packed", counted)
 
-    async def work() -> None:
+    async def work(url: str) -> None:
         async with ClientSession() as session, AsyncExitStack() as stack:
-            looking = [session.ws_connect(f"{live.url}/live", origin=live.url) for _ in range(8)]
+            looking = [session.ws_connect(f"{url}/live", origin=url) for _ in range(8)]
             sockets = [await stack.enter_async_context(one) for one in looking]
             await asyncio.gather(*(frames(socket, 20) for socket in sockets))
 
-    run(work())
+    with served_here(live.source) as page:
+        run(work(page.address.rstrip("/")))
     assert len(packed) >= 20 and len(packed) == len(set(packed)), "none was packed anew for another page"
 
 

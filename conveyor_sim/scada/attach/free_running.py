@@ -21,7 +21,7 @@ from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.scada.attach.link import Link, LinkError
 from conveyor_sim.scada.attach.links import all_of, link
 from conveyor_sim.scada.attach.tag_map import TagMap, read_tag_map
-from conveyor_sim.scada.face import Face, Settings, Status
+from conveyor_sim.scada.face import Face, Status
 from conveyor_sim.scada.faces import Kind
 from conveyor_sim.scada.source import PLC, Shown, TagSource
 from conveyor_sim.support.printable import SENTENCE, printable
@@ -172,9 +172,10 @@ def of_plc(
     `PlcFace`.
     """
 
-    def make(source: TagSource, _: int, __: Settings) -> Face:
+    def make(source: TagSource, *_: object) -> Face:
         mapped = read_tag_map(tags, source.about.tags)
         return PlcFace(source, url, mapped, lambda: link(url, all_of(mapped), user, password), period, say, observe)
 
     library = "pymodbus" if url.startswith("modbus") else "asyncua"
-    return Kind(PLC, 0, (library,), make, lambda _: "command it")
+    # It is alone, and made of functions of this process.
+    return Kind(PLC, 0, (library,), __name__, make, lambda _: "command it", isolated=False)

@@ -14,7 +14,7 @@ from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.scada.hands import TAKES_NO_INPUT, is_mode, objection, refused_for_good
-from conveyor_sim.scada.holding import Holding
+from conveyor_sim.scada.holding import Holding, HoldingService
 from conveyor_sim.scada.mqtt.line_metrics import number_of
 from conveyor_sim.scada.mqtt.payload import decoded
 from conveyor_sim.scada.source import MQTT, TagSource
@@ -33,15 +33,26 @@ SILENCE = 30.0
 class Commands:
     """Of all hosts of one source, by one broker."""
 
-    def __init__(self, source: TagSource, role: WriterKind | None, broker: str, silence: float = SILENCE) -> None:
-        """role: in which they command; None: they may not. broker: its address, which inputs are recorded under."""
+    def __init__(
+        self,
+        source: TagSource,
+        role: WriterKind | None,
+        broker: str,
+        silence: float = SILENCE,
+        holding: HoldingService | None = None,
+    ) -> None:
+        """role: in which they command; None: they may not. broker: its address, which inputs are recorded under.
+        holding: decides whether they hold the line; None: a new one.
+        """
         self._source, self._role, self._silence = source, role, silence
         self._writer = f"{MQTT} {broker}"
         self._receipt = Receipt(source.about.tags, source.about.where)
-        self._holding = Holding(source, MQTT)
+        self._holding = holding or Holding(source, MQTT)
         self._last = 0.0  # s of wall time, of the last command that was taken
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
+        self.before = (0, 0)
+        """Commands that were passed on, and that were not, before the edge node was restarted."""
         self.writes = self.refused = 0
         """Commands so far that were passed on to the line, and that were not."""
         self.refusal = ""

@@ -19,6 +19,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.clock import Clock
 from conveyor_sim.scada.face import FaceError, Stamps, Status
+from conveyor_sim.scada.holding import HoldingService
 from conveyor_sim.scada.mqtt.birth_numbers import BirthNumbers
 from conveyor_sim.scada.mqtt.broker import Broker
 from conveyor_sim.scada.mqtt.commands import SILENCE, Commands
@@ -50,13 +51,18 @@ class EdgeNode:
         role: WriterKind | None = None,
         stamps: Stamps = "wall",
         silence: float = SILENCE,
+        holding: HoldingService | None = None,
+        before: tuple[int, int] = (0, 0),
     ) -> None:
         """role: in which hosts command; None: they may not. stamps: what times of values are.
         silence: s of wall time without a command after which a controller holds nothing any more.
+        holding: decides whether hosts hold the line; None: a new one. before: commands that were passed on, and that
+        were refused, before a restart.
         """
         self._source, self._broker = source, broker
         self._names = Names(*broker.named(source.about))
-        self._commands = Commands(source, role, f"{broker.host}:{broker.port}", silence)
+        self._commands = Commands(source, role, f"{broker.host}:{broker.port}", silence, holding)
+        self._commands.before = before
         self._line = LineMetrics(source.about, Clock(source.about, stamps), writes=role is not None)
         self._numbers = BirthNumbers(broker.address, self._names.group, self._names.node)
         self._births = 0  # number of the present connection

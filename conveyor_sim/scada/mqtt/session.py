@@ -126,12 +126,13 @@ class Session:
     def _of_node(self, shown: Shown) -> dict[str, tuple[int, float | str]]:
         """Always good: it says what has become of the rest."""
         commands = self._commands
+        written, refused = commands.before
         return {
             f"{RUN}/state": (INT32, shown.run.state),
             f"{RUN}/reason": (STRING, shown.run.reason),
             f"{RUN}/lost": (STRING, shown.lost),
-            "commands/written": (INT64, commands.writes),
-            "commands/refused": (INT64, commands.refused),
+            "commands/written": (INT64, written + commands.writes),
+            "commands/refused": (INT64, refused + commands.refused),
             "commands/refusal": (STRING, commands.refusal),
         }
 

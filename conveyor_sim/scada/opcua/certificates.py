@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import socket
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime, timedelta, timezone
 from ipaddress import ip_address
 from pathlib import Path
@@ -57,7 +60,9 @@ def identity(folder: Path) -> Identity:
             )
         (folder / TRUSTED).mkdir(mode=0o700, exist_ok=True)
         if not (folder / KEY).exists():
-            _make(folder)
+            with _alone(folder):  # the servers of a line start at the same time
+                if not (folder / KEY).exists():
+                    _make(folder)
         trusted = frozenset(_der(path) for path in sorted((folder / TRUSTED).iterdir()) if path.is_file())
     except OSError as error:
         where = error.filename or folder
@@ -71,6 +76,17 @@ def identity(folder: Path) -> Identity:
     except (x509.ExtensionNotFound, ValueError) as error:
         raise CertificateError(f"{folder / CERTIFICATE}: names no application, expected one URI of it") from error
     return Identity(certificate, _read(folder / KEY), uri, trusted)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder, which one process holds at a time."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _make(folder: Path) -> None:

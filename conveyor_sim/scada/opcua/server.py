@@ -34,7 +34,7 @@ from conveyor_sim.scada.opcua.updates import Updates
 from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
 from conveyor_sim.scada.quotas import QUOTA, Places, Quota
 from conveyor_sim.scada.source import OPCUA, TagSource
-from conveyor_sim.scada.users import Logins, User
+from conveyor_sim.scada.users import Logins, LoginService, User
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,
@@ -61,16 +61,19 @@ class OpcUaServer:
         port: int = 0,
         limits: Limits = LIMITS,
         quota: Quota = QUOTA,
+        logins: LoginService | None = None,
     ) -> None:
         """users: who may do more than read, by name. anonymous: whether those who give no name may read.
         stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
         history: patterns of the tags whose last values are kept. port: 0 for any that is free.
         limits: of each client. quota: places of the connections.
+        logins: checks passwords, in place of `users`.
 
         Raises FaceError for a pattern that no tag fits.
         """
         require_tags(history, source.about.tags)
-        self._source, self._logins, self._anonymous, self._stamps = source, Logins(users or {}), anonymous, stamps
+        self._source, self._anonymous, self._stamps = source, anonymous, stamps
+        self._logins = logins or Logins(users or {})
         self._certificates, self._history = certificates, history
         self._at = host, port
         self._limits, self._quota = limits, quota

@@ -185,6 +185,7 @@ class Feed:
             "reason": shown.run.reason,
             "owner": shown.owner,
             "viewers": len(self._viewers),
+            "servers": [{**health._asdict(), "text": health.text} for health in self._source.servers],
         }
 
     def _new_story(self) -> LineStory:

@@ -16,7 +16,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.quotas import GUEST, QUOTA, Place, Places, Quota
 from conveyor_sim.scada.source import WEB
-from conveyor_sim.scada.users import Logins, User
+from conveyor_sim.scada.users import Logins, LoginService, User
 from conveyor_sim.scada.view import PictureSource
 from conveyor_sim.scada.web.commands import NOBODY, Commands, Person
 from conveyor_sim.scada.web.feed import Feed, text_message
@@ -69,16 +69,18 @@ class WebServer:
         host: str = HERE,
         port: int = 0,
         quota: Quota = QUOTA,
+        logins: LoginService | None = None,
     ) -> None:
         """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
         TLS; None: plain, which is for this machine only. port: 0 for any that is free. quota: places of the pages.
+        logins: checks passwords, in place of `users`.
         """
         self._places = Places(quota)
-        self._logins, self._anonymous, self._secured = Logins(dict(users or {})), anonymous, secured
+        self._logins, self._anonymous, self._secured = logins or Logins(dict(users or {})), anonymous, secured
         self._at = host, port
         self._commands = Commands(source)
         self._feed = Feed(
-            source, users=bool(users), takes=source.takes_inputs, controls=sorted(self._commands.controls)
+            source, users=self._logins.has_users, takes=source.takes_inputs, controls=sorted(self._commands.controls)
         )
         self._files = page_files()
         self._runner: web.AppRunner | None = None

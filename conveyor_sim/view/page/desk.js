@@ -45,11 +45,12 @@ export class Desk {
   }
 
   connection() {
-    const { line } = this.view, { lost, run, reason } = this.status;
+    const { line } = this.view, { lost, run, reason, servers } = this.status;
     const state = line.locked ? "locked" : !line.connected ? "broken" : lost ? "lost" : "live";
     document.body.dataset.link = state;
     this.link.textContent = { locked: "● Sign in to see the line", broken: "● No connection to the server: trying again", lost: `● The line is lost: ${lost}`, live: "● Live" }[state];
     this.link.className = state;
+    this.link.title = servers.map(({ name, text }) => `${name}: ${text}`).join("\n");
     this.run.textContent = state === "live" ? `${run}${reason ? `: ${reason}` : ""}` : "";
     this.stands = STANDS.includes(run);
     this.run.classList.toggle("stands", this.stands);

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import socket
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +17,7 @@ from scada.waiting import PATIENCE, until
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
+from conveyor_sim.scada.server_messages import BEAT
 from test.scada.mqtt.kit import SETPOINT, SPEED, Host
 
 if TYPE_CHECKING:
@@ -53,6 +56,24 @@ def test_a_scene_is_served_until_ctrl_c_and_what_an_operator_did_replays(
         given = [frame.data for frame in bag.outcomes() if frame.data.writer_kind == "operator"]
     writer = f"mqtt 127.0.0.1:{broker.port}"
     assert [(outcome.writer, outcome.accepted) for outcome in given] == [(writer, True)] * 2
+
+
+def test_an_edge_node_that_is_killed_is_born_again_and_counts_on(
+    command: Callable[..., Served], broker: Mosquitto, host: Host
+) -> None:
+    served = command(SCENE, "--mqtt", broker.url, "--mqtt-role", "operator", "--no-record")
+    until(lambda: host.alive["line"], "births")
+    host.set("belts/zone1/mode", MANUAL, INT32)
+    host.set("no/such/tag", 0.1)
+    until(lambda: (host.values["commands/written"], host.values["commands/refused"]) == (1, 1), "the commands")
+    time.sleep(5 * BEAT)  # counts are as of the last heartbeat
+    os.kill(served.server("mqtt"), signal.SIGKILL)
+    until(lambda: not host.alive["node"] or host.kinds().count("NBIRTH") == 2, "its last will")
+    until(lambda: host.alive["line"] and host.kinds().count("NBIRTH") == 2, "births")
+    assert (host.values["commands/written"], host.values["commands/refused"]) == (1, 1)
+    host.set(SETPOINT, 0.2)
+    until(lambda: host.values["commands/written"] == 2, "another command")
+    assert "mqtt 2 written, 1 refused, restarted 1 time" in served.end()
 
 
 def test_a_recording_is_read_only_and_a_server_that_is_killed_is_dead_at_once(
