@@ -1,8 +1,8 @@
 """Latency of Modbus and of the page while the OPC UA server is attacked, all on two cores.
 
-The line, its protocol servers, the attacker and the clients that measure share the cores. The attacks are those of an
-anonymous client (bench/isolation_attacks.py): each keeps the event loop of the OPC UA server busy until the server is
-restarted.
+The line, its protocol servers, the attacker and the clients that measure share the cores. An
+anonymous client attacks (bench/isolation_attacks.py): each attack keeps the event loop of the OPC UA server busy until
+the server is restarted.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ GREETING = r"^(\w[\w.]*)(://\S+): clients can"
 
 
 def measure(effort: Effort) -> list[Row]:
-    """Latencies without an attack, and during each."""
+    """Return latencies without an attack and during each attack."""
     if missing := [kind.libraries[0] for kind in FACES if kind.name in SERVERS and not kind.installed]:
         say(f"isolation is left out: {', '.join(missing)} not installed")
         return []
@@ -80,7 +80,7 @@ def _measure(attack: str, turn: int, seconds: float) -> list[Row]:
 
 @contextmanager
 def _served() -> Iterator[tuple[dict[str, str], IO[str]]]:
-    """`conveyor-sim serve`: addresses of its servers, and what it says."""
+    """Run `conveyor-sim serve`. Yield the addresses of its servers by name, and its log."""
     code = "from conveyor_sim.cli import main; main()"
     ports = [argument for name in SERVERS for argument in (f"--{name}", "0")]
     with TemporaryFile("w+") as log:
@@ -125,7 +125,7 @@ def _percentile(values: list[float], share: float) -> float:
 
 
 def tables(rows: Rows) -> str:
-    """A row for each attack."""
+    """Return the Markdown table, one row per attack."""
     attacks = list(dict.fromkeys(row.contestant for row in rows.all))
     if not attacks:
         return "Not measured."

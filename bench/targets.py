@@ -109,7 +109,7 @@ def _beside(rows: Rows) -> float | None:
 
 
 def _attacked(quantity: str) -> Callable[[Rows], float | None]:
-    """Greatest of all attacks and of what is measured during each."""
+    """Return a function that gives the greatest value over all attacks and all measured servers."""
 
     def figure(rows: Rows) -> float | None:
         attacks = {row.contestant for row in rows.all} - {isolation.NONE}

@@ -334,13 +334,13 @@ class Simulation:
         return self._line.signals().values
 
     def state_hash(self) -> int:
-        """64 bits over tick, bottles, stretched springs, belts, moving rails: `state/state_hash.py` says what not."""
+        """Return 64 bits over tick, bottles, stretched springs, belts and moving rails (`state/state_hash.py`)."""
         bottles, now = self.bottles(), self._line.now
         columns = [*(getattr(bottles, name) for name in COLUMNS), now.setpoints, now.speeds]
         return state_hash(self.tick, columns, self._state)
 
     def full_state_hash(self) -> int:
-        """64 bits over all that decides how the run goes on, as `state/full_state_hash.py` lists it."""
+        """Return 64 bits over everything that decides how the run continues (`state/full_state_hash.py`)."""
         return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
     def rehearse(self) -> None:

@@ -8,7 +8,7 @@ import signal
 def restore_for_children() -> None:
     """Let the processes that this one starts be interrupted, where this one was started with SIGINT ignored.
 
-    Shells ignore SIGINT for background jobs, and an ignored signal stays ignored in whatever is started. A signal with
+    Shells ignore SIGINT for background jobs, and an ignored signal stays ignored in child processes. A signal with
     a handler does not: it has its default action again after an exec. This process itself keeps ignoring SIGINT.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -103,7 +103,7 @@ def set_up_module() -> Any:
 
 
 def test_ros_finds_the_package_in_the_environment_of_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As `ros2 pkg prefix`, `ros2 run` and `ros2 launch` look for it; set up twice, as after a change."""
+    """It uses the look-up of `ros2 pkg prefix`, `ros2 run` and `ros2 launch`, after a second set-up as well."""
     index = pytest.importorskip("ament_index_python", reason="needs ROS 2")
     module = set_up_module()
     distribution = importlib.metadata.distribution("conveyor_sim")

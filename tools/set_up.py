@@ -28,8 +28,9 @@ SHARED = ("package.xml", "config", "launch", "msg_defs")  # of the checkout, whe
 MESSAGE_BUILD = ROOT / "tools" / "message_build"
 STRIP = "strip_missing_includes.cmake"
 REFUSED = ":;\"'`$\\#%"
-"""What no path of the environment may contain: PATH and its like are split at colons, lists of CMake at semicolons, and
-the others mean something to the shells and tools that read scripts' first lines and file URLs."""
+"""Characters that no path of the environment may contain. PATH and similar variables are split at colons, CMake's lists
+at semicolons. The others have a meaning for shells, first lines of scripts, or file URLs.
+"""
 LONGEST = 1000
 """Bytes of the checkout's path: files in the environment have up to 300 more, and Linux takes 4096."""
 
@@ -99,7 +100,7 @@ class Environment:
                 (self.path / name).unlink(missing_ok=True)
         log = self.path / "conveyor_msgs.log"
         log.unlink(missing_ok=True)
-        # ROS's message generators can't handle a space in any path that they see: all are links in a scratch folder.
+        # ROS's message generators can't handle spaces in paths, so all paths are links in a scratch folder.
         with tempfile.TemporaryDirectory(prefix="conveyor_msgs_", dir=scratch_folder()) as folder:
             scratch = Path(folder)
             (scratch / "env").symlink_to(self.path)

@@ -17,7 +17,7 @@ SLOW = 0.1
 
 
 def clogging_of(state: State, scene: Scene) -> "Clogging | None":
-    """Return the watch on a scene's outfeeds; None if the scene has no limit of `clogging_time`."""
+    """Return the clogging monitor of a scene; None if the scene has no limit `clogging_time`."""
     if scene.limits.clogging_time is None:
         return None
     exits = {name: np.array(outfeed.region) for name, outfeed in scene.outfeeds.items()}

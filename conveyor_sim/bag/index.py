@@ -40,25 +40,25 @@ class Index:
     chunks: list[ChunkIndex] = field(default_factory=list)
     statistics: Statistics | None = None
     places: set[int] = field(default_factory=set)
-    """Bytes at which it states that known records begin: chunks, their indexes, attachments, metadata."""
+    """First bytes of known records as the index states them: chunks, their indexes, attachments, metadata."""
     unknown: list[int] = field(default_factory=list)
     """Opcodes of records that the specification does not define."""
 
     @property
     def absent(self) -> bool:
-        """The file has no index, as its footer states."""
+        """True if the file has no index, as its footer states."""
         return self.stated == 0 and self.start == self.stop - len(MAGIC) - FOOTER.size
 
     @property
     def counts_messages(self) -> bool:
-        """It shows which messages there were."""
+        """True if the index shows which messages there were."""
         return bool(self.chunks) or self.statistics is not None
 
 
 def chained_to(data: Data) -> int | None:
     """Return the byte of DataEnd if record lengths lead from the first record to footer and end mark, else None.
 
-    Then the lengths can be trusted, also those of records that the specification does not define.
+    Then the lengths can be trusted, also of records that the specification does not define.
     """
     size = len(data)
     footer = size - len(MAGIC) - FOOTER.size

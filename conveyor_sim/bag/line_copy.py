@@ -1,4 +1,4 @@
-"""A copy of the line message in a metadata record directly after the header: one damaged chunk can't take both.
+"""A copy of the line message in a metadata record directly after the header. One damaged chunk can't destroy both.
 
 Without the line message no other message can be understood. Keys: `topic`, `type`, `log_time` (ns), `data` (base64 of
 zlib of the serialized message), `crc32` (decimal, of the other values and the serialized message).
@@ -20,7 +20,7 @@ LIMIT = 1 << 26
 
 @dataclass(frozen=True)
 class LineCopy:
-    """A line message with what is needed to record it."""
+    """A line message with the fields needed to record it."""
 
     topic: str
     """Absolute."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Loss:
-    """Messages that can't be had any more."""
+    """Messages that can't be read any more."""
 
     messages: int | None
     """None: not known."""

@@ -159,7 +159,7 @@ def _named(file: Salvage, topics: Collection[str]) -> dict[int, str]:
 
 
 def _chunked(file: Salvage, topics: Collection[str]) -> Iterator[Raw]:
-    """Yield the messages in chunks in time order. Chunks may overlap in time; only those that do are held at once."""
+    """Yield the messages in chunks in time order. Only chunks that overlap in time are in memory at once."""
     names = _named(file, topics)
     waiting: list[tuple[int, int, int, Raw]] = []  # time, chunk, place in it
     wanted: list[ValidChunk] = [one for one in file.chunks if one.counts.keys() & names.keys()]

@@ -248,10 +248,10 @@ def mcap_files(path: Path) -> list[Path]:
 
 
 def open_bag(path: str | Path, by_index: bool = False, *, report: bool = True) -> Bag:
-    """Opens a rosbag2 folder or a single .mcap file, once all of it that carries a checksum has been verified.
+    """Open a rosbag2 folder or a single .mcap file, once everything in it that carries a checksum has been verified.
 
-    by_index: a whole recording of this package is opened by its index alone, however long it is; what is read of it
-    later is verified then, chunk by chunk.
+    by_index: open an intact recording of this package by its index alone, however long it is. Its chunks are verified
+    when they are read.
     report: log one line for each file with valid parts that are not read, such as channels without ROS 2 type.
     Raises BagError, in one sentence, if it is missing, cut short or damaged, or holds no `line`.
     """

@@ -1,4 +1,4 @@
-"""The verdict on an MCAP file that may be damaged anywhere: what is valid in it, what is wrong, and what is lost."""
+"""The verdict on an MCAP file that may be damaged anywhere: its valid parts, its damage, and its losses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LISTED = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA
 
 
 class Salvage(Walk):
-    """A walk over a file, judged: its damage, and what can be read all the same.
+    """A walk over a file with a verdict: its damage, and the parts that can still be read.
 
     Raises NothingLeft if the file does not begin as an MCAP file does, and has no chunk either.
     """
@@ -96,7 +96,7 @@ class Salvage(Walk):
                 yield message
 
     def _names(self) -> None:
-        """Take the topics and types from the index that the data do not name any more."""
+        """Take topics and types that are missing in the data from the index."""
         self.learn(self._loose_names)
         self._named = {key for key, channel in self.channels.items() if self._has_schema(channel)}
         if self.index is not None:
@@ -177,7 +177,7 @@ class Salvage(Walk):
             self.damage.append(f"{len(self.data) - index.stop} bytes follow the end")
 
     def _judge_index(self, index: Index, counts: Counter[int]) -> None:
-        """Report as lost what the index lists and the walk did not meet, and as damaged an index that differs else."""
+        """Report chunks that only the index lists as lost. Report an index that differs in other ways as damaged."""
         # Chunks whose compression is unknown hold messages that nothing here counts.
         listed = [chunk for chunk in index.chunks if chunk.compression in COMPRESSIONS]
         statistics = None if self.unread else index.statistics
@@ -218,7 +218,7 @@ class Salvage(Walk):
             self.damage.append("the index at the end does not fit the data")
 
     def _fits(self, start_ns: int, end_ns: int) -> bool:
-        """Return True if times are those of the messages, as far as these are in chunks."""
+        """Return True if the messages in chunks have these first and last times."""
         filled = [one.chunk for one in self.chunks if one.counts]
         if self.loose or not filled:
             return True

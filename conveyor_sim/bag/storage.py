@@ -60,6 +60,6 @@ def _clause(name: str, kind: str) -> str:
 
 
 def _unpacked(name: str) -> str:
-    """Return the name without the suffix of its compression, or another name if it has none."""
+    """Return the name without the suffix of its compression, or another name if there is no such suffix."""
     short = name.rpartition(".")[0]
     return short if PurePath(short).suffix in (".mcap", SUFFIX) else f"unpacked_{name}"

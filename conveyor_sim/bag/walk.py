@@ -74,7 +74,7 @@ class NothingLeft(BagError):
 
 
 class Walk:
-    """The records of a file, and what is wrong with them. Walks over the bytes when it is made.
+    """The records of a file and their damage. The constructor walks over all bytes.
 
     Raises NothingLeft if the file does not begin as an MCAP file does, and has no chunk either.
     """
@@ -179,12 +179,12 @@ class Walk:
         return chunk.stop
 
     def _may_repeat(self, chunk: Chunk) -> bool:
-        """Return True if nothing says that a chunk equal to an earlier one was not written so."""
+        """Return True if a chunk that equals an earlier one may have been written by the recorder."""
         listed = [] if self.index is None else [entry.chunk_start_offset for entry in self.index.chunks]
         return self._trusted and (not listed or chunk.start in listed)
 
     def _chunk_in(self, chunk: Chunk) -> Chunk | None:
-        """Return the next chunk, if it begins before a damaged one ends: where bytes of that were lost."""
+        """Return the next chunk if it begins before a damaged one ends, because bytes of the damaged one were lost."""
         return next_chunk(self.data, chunk.start + 1, chunk.stop)
 
     def learn(self, records: Iterable[object]) -> None:

@@ -13,7 +13,7 @@ class LineTags:
     signals: Mapping[str, str]
     commands: Mapping[str, str]
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Least and greatest value that the line takes, of commands; empty: not known."""
+    """Minimum and maximum that the line accepts, by command; empty: not known."""
 
 
 def bind(controller: object, tags: LineTags) -> None:

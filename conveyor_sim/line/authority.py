@@ -70,7 +70,7 @@ MOST_PATTERNS = 1000
 
 
 def reserved_mode(kind: str, modes: Iterable[float]) -> float | None:
-    """Return the first of some modes that is not for a kind of writer; None if there is none."""
+    """Return the first mode that a kind of writer may not set; None if it may set all of them."""
     return next((mode for mode in modes if mode not in MAY_SET.get(kind, ())), None)
 
 
@@ -96,7 +96,7 @@ def pattern_problem(patterns: Sequence[str], devices: Collection[str], where: st
 
 
 def hand_over_problem(given: Input) -> str:
-    """Return why the line can't be taken or given up by such an input, whoever owns it; "" if it can."""
+    """Return why such an input can't take or release the line, whichever controller owns it; "" if it can."""
     if given.names or given.values or (given.texts and given.operation == DISOWN):
         expected = "texts alone, patterns of devices" if given.operation == OWN else "nothing beside its writer"
         return f"{len(given.names)} names, {len(given.values)} values, {len(given.texts)} texts, expected {expected}"

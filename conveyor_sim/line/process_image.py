@@ -27,7 +27,7 @@ class ProcessImage:
 
     @property
     def command_limits(self) -> dict[str, tuple[float, float]]:
-        """Least and greatest value of each command, by name."""
+        """Minimum and maximum of each command, by name."""
         return {tag.name: (tag.low, tag.high) for tag in self.commands}
 
 

@@ -1,6 +1,6 @@
-"""`Receipt`: what can be judged of an input as it is received, before its tick: all that no state of the line changes.
+"""`Receipt`: the checks of an input that do not depend on the state of the line, made when it is received.
 
-Protocol servers answer a client by it at once. The line itself judges again at the tick, by the same rules.
+Protocol servers answer clients by these checks at once. The line checks again at the tick, by the same rules.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from conveyor_sim.observe.counters import LINE
 from conveyor_sim.support.printable import printable
 
 Cause = Literal["operation", "role", "name", "value", "form"]
-"""operation: not for this kind of writer; role: the value is not for it; name: there is no such thing; value: out of
-range, or not of the tag's kind; form: anything else about the input."""
+"""Cause of a refusal. operation: not allowed for this kind of writer. role: value not allowed for it. name: unknown.
+value: out of range, or not of the tag's kind. form: anything else about the input.
+"""
 
 RESET_COUNTERS = "reset_counters"
 
@@ -35,7 +36,7 @@ class Refusal(NamedTuple):
 
 
 class Receipt:
-    """Judges inputs of one line."""
+    """Checks of the inputs of one line."""
 
     def __init__(self, tags: Sequence[Tag], where: str) -> None:
         """tags: all of the line. where: its place in the plant."""
@@ -48,11 +49,11 @@ class Receipt:
             MODE: ("device", modes),
             FORCE: ("signal", signals),
         }
-        """By operation: what its names are of, with the word for one of them."""
+        """Tags that an operation may name, with the word for one of them, by operation."""
         self._counting = {LINE, *(tag.device for tag in tags if tag.device_class in COUNTING)}
 
     def refusal(self, given: Input) -> Refusal | None:
-        """Return why an input can never be applied, whatever state the line is in; None if it may be."""
+        """Return why no state of the line would allow an input; None if some state may."""
         operation, names, values = given.operation, given.names, given.values
         if reason := unauthorized(given, MAY):
             return Refusal("operation", reason)
@@ -85,7 +86,7 @@ class Receipt:
 
 
 def _cause(known: Mapping[str, Tag], what: str, names: Sequence[str], values: Sequence[float]) -> Cause:
-    """Return the cause of what `refusal` has something against."""
+    """Return the cause of an objection of `refusal`."""
     if not names or len(names) != len(values) or len(set(names)) != len(names):
         return "form"
     unknown = any(name not in known and (what != "command" or not name.startswith(ALARMS)) for name in names)

@@ -68,7 +68,7 @@ class Tag:
         return replace(self, shows=attribute)
 
     def without_limits(self) -> Tag:
-        """Return the same tag, to be forced to anything of its kind, also to what the line itself would never show."""
+        """Return the tag without limits. Forces may set any value of its kind."""
         return replace(self, low=-math.inf, high=math.inf) if self.kind in ("number", "count") else self
 
     @property

@@ -153,7 +153,7 @@ def force_scale(frames: Sequence[Frame], points_per_metre: float, peak: float) -
 def whole_region(plant: Plant, frames: Sequence[Frame], share: float = 0.09) -> Box:
     """Return the box around plant and bottles and a margin, of `share` of its size, for names.
 
-    What is a single point gets a box of SMALLEST m around it; where there is nothing at all, the origin does.
+    A single point gets a box of SMALLEST m around it; an empty plant gets that box around the origin.
     """
     bounds = [plant.bounds()]
     for frame in frames:

@@ -14,10 +14,10 @@ _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def start_child(module: str, *pipes: Connection, name: str = "") -> subprocess.Popen[bytes]:
-    """Start a Python that runs `main()` of a module. It inherits `pipes`; its arguments are their descriptors, and
-    `name`, which says in a list of processes what it is for.
+    """Start a Python process that runs `main()` of a module. It inherits `pipes`, and its arguments are their numbers.
 
-    It has a session of its own, because a Ctrl-C at the terminal is for the parent alone, which ends its children.
+    name: last argument, by which people recognise the process. It runs in a new session: a Ctrl-C at the terminal must
+    reach the parent only, which ends its children in order.
     """
     numbers = [pipe.fileno() for pipe in pipes]
     arguments = [*map(str, numbers), *([name] if name else [])]
@@ -36,7 +36,7 @@ def pipes_of_child() -> list[Connection]:
 
 
 def die_with_parent() -> None:
-    """Have the kernel kill this process once the thread that started it has ended, even if this process is stopped.
+    """Make the kernel kill this process once the thread that started it has ended, even if this process is stopped.
 
     prctl(2), PR_SET_PDEATHSIG. A parent that died before this call is noticed by the end of the pipes.
     """

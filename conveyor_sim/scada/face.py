@@ -55,7 +55,7 @@ class Settings:
     web_certificates: Path | None = None
     """Folder of the certificate and key of the page; None: where it needs them, those of the OPC UA face."""
     opcua_limits: Limits = LIMITS
-    """Work that one OPC UA client may cause."""
+    """Limits of one OPC UA client."""
     opcua_quota: Quota = QUOTA
     """Places of the OPC UA connections."""
     modbus_quota: Quota = QUOTA
@@ -89,11 +89,11 @@ class Health(NamedTuple):
     """Condition of the event loop that runs a protocol server."""
 
     name: str
-    """Of the protocol server."""
+    """Name of the protocol server."""
     lag: float
-    """s of wall time, the longest by which the event loop was late lately."""
+    """Longest recent delay of the event loop, s of wall time."""
     silent: float
-    """s of wall time for which the event loop has given no sign of life; 0: it runs."""
+    """Time since the last heartbeat of the event loop, s of wall time; 0: it runs."""
     restarts: int
     """Number of times that the protocol server was restarted."""
 

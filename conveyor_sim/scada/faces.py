@@ -26,7 +26,7 @@ class Kind:
     libraries: tuple[str, ...]
     """Without which it can't be."""
     module: str
-    """Module of the face, which `make` imports."""
+    """Module of the protocol server, which `make` imports."""
     make: Callable[[TagSource, Any, Settings, Shared], Face]
     """A face on what its option takes, not started. Raises ConveyorError."""
     exposes: Callable[[Settings], str]
@@ -38,7 +38,7 @@ class Kind:
     whoever: str = ""
     """Who can do that, where it is not those who reach its port."""
     isolated: bool = True
-    """True if it runs in a process of its own. It is then made there, by its name in FACES."""
+    """True if it runs in a separate process, which finds it in FACES by its name and makes it."""
 
     @property
     def installed(self) -> bool:

@@ -1,4 +1,4 @@
-"""`Frames`: everything that a view shows, collected for one process that mirrors it, in bounded memory."""
+"""`Frames`: the data of a view, collected in bounded memory for one process that mirrors the view."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HEALTH = 1.0
 
 
 class Frames:
-    """Frames for one process. The view's thread only leaves them behind; another thread fetches and sends them.
+    """Frames for one process. The view's thread only adds them; another thread fetches and sends them.
 
     A process that is far behind misses ticks, not states: merged frames hold the newest message of each topic, and up
     to MOST_EVENTS events.
@@ -35,11 +35,11 @@ class Frames:
         self._wake = threading.Condition(threading.RLock())
         self._waiting: deque[Frame] = deque()
         self._bytes = 0  # of the messages in them
-        self._states: dict[str, bytes] = {}  # heard, and not shown yet
+        self._states: dict[str, bytes] = {}  # messages since the last frame
         self._passed: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._anew = self._ended = self._watched = False
         self._era, self._total, self._tick = -1, 0, -1
-        self._told = 0.0  # s of wall time of the last report of health
+        self._reported = 0.0  # s of wall time of the last report of health
         self.left_out = 0
         """Ticks since this was set to 0 that the process was never sent, because it was too far behind."""
         with self._wake:
@@ -55,13 +55,13 @@ class Frames:
             frame = self._waiting.popleft() if self._waiting else self._cut({}, 0)
             self._bytes -= _size(frame)
         now = time.monotonic()
-        if self._servers is not None and now > self._told + HEALTH:
-            self._told = now
+        if self._servers is not None and now > self._reported + HEALTH:
+            self._reported = now
             return frame._replace(servers=self._servers())
         return frame
 
     def watch(self, on: bool) -> None:
-        """Collect the topics DRAWN, too, or no longer."""
+        """Start or stop collecting the topics DRAWN as well."""
         with self._wake:
             self._watched = on
             if on:
@@ -69,7 +69,7 @@ class Frames:
                 self._listen()
 
     def end(self) -> None:
-        """Collect no longer."""
+        """Stop collecting."""
         for end in self._ends:
             end()
         with self._wake:
@@ -103,7 +103,7 @@ class Frames:
             self._wake.notify()
 
     def _renew(self) -> None:
-        """In another era begin with everything that holds in it; what was heard before no longer does."""
+        """Start again with the messages of the present era, because earlier ones no longer hold."""
         if self._era != (era := self._view.era):
             self._era, self._anew = era, True
             newest = dict(self._view.newest)

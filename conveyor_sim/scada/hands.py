@@ -19,7 +19,7 @@ MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
 
 
 CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 - 1.0), "speed": (0.0, 1e6)}
-"""Values that can be asked of any run: ticks; times real time, 0 for as fast as it goes."""
+"""Valid values by request: number of ticks; factor of real time, 0 for as fast as possible."""
 
 
 def is_mode(tag: Tag) -> bool:
@@ -43,12 +43,12 @@ def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, w
 
 
 def refused_for_good(source: TagSource, receipt: Receipt, given: Input) -> Refusal | None:
-    """Return why the line would refuse an input in every state; None if it might take it.
+    """Return why the line would refuse an input in every state; None if it might accept it.
 
-    One that its writer could have given otherwise is handed on all the same: the line refuses it as a whole, on record.
+    Such an input is still passed on if its writer may use the operation: the line then records the refusal.
     """
     refusal = receipt.refusal(given)
-    # Of commands the line may take a part, so they are not handed on.
+    # The line may accept a part of several commands, so these are not passed on.
     if refusal is not None and refusal.cause != "operation" and given.operation != SET:
         source.give(given)
     return refusal

@@ -1,8 +1,8 @@
-"""`Holding`: which of several clients that nobody knows by name is the controller of the line.
+"""`Holding`: which of several clients without names is the controller of the line.
 
-Modbus has no sessions and no names. So the first write of a client takes the line, and the end of its connection gives
-it up, or its silence: a line that a client left behind must not be nobody's for ever. A restart of the protocol server
-ends all connections, but gives nothing up: for GRACE seconds only the holder's machine can go on with the line.
+Modbus has no sessions and no names. So the first write of a client takes the line. The end of its connection or its
+silence gives the line up, because an absent client must not hold it for ever. A restart of the protocol server ends
+all connections, but gives nothing up: for GRACE seconds only the holder's machine can go on with the line.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GRACE = 30.0
 
 
 class HoldingService(Protocol):
-    """Place where it is decided which client holds the line. The members are those of `Holding`."""
+    """Decides which client holds the line. Its members are documented in `Holding`."""
 
     @property
     def holder(self) -> str:
@@ -28,13 +28,13 @@ class HoldingService(Protocol):
         """Return the name by which a writer's claim on the line is judged."""
 
     def take(self, writer: str) -> str:
-        """Have the line be a writer's from the next tick on. Return the reason for a refusal, "" if there is none."""
+        """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
 
     def leave(self, writer: str) -> None:
-        """Have a writer give the line up, if it holds it."""
+        """Release the line if a writer holds it."""
 
     def look(self) -> None:
-        """Do what was put off for want of room."""
+        """Release the line if that had to wait for room among the inputs."""
 
 
 class Holding:
@@ -73,8 +73,9 @@ class Holding:
         return ""
 
     def judged_as(self, writer: str) -> str:
-        """Return the name by which a writer's claim on the line is judged: after a restart of the protocol server, the
-        holder's for each client of the holder's machine.
+        """Return the name by which a writer's claim on the line is judged.
+
+        After a restart of the protocol server it is the holder's name for each client on the holder's machine.
         """
         holder = self.holder
         return holder if holder and self._away_until and _machine(writer) == _machine(holder) else writer
@@ -85,12 +86,12 @@ class Holding:
             self._away_until = time.monotonic() + GRACE
 
     def end(self) -> None:
-        """Have the holder give the line up, because the protocol server ends for good."""
+        """Release the line, because the protocol server ends for good."""
         self._away_until = 0.0
         self.leave(self.holder)
 
     def leave(self, writer: str) -> None:
-        """Have a writer give it up, if it is its own and it is not to come back after a restart."""
+        """Release the line if a writer holds it and is not expected back after a restart."""
         if writer == self.holder and not self._away_until:
             self._leaving = True
             self.look()

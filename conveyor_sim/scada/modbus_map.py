@@ -178,8 +178,8 @@ def encode(row: Row, value: float) -> list[int]:
 def decode(row: Row, words: Sequence[int]) -> float:
     """The value of a row's words, (words,), each 0 to 65535, or of its bit.
 
-    A float32 is read as the shortest number that it stands for: who writes 0.1 means 0.1, and not 0.10000000149. One
-    that is a limit of the row, rounded to 32 bits, is read as that limit.
+    A float32 is read as the shortest number that it stands for: 0.1, not 0.10000000149. One that is a limit of the row,
+    rounded to 32 bits, is read as that limit.
     """
     if row.type == "bool":
         return float(bool(words[0]))

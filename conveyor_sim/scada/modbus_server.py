@@ -65,7 +65,7 @@ _EXCEPTIONS: Mapping[Cause, ExcCodes] = {
     "value": ExcCodes.ILLEGAL_VALUE,
     "form": ExcCodes.ILLEGAL_VALUE,
 }
-"""Exception of an input that no state of the line would make good, by its cause."""
+"""Exception code of an input that no state of the line allows, by the cause of its refusal."""
 
 _writer: ContextVar[str] = ContextVar("writer", default=MODBUS)
 """Whose request is being answered."""

@@ -9,7 +9,7 @@ from conveyor_sim.scada.server_messages import BEAT
 
 
 async def beat(take: Callable[[float], object]) -> None:
-    """Call `take` every BEAT seconds with the lateness of that call (s of wall time), until this task is cancelled."""
+    """Call `take` every BEAT seconds with the delay of that call (s of wall time), until this task is cancelled."""
     loop = asyncio.get_running_loop()
     while True:
         due = loop.time() + BEAT

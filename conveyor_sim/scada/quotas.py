@@ -1,9 +1,9 @@
 """`Places`: which clients may be connected to a protocol server at once, and which of them make room for others.
 
-A client that has not identified itself yet needs a place to do so. So connections without a session never block others:
-when all places are taken, the one that has got least far, and of these the one that was idle for longest, makes room.
-Guests, which have a session and no user, hold at most three quarters of the places; the rest stays for users and for
-connections that have no session yet. The same holds for the places of one address. A user is never dropped for a guest.
+A client needs a place before it can identify itself, so connections without a session never block others. When all
+places are taken, the connection at the earliest stage makes room; among several, the one that was idle for longest.
+Guests have a session and no user. They hold at most three quarters of the places; the rest is for users and for
+connections without a session yet. This also holds for the places of one address. A user is never dropped for a guest.
 """
 
 from __future__ import annotations
@@ -71,14 +71,14 @@ class Places:
     def __init__(self, quota: Quota, keeps_active: bool = False) -> None:
         """Start with all places free. keeps_active: True if guests that are not idle keep their places, too.
 
-        That is for a protocol without users, where one more connection can't be an operator's.
+        This is for a protocol without users, where a new connection can't be a user's.
         """
         self._quota, self._keeps_active = quota, keeps_active
         self.idle = quota.idle
         """Seconds without a request after which a connection is idle."""
         self._taken: set[Place] = set()
         self.dropped = self.refused = 0
-        """Connections that made room so far, and those that got no place."""
+        """Connections that made room so far, and connections that got no place."""
 
     def __len__(self) -> int:
         return len(self._taken)

@@ -1,9 +1,9 @@
 """`RemoteSource`: the line as the process of a protocol server sees it; its parent has the line, logins and ownership.
 
-`give`, `control` and logins are decided by the parent. The protocol server waits for the answer, because its client is
-to get the reason for a refusal, and because answers take well below a millisecond: a thread of the parent gives them
-that never waits for a protocol server. If there is no answer in time, the request is refused with that reason; the
-parent drops a request that it reads after its deadline, so a refused command does not act later.
+The parent decides on `give`, `control` and logins. The protocol server waits for the answer, because its client must
+get the reason for a refusal. An answer takes well below a millisecond: it comes from a thread of the parent that never
+waits for a protocol server. Without an answer in time, the request is refused with that reason. The parent drops a
+request that it reads after its deadline, so a refused command does not act later.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from conveyor_sim.scada.past import Past
 
 PATIENCE, LOGIN_PATIENCE = 1.0, 3.0
-"""s of wall time that the parent has for an answer; a password takes it about 0.05 s of a processor."""
+"""s of wall time that the parent has for an answer; checking a password takes about 0.05 s of processor time."""
 
 SILENCE = 5.0
-"""s of wall time without a frame after which what is shown is stale."""
+"""s of wall time without a frame after which the line counts as lost."""
 
 Decode = Callable[[str, bytes], Any]
 
@@ -79,7 +79,7 @@ class Calls:
         return True
 
     def take(self, answer: Answer) -> None:
-        """Hand an answer to the thread that waits for it. Called by the thread that reads the pipe."""
+        """Pass an answer to the thread that waits for it. Called by the thread that reads the pipe."""
         if (waiting := self._waiting.get(answer.number)) is not None:
             waiting.put(answer.value)
 
@@ -104,11 +104,11 @@ class RemoteSource(View):
         return self._past
 
     def give(self, given: Input) -> str:
-        """Have the parent give an input to the line. Return the reason for a refusal, "" if it was accepted."""
+        """Give an input to the line, through the parent. Return the reason for a refusal, "" if it was accepted."""
         return self._ask("give", given)
 
     def control(self, what: Control, value: float, by: str) -> str:
-        """Have the parent control the run. Return the reason for a refusal, "" if it was accepted."""
+        """Control the run, through the parent. Return the reason for a refusal, "" if it was accepted."""
         return self._ask("control", what, value, by)
 
     def _ask(self, what: What, *arguments: Any) -> str:
@@ -121,7 +121,7 @@ class RemoteSource(View):
         self._calls.tell("watch", on)
 
     def apply(self, frame: Frame) -> None:
-        """Show what a frame holds. Messages that can't be decoded make the line lost, with the reason."""
+        """Show the data of a frame. Messages that can't be decoded make the line lost, with the reason."""
         try:
             self._apply(frame)
         except Exception as error:  # of a damaged recording, or a node of another version, messages may be anything
@@ -162,7 +162,7 @@ class RemoteLogins:
         self._calls, self.has_users = calls, has_users
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
-        """Have the parent check a password, and count wrong ones; None is a refusal. `now` is the parent's own."""
+        """Return the user if the parent accepts the password, None otherwise. The parent has its own `now`."""
         try:
             user: User | None = self._calls.ask("enter", name, password, origin, patience=LOGIN_PATIENCE)
         except NoAnswerError:
@@ -186,18 +186,18 @@ class RemoteHolding:
         return self._ask("judged_as", writer, writer)
 
     def take(self, writer: str) -> str:
-        """Have the line be a writer's from the next tick on. Return the reason for a refusal, "" if there is none."""
+        """Give a writer the line from the next tick on. Return the reason for a refusal, "" if there is none."""
         try:
             return str(self._calls.ask("take", writer))
         except NoAnswerError as error:
             return str(error)
 
     def leave(self, writer: str) -> None:
-        """Have a writer give the line up, if it holds it."""
+        """Release the line if a writer holds it."""
         self._calls.tell("leave", writer)
 
     def look(self) -> None:
-        """Do what was put off for want of room."""
+        """Release the line if that had to wait for room among the inputs."""
         self._calls.tell("look")
 
     def _ask(self, what: What, otherwise: str, *arguments: str) -> str:

@@ -1,4 +1,4 @@
-"""`ServerChild`: a process for one protocol server, which imports what that needs before the line is known."""
+"""`ServerChild`: a process for one protocol server. It imports its libraries before the line is known."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ServerChild:
             self.process = start_child(PROCESS, its_frames, its_pipe, name=name)
 
     def kill(self, patience: float) -> None:
-        """Return once it has ended; it is killed if it has not within `patience` seconds."""
+        """Wait up to `patience` seconds for the end of the process, then kill it."""
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(patience)
         self.process.kill()

@@ -1,4 +1,4 @@
-"""`ServerHost`: one protocol server in a process of its own, watched and restarted by this one.
+"""`ServerHost`: one protocol server in a separate process, watched and restarted by this one.
 
 The line, logins and ownership stay here. One thread of the host answers the process and watches its heartbeats, one
 sends frames; a process that does not read holds up neither the line nor another protocol server.
@@ -44,7 +44,7 @@ for that long.
 """
 
 LOOK = 0.5
-"""s of wall time between two looks at whether there are heartbeats."""
+"""s of wall time between two checks for heartbeats."""
 
 FRESH = 0.5
 """s of wall time that a protocol server has to report its status."""
@@ -70,8 +70,8 @@ class ServerHost:
         ready: ServerChild | None,
     ) -> None:
         """Return at once; `wait_until_started` waits. place: port or URL. say: takes sentences for people.
-        everyone: returns the health of all protocol servers, for those that show it. ready: process for the first
-        start; None: it is started here.
+        everyone: returns the health of all protocol servers, for the page. ready: process for the first start; None:
+        it is started here.
         """
         self.kind = kind
         self._place, self._settings, self._view, self._logins, self._say = place, settings, view, logins, say
@@ -86,7 +86,7 @@ class ServerHost:
         self._address = ""
         self._restarts = 0
         self._before = self._now = _NONE  # counts of earlier processes; status of the present one
-        self._lag = self._latency = 0.0  # s, the longest since the status was asked for
+        self._lag = self._latency = 0.0  # s, the longest since the last status
         self._recent: deque[float] = deque(maxlen=RECENT)
         self._silent = 0.0  # s of wall time since the last heartbeat
         self._process: subprocess.Popen[bytes] | None = None
@@ -130,7 +130,7 @@ class ServerHost:
         )
 
     def health(self, since_asked: bool = False) -> Health:
-        """Return its health: the longest lag of the last second, or since that was last asked for."""
+        """Return its health with the longest lag of the last second; since_asked: since the last such call."""
         silent = self._silent if self._silent > 2 * LOOK else 0.0
         lag = max((*self._recent, self._silent if silent else 0.0), default=0.0)
         if since_asked:
@@ -138,7 +138,7 @@ class ServerHost:
         return Health(self.kind.name, lag, silent, self._restarts)
 
     def end(self) -> None:
-        """Have the protocol server close its connections and end; `join` waits for that."""
+        """Ask the protocol server to close its connections and end; `join` waits for that."""
         self._ending.set()
         self._send(End())
 
@@ -148,7 +148,7 @@ class ServerHost:
         self._passwords.shutdown(cancel_futures=True)
 
     def _send(self, message: Any, pipe: Connection | None = None) -> None:
-        """Send to the present process. pipe: that of the process that it is for; another one must not get it."""
+        """Send to the present process. pipe: drop the message if the present process has another pipe."""
         with self._sending, suppress(OSError):
             if self._pipe is not None and pipe in (None, self._pipe):
                 self._pipe.send(message)
@@ -161,7 +161,7 @@ class ServerHost:
             began = time.monotonic()
             try:
                 reason = self._run()
-            except Exception as error:  # whatever it is, the user must know
+            except Exception as error:  # the user must know of any error
                 reason = f"{self.kind.name}: {type(error).__name__}: {error}"
             self._account()
             if self._ending.is_set():

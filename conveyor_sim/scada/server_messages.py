@@ -34,7 +34,7 @@ class ServerTask:
     controls: frozenset[Control]
     takes_inputs: bool
     has_users: bool
-    """True if there are users who can log in."""
+    """True if any user can log in."""
     bag: Path | None
     """Recording that is played back. It defines the messages, and holds the history; None: not a recording."""
     counts: tuple[int, int]
@@ -45,7 +45,7 @@ class Frame(NamedTuple):
     """Sent to the process: everything that is new since the frame before."""
 
     anew: bool
-    """True if what was shown before no longer holds, because time was moved or another run has begun."""
+    """True if earlier frames no longer hold, because of a seek or another run."""
     states: Mapping[str, bytes]
     """Newest serialized message of each topic but `events`."""
     passed: Sequence[bytes]
@@ -55,7 +55,7 @@ class Frame(NamedTuple):
     events: Sequence[Event]
     """The newest of them; the oldest may be missing."""
     shown: int
-    """Number of times that the line was shown anew; 0: a sign of life."""
+    """1 if the line has a new state to show; 0: a sign of life."""
     run: RunState
     lost: str
     owner: str

@@ -1,4 +1,4 @@
-"""The process of one protocol server: it mirrors the line by the frames that its parent sends, and serves it.
+"""The process of one protocol server: it mirrors the line from frames of its parent, and serves it.
 
 Three threads: the main one runs the event loop of the protocol server, one applies frames, one reads answers. The
 process ends with its parent, even while it is stopped or its event loop hangs.
@@ -93,7 +93,7 @@ def _source(task: ServerTask, calls: Calls, stack: ExitStack) -> RemoteSource:
 
 
 def _or_end(follow: Callable[[], None]) -> None:
-    """Read a pipe until the parent is gone, then end this process at once, whatever the protocol server does."""
+    """Read a pipe until the parent is gone, then end this process at once, even if the protocol server hangs."""
     try:
         follow()
     except (EOFError, OSError):
@@ -101,14 +101,14 @@ def _or_end(follow: Callable[[], None]) -> None:
 
 
 def main() -> None:
-    """Be that process. Arguments: descriptors of two pipes, of frames, and of calls and answers; name in FACES."""
+    """Run the process. Arguments: numbers of the pipes of frames and of calls and answers; name in FACES."""
     die_with_parent()
     frames, pipe = pipes_of_child()
     with collected_later():
         import_module(next(kind.module for kind in FACES if kind.name == sys.argv[-1]))
     try:
         task = pipe.recv()
-    except (EOFError, OSError):  # the parent has ended before it could say
+    except (EOFError, OSError):  # the parent has ended before it sent the task
         return
     with ExitStack() as stack:
         try:
@@ -119,4 +119,4 @@ def main() -> None:
             pipe.send(Failed(str(error)))
         except Exception as error:
             pipe.send(Failed(f"{task.kind}: {type(error).__name__}: {error}"))
-    os._exit(0)  # to free thousands of nodes takes longer than to close all connections
+    os._exit(0)  # freeing thousands of nodes takes longer than closing all connections

@@ -1,4 +1,4 @@
-"""`Serving`: the protocol servers of one source, each by itself, and the lines that report on them."""
+"""`Serving`: all protocol servers of one source, and the lines that report on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Shared`: state that is not a protocol server's own, so that it survives its restart."""
+"""`Shared`: state of a protocol server that its parent keeps, so that it survives a restart."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class Shared:
     """State that a protocol server uses and its parent keeps."""
 
     logins: LoginService
-    """One for all protocol servers."""
+    """Logins, common to all protocol servers."""
     holding: HoldingService
-    """One for each protocol."""
+    """Holder of the line among the clients of one protocol."""
     counts: tuple[int, int] = (0, 0)
     """Requests that were passed on, and that were refused, before the protocol server was restarted."""

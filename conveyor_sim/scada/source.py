@@ -127,12 +127,12 @@ class Listeners:
     """Functions that are called when something has changed. From any thread."""
 
     def __init__(self) -> None:
-        """Start without any."""
+        """Start without functions."""
         self._all: tuple[Callable[..., None], ...] = ()
         self._changing = threading.Lock()
 
     def add(self, heard: Callable[..., None]) -> Callable[[], None]:
-        """Call this one, too, from now on. Return a function that ends that."""
+        """Call a function from now on. Return another one that ends that."""
         with self._changing:
             self._all = (*self._all, heard)
 
@@ -143,7 +143,7 @@ class Listeners:
         return end
 
     def tell(self, *news: object) -> None:
-        """Call them all with `news`."""
+        """Call all functions with `news`."""
         for heard in self._all:
             heard(*news)
 
@@ -162,7 +162,7 @@ class RecentEvents:
             self._kept = total + len(events), (*last, *events)[-MOST_EVENTS:]
 
     def bring(self, total: int, newest: Sequence[Event]) -> None:
-        """Continue up to `total` events, of which these are the newest; others in between are unknown."""
+        """Add the newest of `total` events in all; events in between are unknown."""
         if newest:
             _, last = self._kept
             self._kept = total, (*last, *newest)[-MOST_EVENTS:]

@@ -1,7 +1,7 @@
 """`ThreadHost`: one protocol server in a thread of this process, where the owner of the line decides when time passes.
 
-The line of a test (`TickSource`) is served this way, because the test steps it, and so is a PLC that a line attaches
-to, which is alone. All others are served by processes (server_host.py). What runs in a thread is not restarted.
+Two protocol servers run this way: those of a test's line (`TickSource`), because the test steps it, and the only one of
+`attach`. All others run in processes (server_host.py). A protocol server in a thread is not restarted.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class ThreadHost:
     def __init__(self, kind: Kind, place: Any, settings: Settings, source: TagSource, logins: Logins) -> None:
         """Serve from now on. place: port or URL. Raises ConveyorError, in one sentence, if that can't be."""
         self.kind = kind
-        self._lag = 0.0  # s of wall time, the longest since that was asked for
+        self._lag = 0.0  # s of wall time, the longest since the last `health`
         self._thread = ServerThread()
         self._server: Face | None = None
         self._beating: asyncio.Task[None] | None = None

@@ -120,19 +120,19 @@ def authenticate(users: Mapping[str, User], name: str, password: str) -> User | 
 
 
 class LoginService(Protocol):
-    """Place where passwords are checked. Its method may be called from any thread."""
+    """Checks passwords. Its method may be called from any thread."""
 
     has_users: bool
-    """True if there are users who can log in."""
+    """True if any user can log in."""
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
-        """Return the user if the password is right, None otherwise. The arguments are those of `Logins.enter`."""
+        """Return the user if the password is right, None otherwise. `Logins.enter` documents the arguments."""
 
 
 class Logins:
-    """The one `LoginService` of all protocol servers of a line. It counts wrong passwords: guessing takes years.
+    """The common `LoginService` of all protocol servers of a line. It counts wrong passwords, so guessing takes years.
 
-    One password is checked at a time, because that takes a processor.
+    It checks one password at a time, because each check keeps a processor busy.
     """
 
     def __init__(self, users: Mapping[str, User]) -> None:

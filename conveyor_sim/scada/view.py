@@ -74,11 +74,13 @@ class PictureSource(TagSource, Protocol):
         """By topic, the last message as it came."""
 
     servers: tuple[Health, ...]
+    """Health of the protocol servers of the line."""
     recording: Path | None
+    """Recording that is played back; None: no recording."""
 
     @property
     def era(self) -> int:
-        """Number that changes when messages from before no longer hold."""
+        """Number that changes when earlier messages no longer hold."""
 
     def watch(self) -> Callable[[], None]:
         """Have DRAWN be there, too, from now on; what is returned ends that."""
@@ -129,7 +131,7 @@ class View:
         self._newest: dict[str, bytes] = {}
         self._era = 0
         self.servers: tuple[Health, ...] = ()
-        """Health of the protocol servers of the line, as far as it is known here."""
+        """Health of the protocol servers of the line; empty: not known in this process."""
         self._forget("")
 
     @property
@@ -158,7 +160,7 @@ class View:
 
     @property
     def era(self) -> int:
-        """Number that changes when messages from before no longer hold: after a reset, or a seek in a recording."""
+        """Number that changes when earlier messages no longer hold: after a reset, or a seek in a recording."""
         return self._era
 
     def watch(self) -> Callable[[], None]:
@@ -335,7 +337,7 @@ class View:
 
 
 def decoded(topic: str, data: bytes) -> Any:
-    """Return the message of a topic, serialized as this version does it."""
+    """Return the decoded message of a topic, which this version has serialized."""
     return typestore().deserialize_cdr(data, TOPICS[topic].type)
 
 

@@ -21,7 +21,7 @@ MOVE_RAILS = ("leapfrog", "semi_implicit_euler", "velocity_verlet")
 
 
 def problems_of(scene: Scene) -> list[Problem]:
-    """Return what is wrong with a scene whose fields are each valid by themselves: MOST_SAID + 1 problems at most."""
+    """Return up to MOST_SAID + 1 problems of a scene whose fields are each valid by themselves."""
     checks = (
         _times,
         accuracy_problems,
@@ -66,7 +66,7 @@ def _times(scene: Scene) -> Iterator[Problem]:
 
 
 def _repeated(scene: Scene) -> Iterator[Problem]:
-    """Pairs of materials that are given twice."""
+    """Yield a problem for each pair of materials that is given twice."""
     contacts = [tuple(sorted(contact.between)) for contact in scene.contacts]
     for field, pairs in (("contacts", contacts), ("base", [base.between for base in scene.base])):
         seen: dict[tuple[str, ...], int] = {}
@@ -89,7 +89,7 @@ def _missing_contacts(scene: Scene) -> Iterator[Problem]:
 
 
 def _touching(scene: Scene) -> Iterator[tuple[frozenset[str], str]]:
-    """Yield pairs of materials that can touch, and what they are of."""
+    """Yield pairs of materials that can touch, and the parts that consist of them."""
     bottles = _bottle_materials(scene)
     if _several_bottles(scene):
         for one, other in combinations_with_replacement(bottles, 2):

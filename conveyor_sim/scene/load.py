@@ -121,9 +121,9 @@ def merged(data: Any, changes: Any) -> Any:
 
 
 def refused(problems: list[Problem], document: Document, name: str, changes: Any, more: int = 0) -> SceneError:
-    """Return the error for what is wrong in a file, one line per problem, in the order of the file.
+    """Return the error for the problems of a file, one line per problem, in the order of the file.
 
-    more: problems that were counted, and have no words. Of a list beyond MOST_SAID the rest may be missing.
+    more: number of problems that were only counted. A list of more than MOST_SAID problems may be incomplete.
     """
     lines = []
     for problem in problems:

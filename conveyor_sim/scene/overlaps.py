@@ -9,7 +9,7 @@ from conveyor_sim.scene.geometry import Piece
 
 _MOST_CELLS = 1e6  # along one axis, so that the number of a cell fits 64 bits; coarser cells are only slower
 MOST_PAIRS = 1_000_000
-"""Pairs of circles that are looked for; a scene that has one is refused."""
+"""Number of pairs of circles after which the search ends; a scene with one pair is refused."""
 _AT_ONCE = 4_000_000  # pairs of neighbours that are compared in one step: some 200 MB
 # Half of a cell's neighbours: the other half sees the pair from its own side.
 _FORWARD = ((0, 0), (1, -1), (1, 0), (1, 1), (0, 1))
@@ -20,7 +20,7 @@ def overlapping(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return pairs (i, j), i < j, of circles (centres (n, 2), radii (n,), m) that overlap by more than a tolerance (m).
 
-    Of more than MOST_PAIRS the others are left out: circles at one place have as many pairs as their number squared.
+    Pairs beyond about MOST_PAIRS are left out, because circles at one place have pairs by the square of their number.
     """
     if len(centres) < 2:
         return np.empty(0, np.intp), np.empty(0, np.intp)

@@ -24,7 +24,7 @@ class Part(BaseModel):
             return handler(data)
         except ValidationError as error:
             if count is not None and count.is_full and count.said == before:
-                # All of it is its own, and only counted. The scene is refused for what was said before.
+                # All its problems are new and only counted. The scene is refused for the problems before them.
                 count.more += error.error_count()
                 return cls.model_construct()
             raise in_words(cls, error, count) from None

@@ -1,4 +1,4 @@
-"""`ProblemCount`: problems of one validation that are put into words, and those that are only counted."""
+"""`ProblemCount`: problems of one validation that are put into words, and problems that are only counted."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +20,7 @@ class ProblemCount:
 
     @property
     def is_full(self) -> bool:
-        """Return True if no further problem is put into words."""
+        """True if no further problem is put into words."""
         return self.said >= MOST_SAID
 
 

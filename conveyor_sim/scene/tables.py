@@ -58,7 +58,7 @@ def with_tables(data: Any, beside: Beside | None) -> tuple[Any, list[Problem]]:
 
 
 def _points(content: bytes, is_inside: bool) -> list[list[float]]:
-    """Return the points [overlap, force] of a CSV file. Raise ValueError that says what is wrong.
+    """Return the points [overlap, force] of a CSV file. Raise ValueError with the problem.
 
     is_inside: the file lies in the scene's folder, so it may be quoted.
     """
@@ -108,7 +108,7 @@ def _is_number(cell: str) -> bool:
 def _content(path: str, beside: Beside | None) -> tuple[bytes, bool]:
     """Return the content of a file that a scene names, and whether it lies in the scene's folder.
 
-    Raise ValueError that says why it can't be read.
+    Raise ValueError with the reason if it can't be read.
     """
     if beside is None:
         raise ValueError("expected a list of points [overlap, force]: a scene that is no file has no files beside it")

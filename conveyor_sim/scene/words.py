@@ -18,7 +18,7 @@ _LONGEST_VALUE = 60
 _LONGEST_NAME = 100
 """Characters of an unknown name for which a similar one is looked up; the time grows with its length."""
 _LISTED = 20
-"""Names of the scene's own that a sentence lists."""
+"""Names of the scene that a sentence lists."""
 
 
 def shown(value: Any) -> str:
@@ -123,9 +123,9 @@ def fields_of(model: type[BaseModel]) -> str:
 
 
 def in_words(model: type[BaseModel], error: ValidationError, count: ProblemCount | None = None) -> ValidationError:
-    """The same problems, those of the model's own fields said in words (error type "said", which passes unchanged).
+    """Return the error with problems of the model's fields in words (error type "said"); others pass unchanged.
 
-    count: bounds how many are said; None: all are.
+    count: bounds the problems in words; None: no bound.
     """
     details: list[InitErrorDetails] = []
     for problem in error.errors(include_url=False):

@@ -4,8 +4,8 @@ A text goes one way: `pragmas.py` leaves one branch of its conditional pragmas; 
 the tree of `tree.py`; `declarations.py` its types (`types.py`), names (`scope.py`), qualifiers (`sections.py`) and
 addresses (`located.py`); `expressions.py`, `integers.py`, `calls.py` and `statements.py` check what is done and write
 it as Python, and `compile.py` puts that together. `functions.py`, `conversions.py` and `blocks.py` are the standard
-library, `operations.py` what code needs at run time. `program.py` runs it. `library.py` has a program run that another
-compiler has made a shared library of. What the standard leaves open is decided in docs/structured_text.md.
+library, `operations.py` the functions of code at run time. `program.py` runs it. `library.py` runs a shared library
+that another compiler has made of a program. docs/structured_text.md lists the decisions that the standard leaves open.
 """
 
 from __future__ import annotations

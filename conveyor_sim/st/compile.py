@@ -64,7 +64,7 @@ class Compiled:
     trace: bool
     """Whether assignments note that they were the last to write."""
     shared: Mapping[tuple[str, str], int]
-    """By Python class and slot: the memory that a located variable shares with others."""
+    """Number of the memory that a located variable shares with others, by Python class and slot."""
 
 
 def compile_file(path: Path, trace: bool = False) -> Compiled:
@@ -142,7 +142,7 @@ def _layout(source: tree.Source, declared: Declarations) -> Layout:
 
 
 def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
-    """Raises SourceError for more elements or text than a file may declare in all."""
+    """Raise SourceError for more elements or text than a file may declare in all."""
     shared: list[Type] = [declared.names.globals, *declared.structures]
     elements, characters = sum(one.size for one in shared), sum(one.characters for one in shared)
     for unit, kind in units:
@@ -191,7 +191,7 @@ def _function(kind: BlockType, lines: Lines) -> None:
 
 
 def _class(lines: Lines, name: str, base: str, members: list[Member], layout: Layout = NOTHING_SHARED) -> None:
-    """A class with a slot for each variable, and a descriptor for each that shares memory."""
+    """Write a class with a slot for each variable, and a descriptor for each one that shares memory."""
     places = {one.slot: place for one in members if (place := layout.places.get((name, one.slot))) is not None}
     memory = "located" if name == "_Globals" and layout.size else ""
     slots = [one.slot for one in members if one.slot not in places] + [memory] * bool(memory)

@@ -2,7 +2,7 @@
 
 Whole numbers and bit strings keep their lowest bits; reals become the nearest whole number, of two the even one, and
 stop the program where the type has none. A DWORD is the bits of a REAL, an LWORD those of an LREAL. A TIME is a number
-of milliseconds and an LTIME one of nanoseconds, as in CODESYS and TwinCAT: the standard does not say.
+of milliseconds and an LTIME a number of nanoseconds, as in CODESYS and TwinCAT; the standard leaves this open.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ _CHUNK = 65536
 
 
 class AnswerError(Exception):
-    """An answer that did not come as agreed; the text continues a sentence: "sent more than ... bytes"."""
+    """A missing or wrong answer. The text continues a sentence: "sent more than ... bytes"."""
 
 
 class LateError(AnswerError):
@@ -25,8 +25,8 @@ class EndedError(AnswerError):
 def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, most: int) -> bytes:
     """Send a line to the standard input of a child, and return the next line of its standard output.
 
-    patience: s of wall time for sending and answer together, however the data are spread over it. most: bytes of the
-    answer. The pipes must be unbuffered. Raises LateError, EndedError, and AnswerError for a wrong answer.
+    patience: s of wall time for request and answer together. most: bytes of the answer. The pipes must be unbuffered.
+    Raises LateError, EndedError, and AnswerError for a wrong answer.
     """
     assert process.stdin is not None and process.stdout is not None
     inward, outward = process.stdout.fileno(), process.stdin.fileno()
@@ -53,12 +53,12 @@ def exchange(process: subprocess.Popen[bytes], request: bytes, patience: float, 
             raise AnswerError(f"sent more than {most} bytes")
     line, _, rest = bytes(received).partition(b"\n")
     if left or rest or len(line) > most:
-        raise AnswerError(f"sent more than {most} bytes" if len(line) > most else "sent what was not asked for")
+        raise AnswerError(f"sent more than {most} bytes" if len(line) > most else "sent data without a request")
     return line
 
 
 def _written(pipe: int, data: memoryview) -> int:
-    """Return how many bytes the pipe took. Raises EndedError."""
+    """Return the number of bytes that the pipe took. Raises EndedError."""
     try:
         return os.write(pipe, data[:_CHUNK])
     except BlockingIOError:

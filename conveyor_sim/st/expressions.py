@@ -330,7 +330,7 @@ class Expressions:
         return replace(folded(Value(node.at, LREAL, f"_power({float(a)}, {float(b)})"), left, right), literal="real")
 
     def _time(self, node: tree.Binary, left: Value, right: Value) -> Value:
-        """TIME and LTIME, of which LTIME is the type of what both take part in."""
+        """Return the value of an operator with TIME or LTIME; the result of both is LTIME."""
         word = node.operator
         times = [one for one in (left, right) if one.type.base.kind == "time"]
         kind = LTIME if any(one.type.base == LTIME for one in times) else TIME

@@ -60,7 +60,7 @@ class Application:
         return first.type.base
 
     def given(self, code: str, kind: Type, values: Sequence[Value] = ()) -> Value:
-        """Return the result. values: those of a result that is one of them, as wide as they are."""
+        """Return the result. values: candidates of a result that is one of them, which is as wide as they are."""
         reached = [reach(one, kind) for one in values] if kind.kind == "int" else []
         span = (min(low for low, _ in reached), max(high for _, high in reached)) if reached else None
         return folded(Value(self.at, kind, code, span=span), *self.values)

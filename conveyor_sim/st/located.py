@@ -1,9 +1,9 @@
 """Located variables (AT %MW0): which of them share memory, and where each lies in it.
 
-%M is bytes, in the order of CODESYS: %MWn is bytes 2n and 2n + 1, %MDn begins at byte 4n, %MLn at 8n, %MXn.b is bit b
-of byte n, all little-endian. A variable covers as many bytes as its type has; those that overlap are one memory.
-%I and %Q are places of a Modbus map (docs/scada.md): bits and registers are two memories, and a place has one type.
-A variable that overlaps no other keeps a slot of its own.
+%M is bytes, little-endian, in the order of CODESYS: %MWn begins at byte 2n, %MDn at byte 4n, %MLn at byte 8n.
+%MXn.b is bit b of byte n. A variable covers the bytes of its type, and variables that overlap share their memory.
+%I and %Q are places of a Modbus map (docs/scada.md). Bits and registers are two memories, and a place has one type.
+A variable that overlaps no other one has its own slot.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _PLAIN = ("bool", "int", "bits", "real")
 
 @dataclass(frozen=True)
 class Address:
-    """An address as it is counted here. number: of bits for X, else of units of the size."""
+    """An address. number: counts bits for size X, else units of the size."""
 
     area: str
     size: str
@@ -54,7 +54,7 @@ def address_of(at: Position, text: str) -> Address:
 
 @dataclass(frozen=True)
 class Located:
-    """A variable with an address. unit: the Python class that it belongs to. initial: the program gives it a value."""
+    """A variable with an address. unit: its Python class. initial: True if the program states an initial value."""
 
     unit: str
     member: Member
@@ -63,18 +63,18 @@ class Located:
 
     @property
     def at(self) -> Position:
-        """Where it is declared."""
+        """Position of the declaration."""
         return Position(*self.member.at)
 
     @property
     def space(self) -> str:
-        """The memory that it lies in."""
+        """Name of the memory of the variable."""
         bits = "" if self.address.area == "M" else "bits" if self.address.size == "X" else "registers"
         return self.address.area + bits
 
     @property
     def extent(self) -> tuple[int, int]:
-        """First bit and the one after the last in %M; else bits or registers of 16 bits."""
+        """First bit and the bit after the last one in %M; else the same for bits or registers of 16 bits."""
         number, bits = self.address.number, self.address.bits
         if self.address.area != "M":
             return number, number + max(1, bits // 16)
@@ -87,7 +87,7 @@ class Located:
 
 
 def _size(kind: Type) -> int:
-    """Bits that a type takes in memory, at least; of structures with what alignment may add."""
+    """Return the least number of bits of a type in memory; structures include possible padding."""
     if isinstance(kind, Array):
         length = 1
         for low, high in kind.ranges:
@@ -101,7 +101,7 @@ def _size(kind: Type) -> int:
 
 
 def _format(kind: Type) -> str:
-    """The letter of `struct` for an elementary type."""
+    """Return the format letter of `struct` for an elementary type."""
     base = kind.base
     if base.kind == "real":
         return "f" if base.name == "REAL" else "d"
@@ -113,7 +113,7 @@ def _format(kind: Type) -> str:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a variable lies in the shared memory. group: what overlaps has one."""
+    """Place of a variable in the shared memory. group: number common to all variables that overlap."""
 
     group: int
     offset: int
@@ -121,7 +121,7 @@ class Place:
     bit: int | None
     format: str
     sets: bool
-    """It gives the memory its initial value."""
+    """True if the variable sets the initial value of the memory."""
 
     @property
     def code(self) -> str:
@@ -168,9 +168,9 @@ def laid_out(located: Iterable[Located], instances: Mapping[str, int]) -> Layout
 
 
 def overlapping(spans: Iterable[tuple[str, int, int, _T]]) -> Iterator[list[_T]]:
-    """Group what overlaps, directly or by way of others.
+    """Yield groups of entries that overlap, directly or through others.
 
-    spans: a space, the first place in it, the one after the last, and what lies there.
+    spans: a space, the first place in it, the place after the last one, and the entry there.
     """
     group: list[_T] = []
     where, end = "", 0
@@ -185,7 +185,7 @@ def overlapping(spans: Iterable[tuple[str, int, int, _T]]) -> Iterator[list[_T]]
 
 
 def _check(group: list[Located]) -> None:
-    """Raise SourceError for variables of a group that can't be one memory, at the later one."""
+    """Raise SourceError for variables of a group that can't share memory, at the later declaration."""
     one = group[0]
     for other in group:
         alike = other.extent == one.extent and other.member.type == one.member.type
@@ -229,7 +229,7 @@ class Memory:
 
 
 class Cell:
-    """A descriptor: a variable that lies in shared memory."""
+    """Descriptor of a variable in shared memory."""
 
     def __init__(self, memory: Memory, group: int, offset: int, bit: int | None, letter: str) -> None:
         self.memory, self.group, self._offset, self._bit = memory, group, offset, bit
@@ -255,6 +255,6 @@ class Cell:
 
 
 def identity(owner: Any, slot: str) -> tuple[int, str]:
-    """Return what tells a variable of an instance from others: those that share memory are one."""
+    """Return an identity for a variable of an instance; variables that share memory have the same one."""
     cell = getattr(type(owner), slot, None)
     return (id(cell.memory), str(cell.group)) if isinstance(cell, Cell) else (id(owner), slot)

@@ -127,7 +127,7 @@ def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], address
 
 @dataclass(frozen=True)
 class Candidate:
-    """A variable that may be a tag, by its whole name. group: of the located variables that share memory with it."""
+    """A variable that may be a tag, by its full name. group: number of the memory that it shares; None: not shared."""
 
     name: str
     member: Member
@@ -181,7 +181,7 @@ def _require_one_tag(file: str, bound: list[Bound], groups: Mapping[str, int]) -
 
 
 def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[Bound]) -> None:
-    """Raise StructuredTextError for variables of %I or %Q that share memory in a PLC, but not without a Modbus map."""
+    """Raise StructuredTextError for variables of %I or %Q that a PLC would overlap. Used without a Modbus map."""
     tagged = {one.variable for one in bound}
     spans = []
     for one in candidates:

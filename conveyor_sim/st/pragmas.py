@@ -1,9 +1,9 @@
-"""Conditional pragmas: one branch of {IF ...} remains of a text, at its place, before anything else reads it.
+"""Conditional pragmas: selects one branch of each {IF ...} before anything else reads the text.
 
-As CODESYS ("Conditional Pragmas") and TwinCAT have them, of which these are supported: {define name},
-{define name 'text'}, {undefine name}, {IF}, {ELSIF}, {ELSE}, {END_IF}; in conditions defined (name),
-hasvalue (name, 'text'), NOT, AND, OR and parentheses. {error 'text'} in a branch that remains is an error. Conditional
-pragmas may stand anywhere between words, in declarations too, and within each other.
+Supported pragmas of CODESYS ("Conditional Pragmas") and TwinCAT: {define name}, {define name 'text'}, {undefine name},
+{IF}, {ELSIF}, {ELSE}, {END_IF}. Supported in conditions: defined (name), hasvalue (name, 'text'), NOT, AND, OR and
+parentheses. {error 'text'} in a selected branch is an error. Conditional pragmas may stand anywhere between words, in
+declarations too, and within each other.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ _UNITS = ("PROGRAM", "FUNCTION", "FUNCTION_BLOCK")
 
 @dataclass
 class _If:
-    """An {IF ...} that is open. taken: a branch of it was taken; remains: the present branch does."""
+    """An open {IF ...}. taken: one of its branches was selected. remains: the present branch is selected."""
 
     at: int
     outside: bool
-    """The text around it remains."""
+    """True if the text around it is selected."""
     taken: bool
     remains: bool
     otherwise: bool = False
-    """Its {ELSE} has come."""
+    """True after its {ELSE}."""
 
 
 def selected(text: str) -> str:
@@ -62,7 +62,7 @@ class _Reader:
         self.defined: dict[str, str] = {}
         """Text by name, "" without one; names as they are written."""
         self._before: dict[str, str] | None = None
-        """Within a unit: what was defined outside, which holds again at the unit's end."""
+        """Within a unit: definitions outside of it, which hold again at its end."""
         self._configured = False
         self._open: list[_If] = []
         self._left_out: list[tuple[int, int]] = []
@@ -107,7 +107,7 @@ class _Reader:
         return "".join([*pieces, self._text[place:]])
 
     def _word(self, start: int, name: str) -> None:
-        """A word of a part that remains: units have definitions of their own, and texts do not replace names."""
+        """Take a word of a selected part in: each unit has its own definitions, and texts do not replace names."""
         upper = name.upper()
         if upper in ("CONFIGURATION", "END_CONFIGURATION"):
             self._configured = upper == "CONFIGURATION"
@@ -187,7 +187,7 @@ class _Condition:
         self._depth = 0
 
     def whole(self) -> bool:
-        """Return the value. Raise SourceError for what is not supported."""
+        """Return the value. Raise SourceError for a condition that is not supported."""
         value = self._any()
         if self._place < len(self._tokens):
             self._unexpected()

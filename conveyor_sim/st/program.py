@@ -83,7 +83,7 @@ class Program:
         raise Fault(f"watchdog: found more than {self.budget} statements in one scan, expected fewer")
 
     def _copied_large(self, value: Any, count: int) -> Any:
-        """Return an array or a structure as a value of its own. count: statements that the copy counts as."""
+        """Return a copy of an array or a structure. count: statements that the copy counts as."""
         self._spend(count)
         return copied(value)
 

@@ -36,20 +36,20 @@ TAKES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "PROGRAM": _IN_A_UNIT_WITH_MEMORY,
     OUTSIDE: {"VAR_GLOBAL": _VAR},
 }
-"""By kind of unit and section: the qualifiers that it takes. A section or qualifier that is not listed is refused."""
+"""Qualifiers by kind of unit and section. A section or qualifier that is not listed is refused."""
 
 LOCATED: Mapping[str, tuple[str, ...]] = {"PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT"), OUTSIDE: ("VAR_GLOBAL",)}
-"""By kind of unit: the sections whose variables may have an address (AT) or a tag, without CONSTANT."""
+"""Sections whose variables may have an address (AT) or a tag, without CONSTANT, by kind of unit."""
 
 _PAIRS = ({"RETAIN", "PERSISTENT"},)
 """Qualifiers that go together."""
 
 
 def meaning(section: tree.Variables, unit: str) -> tuple[str, ...]:
-    """Qualifiers that apply to the variables of a section in a kind of unit.
+    """Return the qualifiers that apply to the variables of a section in a kind of unit.
 
-    PERSISTENT is RETAIN. CONSTANT of an input only says that the unit does not write it, which no unit does: the
-    caller's value counts. Raise SourceError for a section or qualifier that the unit does not take.
+    PERSISTENT is RETAIN. CONSTANT of an input has no effect, because no unit writes its inputs: the caller's value
+    counts. Raise SourceError for a section or qualifier that the unit does not take.
     """
     allowed = TAKES[unit]
     name, given = section.section, section.qualifiers

@@ -69,7 +69,7 @@ class Statements:
         self._loops = 0
         self._names = 0
         self._counter: int | None = None
-        """Line that counts the statements that follow it, as many as are sure to be executed after it."""
+        """Line that counts the statements after it that are certainly executed."""
         self._counted = 0
         self._jumps = 0
 
@@ -83,7 +83,7 @@ class Statements:
             for statement in body:
                 jumps = self._jumps
                 self._statement(statement)
-                if self._jumps != jumps:  # what follows it may not be reached
+                if self._jumps != jumps:  # the statements after it may not be reached
                     self._counter = None
             if not (body or count):
                 self._lines.add("pass")
@@ -98,7 +98,7 @@ class Statements:
         self._lines.change(self._counter, f"_rt.left -= {self._counted}")
 
     def _count_expressions(self, at: Position) -> None:
-        """Take what the expressions since the last count amount to, beyond the statement that they belong to."""
+        """Count the expressions since the last count, beyond the statement that they belong to."""
         self._count(statements(self._expressions.take_work()), at)
 
     def _statement(self, node: tree.Statement) -> None:
@@ -162,7 +162,7 @@ class Statements:
         self._otherwise(node, "else:", statements(work))
 
     def _otherwise(self, node: tree.If | tree.Case, word: str, count: int) -> None:
-        """Write an ELSE. count: statements that the conditions before it count as, which it takes if there is none."""
+        """Write an ELSE. count: statements for the conditions before it, which need a branch even without an ELSE."""
         if node.otherwise or count:
             self._lines.add(word)
             self.block(node.otherwise, node.at, count)

@@ -63,7 +63,7 @@ class Type:
 
     @property
     def work(self) -> int:
-        """Work of making or copying a value, beyond that of the statement that does it."""
+        """Work of making or copying a value, beyond the statement itself."""
         return 0
 
     @property

@@ -145,7 +145,7 @@ def within(value: Value, kind: Type) -> bool:
 
 
 def operand(value: Value, kind: Type) -> str:
-    """Return code of an operand in the type that the operands share, integers at the width of `register`."""
+    """Return the code of an operand in the common type of all operands; integers have the width of `register`."""
     if kind.kind != "int" or value.literal:
         return converted(value, kind)
     wide = register(kind)

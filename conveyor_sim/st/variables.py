@@ -116,10 +116,9 @@ def load(value: Any, data: Any) -> Any:
 
 
 def retain(kind: Type, old: Any, new: Any, inherited: bool = False) -> None:
-    """Carry RETAIN variables from one value of a type to another, those of blocks within it too.
+    """Copy RETAIN variables from one value of a type to another, including blocks within it.
 
-    inherited: the instance itself is RETAIN, so all its variables are except those of NON_RETAIN (IEC 61131-3:2013,
-    6.5.6.2).
+    inherited: the instance itself is RETAIN, so all its variables are, except NON_RETAIN (IEC 61131-3:2013, 6.5.6.2).
     """
     if isinstance(kind, Array):
         if isinstance(_innermost(kind), Structure):

@@ -1,8 +1,8 @@
-"""The work of a scan: what its statements count, so that the watchdog's budget does not depend on the machine.
+"""The work of a scan, counted in statements, so that the watchdog's budget does not depend on the machine.
 
-An executed statement, a round of a loop and a call of a function count 1 each. Operands and operators are counted in
-sixteenths, and only whole statements of them count. The weights below are chosen so that what counts 1 takes
-about a microsecond at most.
+An executed statement, a round of a loop and a call of a function count 1 each. Operands and operators count a
+sixteenth each, rounded down for each statement. The weights below are chosen so that work of 1 takes about a
+microsecond at most.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ _TEXTS = {"real": 48, "time": 8, "enum": 4}
 """Work of writing a value as a text; others count as a call of a standard function."""
 
 MANY, MANY_SEARCHED = 4096, 256
-"""Characters that a function of texts handles for one statement. If the texts are declared longer in all, the lengths
-that they have in a scan count; FIND has a limit of its own."""
+"""Characters that a function of texts handles for one statement; the second number is for FIND. If the declared lengths
+are longer in all, the present lengths count.
+"""
 
 _PLACES, _COMPARISONS, _LONGEST = 1000, 5000, 500
 """Places that FIND looks at for one statement, and comparisons that it makes; at most _LONGEST at each place."""

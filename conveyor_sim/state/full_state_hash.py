@@ -1,6 +1,6 @@
-"""One number for all that decides how a run goes on: what a checkpoint holds, less what only looks on.
+"""One number for everything that decides how a run continues: the content of a checkpoint without observers.
 
-The list is the checkpoint's own (`changing_arrays`, and the memory beside them), so what is new is covered unless it is
+The list is that of the checkpoint (`changing_arrays` and the memory beside them), so new state is covered unless it is
 named here. `test/state/test_full_state_hash.py` changes each of its parts.
 """
 
@@ -23,11 +23,11 @@ SCRATCH: Mapping[str, str] = {
     "linear.": "of one step of the linearly implicit method",
     "riding.": "of one call of an integrator",
 }
-"""Beginnings of names of arrays that are written before they are read, with what they hold."""
+"""Prefixes of the names of arrays that are written before they are read, with their content."""
 
 OBSERVERS: Mapping[str, str] = {
     "peaks.": "largest forces since the last output; only outputs read them",
-    "ledger.": "books of energy; only outputs read them",
+    "ledger.": "energy ledger; only outputs read it",
     "damage.scuffing.bins.": "loads on rails; only outputs read them",
     "damage.crushing.": "largest loads in this tick, which begins at zero, and since the last output",
     "damage.impacts.speed.": "likewise",
@@ -38,13 +38,13 @@ OBSERVERS: Mapping[str, str] = {
     "damage.tipping.fy": "of one step",
     "damage.tipping.moment": "of one step",
 }
-"""Beginnings of names of arrays that nothing but outputs reads."""
+"""Prefixes of the names of arrays that only outputs read."""
 
 LIMITED: Mapping[str, str] = {"damage.": "loads on bottles; only limits of the scene make events and alarms of them"}
-"""Likewise in a scene without a limit of a load."""
+"""Prefixes of the names of arrays that only outputs read in a scene without limits of loads."""
 
 MEMORY: Mapping[tuple[str, ...], str] = {
-    ("account",): "books of energy",
+    ("account",): "energy ledger",
     ("damage", "events"): "waits until it is taken",
     ("clogging", "events"): "waits until it is taken",
     ("integration", "events"): "waits until it is taken",
@@ -56,16 +56,15 @@ MEMORY: Mapping[tuple[str, ...], str] = {
 
 
 def full_state_hash(memory: Mapping[str, Any], arrays: Arrays, limits: Limits) -> int:
-    """64 bits over memory and arrays as a checkpoint holds them: equal (all but surely) only if futures are.
+    """Return 64 bits over memory and arrays as a checkpoint holds them. Equal hashes mean equal futures, almost surely.
 
-    Covered: tick, ids, bottles and their slots, bottles that machines hold, tangential springs with those kept for the
-    next rebuild, contact laws by pair, neighbour lists, moving rails with their drives, what limits of loads are judged
-    by, and the line: devices, random streams, commands that wait, modes, forces, alarms, counters, log. Left out:
-    SCRATCH, OBSERVERS, MEMORY, LIMITED where `limits` has none of a load, and arrays that the scene gives for good
-    (FIXED).
+    Covered of motion: tick, ids, slots, bottles (also in machines), tangential springs (also stored ones), contact laws
+    by pair, neighbour lists, moving rails with their drives, loads that have a limit.
+    Covered of the line: devices, random streams, waiting commands, modes, forces, alarms, counters, log.
+    Left out: SCRATCH, OBSERVERS, MEMORY, FIXED (arrays that the scene sets once), and LIMITED without limits of loads.
 
-    Futures are those of the same scene, version and commands. A controller's memory is no part of a Simulation. Equal
-    futures may have unequal hashes: lists are hashed with their unused room.
+    A future belongs to one scene, version and sequence of commands. The memory of a controller is not part of a
+    Simulation. Equal futures may have unequal hashes, because lists are hashed with their unused room.
 
     Cost: 0.2 to 0.3 ms for 9 to 95 bottles, most of it JSON of the line's memory (docs/performance.md).
     """
@@ -81,7 +80,7 @@ def full_state_hash(memory: Mapping[str, Any], arrays: Arrays, limits: Limits) -
 
 
 def _memory(memory: Mapping[str, Any], decides: bool) -> str:
-    """The memory without MEMORY as JSON; the loads of held bottles stay where a limit is judged by them."""
+    """Return the memory without MEMORY as JSON. The loads of held bottles stay if a limit depends on them."""
     kept: dict[str, Any] = dict(memory)
     for path in MEMORY:
         if len(path) == 1:

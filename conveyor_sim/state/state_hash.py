@@ -1,4 +1,4 @@
-"""One number for what is seen of a state at a tick."""
+"""One number for the visible part of a state at a tick."""
 
 import hashlib
 from collections.abc import Iterable
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from conveyor_sim.state.state import State
 
 COLUMNS = ("id", "type", "x", "y", "theta", "vx", "vy", "omega")
-"""Of the bottles on the line, by id."""
+"""Columns of the bottles on the line, ordered by id."""
 
 
 def state_hash(tick: int, columns: Iterable[NDArray[Any]], state: State) -> int:
-    """64 bits over a tick, columns, tangential springs that are not slack, and the places and speeds of moving rails.
+    """Return 64 bits over a tick, columns, tangential springs that are not slack, and positions and speeds of rails.
 
-    A Simulation gives COLUMNS, and setpoints and speeds of belts. Recordings hold this hash, so it stays as it is. It
-    does not cover what else decides the next ticks: memories of devices and random streams, commands that wait, bottles
-    that machines hold, the next id, neighbour lists, contact laws, courses and drives of moving rails, histories of
-    impacts. `full_state_hash` does.
+    A Simulation passes COLUMNS, and setpoints and speeds of belts. Recordings hold this hash, so its definition stays.
+    Other state also decides the next ticks, and only `full_state_hash` covers it: memories of devices and random
+    streams, waiting commands, bottles that machines hold, the next id, neighbour lists and contact laws. The same holds
+    for motion profiles and drives of moving rails, and for histories of impacts.
     """
     digest = hashlib.blake2b(np.int64(tick).tobytes(), digest_size=8)
     for column in columns:

@@ -49,9 +49,9 @@ class Journal(AbstractContextManager["Journal"]):
     """The finished runs of one study, by their keys. One process at a time writes it."""
 
     def __init__(self, folder: Path, setup: Setup, say: Callable[[str], object] = lambda _: None) -> None:
-        """Read what is there. The folder is made. A file that is damaged, or of another study, is set aside and named.
+        """Read the folder, or make it. A file that is damaged, or of another study, is set aside and named.
 
-        say: called with each sentence on such a file. Raises StudyError if the runs are of another study or version,
+        say: called with one sentence for each such file. Raises StudyError if the runs are of another study or version,
         another process works on the folder, or it can't be written.
         """
         self.folder = folder
@@ -59,7 +59,7 @@ class Journal(AbstractContextManager["Journal"]):
         self.warm_up: float | None = None
         """s, as pilot runs have found it; None: they have not yet, or need not."""
         self.rows: dict[tuple[int, int], Row] = {}
-        """Those that were there, and those added since."""
+        """Finished runs, including runs added since the start."""
         try:
             (folder / RUNS).mkdir(parents=True, exist_ok=True)
             self._lock = open(folder / ".lock", "ab")  # noqa: SIM115 (closed by __exit__)
@@ -186,7 +186,7 @@ class Journal(AbstractContextManager["Journal"]):
             ) from None
 
     def _write_origin(self) -> None:
-        """Write what the runs are made with, and the study as it is now: its FREE fields may have changed."""
+        """Write the origin of the runs, and the present text of the study, because its FREE fields may have changed."""
         origin = Origin(origin_of(self._setup), self.warm_up, self._setup.source, True)
         file = self.folder / ORIGIN
         with suppress(FileError):
@@ -195,7 +195,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._write(Path(ORIGIN), origin.content())
 
     def _own(self, file: Path, finite: bool = True) -> dict[str, Any]:
-        """Return the content of a file that was made with what this study is made with. Raises FileError."""
+        """Return the content of a file with the same origin as this study. Raises FileError."""
         kept = read_study_json(file, finite)
         made = kept.data.pop(MADE_WITH, None)
         if not kept.sealed or not isinstance(made, dict):
@@ -205,7 +205,7 @@ class Journal(AbstractContextManager["Journal"]):
         return kept.data
 
     def _set_aside(self, file: Path, reason: str) -> None:
-        """Rename a file that can't be used, if it is there, so that nothing is lost when it is made again."""
+        """Rename an unusable file, if it exists, so that nothing is lost when it is made again."""
         if not file.is_symlink() and not file.exists():
             return
         names = (file.with_name(f"{file.name}{ASIDE}{number or ''}") for number in range(10_000))
@@ -218,7 +218,7 @@ class Journal(AbstractContextManager["Journal"]):
             self._say(f"{file.parent}: more such files are kept as *{ASIDE} and made again")
 
     def _read(self) -> None:
-        """Read the origin and the runs. Set aside what can't be used."""
+        """Read the origin and the runs. Set unusable files aside."""
         origin, wanted = self.folder / ORIGIN, origin_of(self._setup)
         if (self.folder / ACCURACY).exists():
             raise StudyError(f"{self.folder}: has a study of conveyor-sim accuracy, expected another folder")
@@ -296,7 +296,7 @@ _Runs = list[tuple[Path, "tuple[Row, Kept] | FileError"]]
 
 
 def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, Kept] | FileError]]:
-    """Files of runs, each with its content or why it can't be used. Raises OSError."""
+    """Yield the files of runs, each with its content or the reason why it is unusable. Raises OSError."""
     for file in run_files(folder):
         try:
             yield file, read_row(folder, file)
@@ -305,9 +305,9 @@ def _runs_in(folder: Path) -> Iterator[tuple[Path, tuple[Row, Kept] | FileError]
 
 
 def read_rows(folder: Path, origin: Origin | None = None) -> list[Row]:
-    """The finished runs in a folder, in the order of their keys. origin: what its `study.json` says; None: it is read.
+    """Return the finished runs in a folder, in the order of their keys. origin: of the folder; None: it is read.
 
-    Raises StudyError for what is no such folder, and for a run that is damaged or of another study.
+    Raises StudyError for a folder without a study, and for a run that is damaged or of another study.
     """
     rows = []
     try:
@@ -328,7 +328,7 @@ def read_rows(folder: Path, origin: Origin | None = None) -> list[Row]:
 
 
 def unusable(file: Path, reason: object) -> StudyError:
-    """The error for a file about a study that is missing, damaged or of another study."""
+    """Return the error for a file about a study that is missing, damaged or of another study."""
     return StudyError(
         f"{file}: {reason}, expected what conveyor-sim sweep or optimise has written; the same command writes it again"
     )

@@ -1,4 +1,4 @@
-"""What the runs of a folder were made with: `study.json`, and the same fields in each file of a run."""
+"""Origin of the runs of a folder: `study.json`, and the same fields in each file of a run."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Origin:
     """Content of a `study.json`."""
 
     fields: Mapping[str, str]
-    """By name, hashes of what decides a run beside its parameters and seed."""
+    """Hashes of the inputs that decide a run beside its parameters and seed, by name."""
     warm_up: float | None
     """s; None: not found yet, or not needed."""
     text: str | None
-    """Of the study's file; None in files of older versions."""
+    """Text of the study's file; None in files of older versions."""
     sealed: bool
     """False in files of older versions, which have no checksum."""
 
@@ -50,7 +50,7 @@ class Origin:
 
 
 def origin_of(setup: Setup) -> dict[str, str]:
-    """Return what decides a run beside its parameters and seed, by name."""
+    """Return hashes of the inputs that decide a run beside its parameters and seed, by name."""
     return {
         "study": _hash(json.dumps(deciding(setup.study), sort_keys=True)),
         "scene": _hash(setup.text, setup.overrides),
@@ -71,7 +71,7 @@ def fingerprint(setup: Setup) -> str:
 
 
 def read_origin(folder: Path) -> Origin:
-    """Return what a folder's `study.json` says. Raises FileError, and StudyError for an intact file of another kind."""
+    """Return the content of a folder's `study.json`. Raises FileError; StudyError for a file of another kind."""
     kept = read_study_json(folder / ORIGIN)
     data = dict(kept.data)
     warm_up, text = data.pop(WARM_UP, None), data.pop(TEXT, None)

@@ -115,7 +115,7 @@ def read_results(path: Path) -> Results:
 
 
 def _fitting(results: Results) -> Results:
-    """The results. Raises ValueError or SceneError if its parts are not of one study."""
+    """Return the results. Raises ValueError or SceneError if its parts are not of one study."""
     if not isinstance(parse_overrides(results.study), dict) or not results.name:
         raise ValueError("no study")
     _ = results.until
@@ -222,13 +222,13 @@ _PARQUET = TypeAdapter(dict[str, str | float | dict[str, str] | None])
 
 
 def _digest(about: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
-    """A checksum over all that is read of a Parquet file."""
+    """Return a checksum over all data that are read from a Parquet file."""
     text = json.dumps([dict(about), [list(row.items()) for row in rows]])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _row(values: Mapping[str, Any], about: Mapping[str, Any]) -> Row:
-    """The run of a line. Raises ValueError or KeyError for values of other types."""
+    """Return the run of one table row. Raises ValueError or KeyError for values of other types."""
     kept = ("point", "seed", "status", "error", *FIXED_UNITS, "bag")
     finished = values["status"] == "finished"
     halves = {name: values[name + HALF_WIDTH] for name in about["units"] if name + HALF_WIDTH in values}

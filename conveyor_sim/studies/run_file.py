@@ -1,4 +1,4 @@
-"""The file of one finished run: its row, what it was made with, and a checksum."""
+"""The file of one finished run: its row, its origin, and a checksum."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from conveyor_sim.support.sealed_json import Kept, sealed
 
 RUNS = "runs"
 MADE_WITH = "made_with"
-"""Field that has what `study.json` has, but for the text of the study."""
+"""Field with the content of `study.json` without the text of the study."""
 
 _Seconds = Annotated[FiniteFloat, Field(ge=0.0)]
 
@@ -51,7 +51,7 @@ def content_of(row: Row, made_with: Mapping[str, Any]) -> bytes:
 
 
 def made_with(fields: Mapping[str, str], warm_up: float | None) -> dict[str, Any]:
-    """Return what a file says that it was made with."""
+    """Return the field MADE_WITH of a file."""
     return {**fields, **({} if warm_up is None else {WARM_UP: warm_up})}
 
 
@@ -77,7 +77,7 @@ def read_row(folder: Path, file: Path) -> tuple[Row, Kept]:
     if file.relative_to(folder).as_posix() != name_of(row):
         raise FileError(f"holds the run of point {row.point} with seed {row.seed}")
     if row.status == "finished" and row.metrics.keys() != row.asked.keys():
-        raise FileError("has other metrics than it was asked for")
+        raise FileError("has other metrics than the study requested")
     return row, kept
 
 
@@ -92,11 +92,11 @@ def objection(row: Row, kept: Kept, origin: Origin) -> str:
     other = [what for what, value in origin.fields.items() if fields.get(what) != value]
     if other or fields.keys() != origin.fields.keys():
         return f"was made with another {' and another '.join(other) or 'version'}"
-    if row.status == "finished" and warm_up != origin.warm_up:  # others may have failed before it was found
+    if row.status == "finished" and warm_up != origin.warm_up:  # other runs may have failed before it was known
         return "was made with another warm-up"
     return ""
 
 
 def run_files(folder: Path) -> list[Path]:
-    """Return the files of runs in a folder, ordered by name, but for unfinished ones. Raises OSError."""
+    """Return the files of finished runs in a folder, ordered by name. Raises OSError."""
     return sorted(file for file in (folder / RUNS).iterdir() if file.suffix == ".json")

@@ -1,4 +1,4 @@
-"""The file of units: those of metrics and parameters, what each metric is, and the path of the study."""
+"""The file of units: units of metrics and parameters, definitions of metrics, and the path of the study."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Units(BaseModel, strict=True, extra="forbid"):
     """Content of the file."""
 
     path: str
-    """Of the study's file, as it was run."""
+    """Path of the study's file when it was run."""
     asked: dict[str, str]
-    """What each metric is."""
+    """Definitions of the metrics."""
     units: dict[str, str]
-    """By metric."""
+    """Units of the metrics."""
     parameters: dict[str, str]
-    """Units of parameters, "" where there is none."""
+    """Units of the parameters; "": without a unit."""
 
 
 def read_units(file: Path, fields: Mapping[str, str], sealed: bool) -> Units:

@@ -25,7 +25,7 @@ _KINDS = {
 
 
 Objection = Callable[[BinaryIO], str]
-"""Reads a file from its beginning. Returns why it may not be replaced, in words that follow its path; "" if it may."""
+"""Check of an open file. Returns why it may not be replaced, in words that follow its path; "" if it may."""
 
 
 class FileError(Exception):

@@ -15,10 +15,9 @@ def single(value: float) -> float:
 
 
 def at_limit(value: float, low: float, high: float, rounded: Callable[[float], float] = single) -> float:
-    """Return the limit that a value means: the one that the sender rounds to this very value; else the value.
+    """Return the limit that the sender's type rounds to this value; else the value itself.
 
-    low, high: the limits, in any unit, which is also that of the value. rounded: the number that the sender's type or
-    scale has for a limit.
+    value, low, high: in the same unit. rounded: returns the number that the sender's type or scale has for a limit.
     """
     if value in (low, high) or not math.isfinite(value):
         return value

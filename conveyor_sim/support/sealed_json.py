@@ -22,9 +22,9 @@ MOST = 64 * MB
 DEEPEST = 32
 """Lists and mappings inside each other that are read."""
 _HALF = re.compile(r"[\ud800-\udc7f\udd00-\udfff]")
-"""Surrogates but for those by which Python holds bytes of paths that are no UTF-8."""
+"""Surrogates, except the ones in which Python stores bytes of paths that are not UTF-8."""
 LARGEST = 10**300
-"""Of whole numbers that are read: all of them are floats, too."""
+"""Largest whole number that is read, so that each of them fits a float."""
 
 _BEFORE, _DIGITS, _AFTER = f'"{SEAL}": "'.encode(), 64, b'"}\n'
 
@@ -34,7 +34,7 @@ class Kept:
     """Content of a file."""
 
     data: dict[str, Any]
-    """Without the checksum."""
+    """Fields without the checksum."""
     sealed: bool
     """True if a checksum was there and is right; False if there is none."""
 
@@ -49,8 +49,8 @@ def sealed(data: Mapping[str, Any], indent: int | None = None) -> bytes:
 def read_sealed(path: Path, most: int = MOST, finite: bool = True) -> Kept:
     """Return the content of a file of at most `most` bytes.
 
-    finite: refuse numbers that are not. Raises FileError, in words that follow the path, for a file that can't be
-    read, is no JSON, repeats a field, is nested more than DEEPEST levels deep or does not fit its checksum.
+    finite: refuse NaN and infinite numbers. Raises FileError, in words that follow the path, for a file that can't be
+    read or is no JSON. The same holds for repeated fields, more than DEEPEST levels, and a wrong checksum.
     """
     content = read_file(path, most)
     place = len(content) - len(_AFTER) - _DIGITS
@@ -103,7 +103,7 @@ def _constant(finite: bool) -> Any:
 
 
 def _check(data: Any, finite: bool) -> None:
-    """Raise FileError for what `json` accepts beyond the promise."""
+    """Raise FileError for content that `json` accepts and `read_sealed` excludes."""
     todo = [(data, 0)]
     while todo:
         value, depth = todo.pop()

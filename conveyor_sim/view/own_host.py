@@ -9,7 +9,7 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 DEFAULT_PORTS = {"http": 80, "https": 443}
-"""By scheme; browsers leave them out."""
+"""Default ports by scheme, which browsers omit."""
 
 OWN_NAMES = ("127.0.0.1", "localhost", "[::1]")
 """Names of this machine, for itself."""
@@ -19,15 +19,15 @@ _LONGEST = 300
 
 
 class Authority(NamedTuple):
-    """Name and port of a server, in one form for all that mean the same."""
+    """Name and port of a server in canonical form."""
 
     name: str
-    """In small letters, without a dot at the end; an address of IPv6 in brackets, in its shortest form."""
+    """Lower case, without a final dot; an IPv6 address is in brackets, in its shortest form."""
     port: int
 
 
 def authority(text: str, scheme: str) -> Authority | None:
-    """Return what a Host header names; None if it is none. A port that is left out is that of the scheme."""
+    """Return the server that a Host header names; None for an invalid one. A missing port is the scheme's default."""
     match = _AUTHORITY.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
         return None
@@ -43,15 +43,15 @@ def authority(text: str, scheme: str) -> Authority | None:
 def is_own(hosts: Sequence[str], scheme: str) -> bool:
     """Return True if a request asks for this machine. hosts: all its Host headers, of which there must be one.
 
-    The port may be any: a tunnel has another one than the server. A page of somebody else, whose name was made to lead
-    here, asks for that name.
+    Any port is accepted, because a tunnel has another one than the server. A foreign page whose DNS name leads here
+    (DNS rebinding) sends its own name.
     """
     found = authority(hosts[0], scheme) if len(hosts) == 1 else None
     return found is not None and found.name in OWN_NAMES
 
 
 def is_same_origin(origins: Sequence[str], hosts: Sequence[str], scheme: str) -> bool:
-    """Return True if a page of the very server that it asks sends a request. origins, hosts: headers, one each."""
+    """Return True if a request comes from a page of the same server. origins, hosts: headers, one each."""
     if len(origins) != 1 or len(hosts) != 1:
         return False
     try:

@@ -43,7 +43,7 @@ metadata and of chunks; summary offsets; bytes appended to records."""
 COMPRESS: dict[str, Callable[[bytes], bytes]] = {
     "": bytes, "lz4": lz4.frame.compress, "zstd": zstandard.compress, "xz": lzma.compress,
 }  # fmt: skip
-"""By name; the specification does not list xz."""
+"""Compressions by name; the specification does not list xz."""
 Item = Schema | Channel | Message | Attachment | Metadata
 
 
@@ -54,7 +54,7 @@ class Form:
     features: Collection[str]
     profile: str = ""
     compression: Callable[[], str] = lambda: ""
-    """Asked for each chunk."""
+    """Called once per chunk."""
     ends_chunk: Callable[[], bool] = lambda: False
     """Asked after each message."""
     appended: Callable[[int, bool], bytes] = lambda opcode, inside: b""

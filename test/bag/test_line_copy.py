@@ -24,7 +24,7 @@ HEAD = 9 + 32 + 4 + 8
 
 @pytest.fixture
 def folder(record_line: Make) -> Path:
-    """A recording of seven chunks: the line, then ten ticks each."""
+    """Return a recording of seven chunks: the line, then ten ticks each."""
     return record_line("bag", TICKS)
 
 

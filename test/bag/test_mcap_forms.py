@@ -96,7 +96,7 @@ def test_ros_messages_are_read_in_the_order_of_the_library_in_every_form(tmp_pat
 def test_unknown_records_appended_fields_and_foreign_channels_are_skipped(
     features: set[str], compression: str, tmp_path: Path
 ) -> None:
-    """In chunks as well as outside; each chunk holds one message."""
+    """They lie in chunks and outside of chunks; each chunk holds one message."""
     form = Form(
         features, compression=lambda: compression, ends_chunk=lambda: True, between=lambda: UNREADABLE,
         appended=lambda opcode, inside: b"later fields",
@@ -157,7 +157,7 @@ def test_contents_that_look_like_chunks_are_messages(cut: int, tmp_path: Path) -
 
 
 def test_a_damaged_name_of_a_compression_is_damage(tmp_path: Path) -> None:
-    """Also without an index and checksums."""
+    """This holds without an index and checksums, too."""
     form = Form({"ch"}, compression=lambda: "zstd", ends_chunk=lambda: True, data_crc=False)
     content = build(ROS_ITEMS, form).content
     file = tmp_path / "form.mcap"
@@ -218,7 +218,7 @@ def test_deletion_is_never_advised_where_records_lead_to_a_proper_end(tmp_path: 
 @pytest.mark.parametrize("opcode", [Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA])
 @pytest.mark.parametrize("bit", [0x10, 0x80])
 def test_a_record_that_a_flipped_bit_makes_unknown_is_damage(opcode: Opcode, bit: int, tmp_path: Path) -> None:
-    """Without a checksum over all data: the index states where the record is."""
+    """There is no checksum over all data, but the index states where the record is."""
     items: list[Item] = [ROS_SCHEMA, ROS_CHANNEL, *TEN, ATTACHMENT, Metadata(name="note", metadata={})]
     content = bytearray(build(items, Form(INDEXED, ends_chunk=lambda: True, data_crc=False)).content)
     position = 8

@@ -24,7 +24,7 @@ READ = ("replay", "events", "serve")
 
 
 def stock(bag: Path, folder: Path, plugin: StoragePlugin, mode: CompressionMode = CompressionMode.NONE) -> Path:
-    """A bag's messages in another storage."""
+    """Return a copy of a bag in another storage."""
     writer = Writer(folder, version=9, storage_plugin=plugin)
     if mode is not CompressionMode.NONE:
         writer.set_compression(mode, CompressionFormat.ZSTD)
@@ -60,7 +60,7 @@ def stored(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pat
 def test_the_storage_and_the_way_to_mcap_are_named(
     stored: dict[str, Path], bag: Path, tmp_path: Path, kind: str, named: tuple[str, ...]
 ) -> None:
-    """By `recover`, and by all others where they can't read the bag."""
+    """`recover` names them, and so does each command that can't read the bag."""
     folder = stored[kind]
     assert replay(folder).compared == replay(bag).compared
     alone = tmp_path / "alone"
@@ -89,7 +89,7 @@ def test_the_named_command_leads_to_a_bag_that_recover_completes(stored: dict[st
 
 
 def test_a_part_that_is_still_compressed_is_not_left_out_in_silence(stored: dict[str, Path], tmp_path: Path) -> None:
-    """As a recorder that compresses by file and is killed leaves its folder."""
+    """A recorder that compresses by file leaves such a folder when it is killed."""
     folder = tmp_path / "bag"
     shutil.copytree(stored["zstd"], folder)
     (packed,) = folder.glob("*.zstd")
@@ -116,7 +116,7 @@ def test_formats_are_known_by_how_files_begin(tmp_path: Path, name: str, content
     for command in (recover, open_bag):
         for path in (file, tmp_path):
             if path == tmp_path and file.suffix == ".mcap":
-                continue  # then metadata.yaml is what is missing first
+                continue  # then metadata.yaml is missing first
             with pytest.raises(BagError) as caught:
                 command(path)
             assert named in str(caught.value)

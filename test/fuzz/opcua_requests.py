@@ -51,7 +51,7 @@ SERVICES: tuple[type, ...] = tuple(
     for name in sorted(vars(ua))
     if name.endswith("Request") and "RequestHeader" in getattr(getattr(ua, name), "__annotations__", ())
 )
-"""All request types that the library knows, those that no server of this kind answers included."""
+"""All request types that the library knows, including types that no server of this kind answers."""
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Pool:
 
     nodes: Sequence[ua.NodeId]
     subscriptions: list[int] = field(default_factory=list)
-    """Of the attacker and of the victim."""
+    """Ids and tokens of the attacker and of the victim."""
     items: list[int] = field(default_factory=list)
     sequences: list[int] = field(default_factory=list)
     methods: Sequence[ua.NodeId] = ()
@@ -74,7 +74,7 @@ class Requests:
         self._rng, self._pool, self._longest = rng, pool, longest
 
     def draw(self, kind: type) -> Any:
-        """Return a request of a type; its header is that of the type's default."""
+        """Return a request of a type with the type's default header."""
         request = kind()
         for name, hint in _fields(kind):
             if name not in ("TypeId", "RequestHeader"):

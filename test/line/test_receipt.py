@@ -1,4 +1,4 @@
-"""What is refused as it is received is refused by the line in every state, and nothing of that kind is left to it."""
+"""Every input that is refused on receipt is refused by the line in every state, and all such inputs are refused."""
 
 from __future__ import annotations
 

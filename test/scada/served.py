@@ -63,7 +63,7 @@ class Served:
         return pid
 
     def server(self, protocol: str) -> int:
-        """The process of a protocol server."""
+        """Return the process of a protocol server."""
         (pid,) = (pid for pid, command in self.children.items() if command.split("\0")[-2] == protocol)
         return pid
 

@@ -1,4 +1,4 @@
-"""Protocol servers in processes of their own: one stalls or is killed, and the line and the others go on."""
+"""Protocol servers in separate processes: one stalls or is killed, and the line and the others go on."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Line(Served):
         return f"http://127.0.0.1:{self.ports['http']}"
 
     def modbus(self, machine: str = "127.0.0.1") -> ModbusTcpClient:
-        """A client on one of the addresses of this machine; it connects again by itself."""
+        """Connect a client from one of the addresses of this machine; it reconnects by itself."""
         return ModbusTcpClient(
             "127.0.0.1", port=self.ports["modbus"], timeout=2, retries=0, source_address=(machine, 0)
         )
@@ -75,7 +75,7 @@ class Line(Served):
         return client
 
     def lets_in(self, user: str, password: str = PASSWORD) -> bool:
-        """By OPC UA."""
+        """Return True if OPC UA accepts a password."""
         try:
             self.opcua(user, password).disconnect()
         except UaStatusCodeError:
@@ -83,7 +83,7 @@ class Line(Served):
         return True
 
     def signs_in(self, user: str, password: str = PASSWORD) -> bool:
-        """On the page."""
+        """Return True if the page accepts a password."""
 
         async def work() -> bool:
             async with ClientSession() as session, session.ws_connect(f"{self.page}/live", origin=self.page) as page:
@@ -96,7 +96,7 @@ class Line(Served):
         return asyncio.run(work())
 
     def health(self) -> dict[str, dict[str, Any]]:
-        """Of the protocol servers by name, as the page is told; empty before it has been."""
+        """Return the health of the protocol servers by name, as the page gets it; empty before that."""
 
         async def work() -> dict[str, dict[str, Any]]:
             async with ClientSession() as session, session.ws_connect(f"{self.page}/live", origin=self.page) as page:
@@ -117,7 +117,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
 
 
 def speed_of(client: ModbusTcpClient) -> float | None:
-    """What a client reads of the first belt; None: nothing."""
+    """Return the speed of the first belt as a client reads it; None without an answer."""
     try:
         answer = client.read_input_registers(0, count=2)
     except Exception:
@@ -225,7 +225,7 @@ def test_wrong_passwords_count_for_all_servers_and_through_a_restart(line: Line)
 
 
 def test_ctrl_c_ends_it_in_order_though_a_server_is_stalled(line: Line) -> None:
-    """Last of those that share the line: what was commanded is on record, and counted through restarts."""
+    """It runs last on the shared line: commands are on record, and counted across restarts."""
     os.kill(line.server("opcua"), signal.SIGSTOP)
     children = line.children
     out = line.end()
@@ -245,7 +245,7 @@ def test_ctrl_c_ends_it_in_order_though_a_server_is_stalled(line: Line) -> None:
 
 
 def test_nothing_is_left_of_a_parent_that_is_killed(command: Callable[..., Served]) -> None:
-    """Not even of a server that is stopped, and can do nothing about it."""
+    """Even a stopped server ends, which can't react itself."""
     served = command(SCENE, "--modbus", "0", "--web", "0", "--no-record")
     until(lambda: served.told.count("clients can") == 2, "the servers")
     children = served.children

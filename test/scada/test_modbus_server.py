@@ -165,7 +165,7 @@ def test_connections_are_bounded_and_come_free_again(line: Line) -> None:
     most = QUOTA.connections_per_address
     assert line.read(SPEED) == line.read(SPEED)
     many = [socket.create_connection(address, timeout=60) for _ in range(most - 1 + 8)]
-    for one in many[:8]:  # they have not asked for anything, and make room
+    for one in many[:8]:  # they have sent no request, and make room
         one.settimeout(20)
         assert one.recv(1) == b""
     assert line.server.status().clients == most

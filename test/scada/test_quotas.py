@@ -1,4 +1,4 @@
-"""Places of connections: who makes room for whom."""
+"""Places of connections, and the order in which connections make room."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_who_has_got_least_far_makes_room_first_and_the_idle_before_the_active()
     first.touch(OPENED)
     second.touch(GREETED)
     expected = [*places[2:], second, first]
-    third.touch()  # the last of those that were not greeted
+    third.touch()  # the last one without a greeting
     expected.remove(third)
     expected.insert(9, third)
     for _ in range(12):

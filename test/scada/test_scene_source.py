@@ -123,7 +123,7 @@ def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneSource)
 
 
 def mirror(source: SceneSource, pipe: Connection) -> RemoteSource:
-    """What the process of a protocol server has of it."""
+    """Return the line as the process of a protocol server mirrors it."""
     task = ServerTask("modbus", 0, Settings(), source.controls, True, False, None, (0, 0))
     return RemoteSource(task, Calls(pipe), decoded, None)
 

@@ -22,7 +22,7 @@ WORK = ("get_close_matches", "_sentence")
 
 
 def refusal(text: str) -> tuple[list[str], Counter[str]]:
-    """Return the lines of a refusal, and how often the functions of WORK were called for it."""
+    """Return the lines of a refusal, and the number of calls of each function of WORK."""
     calls: Counter[str] = Counter()
 
     def note(frame: FrameType, event: str, argument: object) -> None:
@@ -96,7 +96,7 @@ def test_missing_pairs_of_materials_are_not_all_counted() -> None:
 
 
 def test_a_text_of_digits_without_end_is_no_angle() -> None:
-    """Without a bound on its length this takes an hour."""
+    """It would take an hour without a bound on its length."""
     lines, _ = refusal(GOOD.replace("angle: 0 deg", f'angle: "{"1" * 1_000_000}x"', 1))
     assert len(lines) == 1 and "belts.feeder.angle" in lines[0] and "expected an angle" in lines[0]
 

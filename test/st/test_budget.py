@@ -24,7 +24,7 @@ n, m, i : INT; x : BOOL; t : TON; k : b; v, w : ARRAY [1..16000] OF INT; p, q : 
 l, o : STRING[32767]; s : STRING;
 """
 LONG = "l := 'ab'; FOR i := 1 TO 15 DO l := CONCAT(l, l); END_FOR "
-GROWN = 2 + 15 * 8 + 30  # each CONCAT of so long a text counts 7, and 30 are for the characters of the last five
+GROWN = 2 + 15 * 8 + 30  # each CONCAT of a text of that length counts 7, and 30 are for the characters of the last five
 
 
 def stops(body: str, budget: int, text: str = "") -> bool:

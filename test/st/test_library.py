@@ -144,7 +144,7 @@ def test_a_real_at_a_limit_is_the_limit(tmp_path: Path) -> None:
 
 
 def says(text: str) -> str:
-    """C that writes to whatever way leads to the simulator, beside the standard streams."""
+    """Return C code that writes to the pipe of the simulator, beside the standard streams."""
     text = text.replace('"', '\\"').replace("\n", "\\n")
     return f'for (int way = 3; way < 10; way++) if (write(way, "{text}", sizeof "{text}" - 1) < 0) {{}}'
 
@@ -152,13 +152,13 @@ def says(text: str) -> str:
 @pytest.mark.parametrize(
     ("body", "text"),
     [
-        # A byte now and then: each would start a patience of its own.
+        # A byte now and then: none of them may restart the patience.
         (
             "for (;;) { " + says("[") + " thrd_sleep(&(struct timespec){.tv_nsec = 50000000}, 0); }",
             "took more than 1 s of wall time",
         ),
         ("for (;;) { " + says("[" * 1000) + " }", "sent more than 65632 bytes"),
-        (says("[]\n7\n"), "sent what was not asked for"),
+        (says("[]\n7\n"), "sent data without a request"),
         (says("[]\n") + " exit(0);", "sent a line that is no answer"),
         (says("{\n") + " exit(0);", "sent a line that is no answer"),
         (says("[" * 60000 + "\n") + " exit(0);", "sent a line that is no answer"),

@@ -65,7 +65,7 @@ def test_a_snapshot_holds_the_memory(tmp_path: Path) -> None:
 
 
 def test_a_snapshot_without_the_memory_is_refused(tmp_path: Path) -> None:
-    """As an earlier version made it."""
+    """Earlier versions made such snapshots."""
     plc = bound(tmp_path, SHARED)
     kept = plc.snapshot()
     del kept["globals"]["located"]

@@ -101,7 +101,7 @@ END_PROGRAM"""
 
 
 def test_a_warm_restart_keeps_what_is_retained() -> None:
-    """IEC 61131-3:2013, 6.5.6.2: an instance of RETAIN keeps all but NON_RETAIN, another one what is RETAIN."""
+    """IEC 61131-3:2013, 6.5.6.2: an instance of RETAIN keeps all but NON_RETAIN, another one keeps RETAIN only."""
     running = Program(compile_text(KEPT))
     running.variables["main/i"].write(9)
     for tick in range(3):

@@ -84,7 +84,7 @@ class Expressions:
         return name, f"{kind}#{value}", Computed(kind, value)
 
     def expression(self, depth: int) -> tuple[str, str, Computed]:
-        """In variables, in constants, and what it comes to."""
+        """Return an expression in variables, the same in constants, and its value."""
         if depth == 0 or self._random.random() < 0.2:
             return self._variable()
         while True:

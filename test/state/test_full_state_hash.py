@@ -1,4 +1,4 @@
-"""`full_state_hash`: whatever changes a future changes it, and whatever only looks on does not."""
+"""`full_state_hash`: state that changes a future changes it, and observers do not."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ AHEAD = 12
 
 @pytest.fixture(scope="module", params=SCENES)
 def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A checkpoint of a scene at tick 60."""
+    """Return a checkpoint of a scene at tick 60."""
     sim = Simulation(SCENES[request.param](), threads=1)
     run(sim, 60)
     path = tmp_path_factory.mktemp("saved") / "checkpoint.npz"
@@ -44,7 +44,7 @@ def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 @pytest.fixture(scope="module")
 def station(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A checkpoint of a line of machines with failures, one of which holds a bottle; commands wait in it."""
+    """Return a checkpoint of a line of machines with failures. One of them holds a bottle, and commands wait."""
     sim = stationed(4.0, rate=2.0, ramp_up=0.4, sets={"cap": {"to": 1.0, "share": 0.6}}, **LOADED)
     while not sim.counts.held:
         sim.advance()
@@ -81,7 +81,7 @@ def test_every_array_of_a_checkpoint_is_hashed_or_declared(saved: Path) -> None:
 
 
 def test_what_is_left_out_does_not_change_the_future(saved: Path) -> None:
-    """All of it at once holds what no run leaves there; the ticks that follow are those of the checkpoint."""
+    """All of it is changed at once to values that no run leaves there; the next ticks equal those of the checkpoint."""
     sim, other = (Simulation.load(saved, threads=1) for _ in range(2))
     spoilt = set()
     for name, array in changing_arrays(other._state.world).items():

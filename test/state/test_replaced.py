@@ -27,14 +27,14 @@ def sim() -> Simulation:
 
 @pytest.fixture(scope="module")
 def content(sim: Simulation, tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A checkpoint."""
+    """Return the content of a checkpoint."""
     path = tmp_path_factory.mktemp("checkpoint") / "good.npz"
     sim.save(path)
     return path.read_bytes()
 
 
 def refusal(sim: Simulation, path: Path, folder: Path | None = None) -> str:
-    """Return why a save to a path is refused, without the path; what is in its folder must stay as it is."""
+    """Return why a save to a path is refused, without the path. The content of its folder must stay as it is."""
     before = {file.name: file.read_bytes() for file in path.parent.iterdir() if file.is_file()}
     with pytest.raises(CheckpointError) as caught:
         sim.save(path, folder)
@@ -75,7 +75,7 @@ def test_a_file_that_is_no_checkpoint_is_not_replaced(
 
 
 def test_a_checkpoint_of_any_format_is_replaced(sim: Simulation, content: bytes, tmp_path: Path) -> None:
-    """Also one that is damaged behind its header; its name says nothing."""
+    """This includes one that is damaged behind its header; the name does not matter."""
     (tmp_path / "now").write_bytes(content)
     with np.load(tmp_path / "now") as file:
         arrays = dict(file)

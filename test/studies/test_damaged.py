@@ -26,7 +26,7 @@ Made = tuple[Setup, Path, list[Row]]
 
 
 def made_in(folder: Path, **changes: Any) -> Made:
-    """A study of four runs, made."""
+    """Make a study of four runs."""
     folder.mkdir()
     setup = setup_of(folder, duration=0.1, **changes)
     with Runs(setup, folder / "out", Here()) as runs:
@@ -45,7 +45,7 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> Made:
 
 
 def again(made: Made, folder: Path) -> tuple[list[Row], list[str], int]:
-    """The rows of a study that goes on in a folder, what it says, and how many runs it made."""
+    """Continue a study in a folder. Return its rows, its messages, and the number of new runs."""
     setup, said, engine = made[0], list[str](), Here()
     with Runs(setup, folder, engine, said.append) as runs:
         return sweep(runs, setup), said, engine.made
@@ -58,13 +58,13 @@ def same(rows: list[Row], others: list[Row]) -> bool:
 
 
 def flipped(content: bytes) -> bytes:
-    """The content with another digit of a number in it."""
+    """Return the content with one digit of a number changed."""
     place = content.index(b"stops") + 8
     return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
 
 
 def without_checksum(folder: Path) -> None:
-    """The files of a folder as an older version wrote them."""
+    """Remove the checksums from the files of a folder, as in folders of older versions."""
     for file in folder.rglob("*.json"):
         data = json.loads(file.read_text())
         file.write_text(json.dumps({key: data[key] for key in data if key not in ("sha256", "made_with", "text")}))
@@ -224,7 +224,7 @@ def test_two_kinds_of_study_do_not_share_a_folder(one: Made, tmp_path: Path) -> 
         again(one, tmp_path)
     with pytest.raises(StudyError, match="conveyor-sim accuracy has one of the same name"):
         read_results(tmp_path)
-    (tmp_path / "study.json").write_bytes(before[:500])  # damaged: nobody can tell; it is kept aside
+    (tmp_path / "study.json").write_bytes(before[:500])  # damaged, so its kind is not known; it is kept aside
     again(one, tmp_path)
     assert (tmp_path / "study.json.unusable").read_bytes() == before[:500]
     with pytest.raises(ConveyorError, match="all of it: found"):

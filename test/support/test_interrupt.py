@@ -156,7 +156,7 @@ def test_a_command_that_is_started_with_interrupts_ignored_goes_on() -> None:
 
 
 def test_processes_of_tests_can_be_interrupted_where_tests_are_started_with_interrupts_ignored() -> None:
-    """Those that are started anew and those that are forked from a warm one."""
+    """This holds for new processes and for processes forked from a warm one."""
     code = (
         "import os, signal, subprocess, sys\nfrom ctrl_c import restore_for_children\nimport warm\n"
         "shown = 'import signal; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)'\n"

@@ -76,7 +76,7 @@ def run(work: Coroutine[Any, Any, T]) -> T:
 
 @contextmanager
 def served_here(source: Any, **options: Any) -> Iterator[WebServer]:
-    """The page, served by this process, in which a test can change or watch how that is done."""
+    """Serve the page in this process, where a test can change or watch the server."""
     with ServerThread() as thread:
         page = WebServer(source, **options)
         thread.run(page.start())

@@ -1,4 +1,4 @@
-"""By which names a browser may ask for a server of this machine, however it writes them."""
+"""Names by which a browser may request a server of this machine, in all their spellings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page asks for is judged at once by the rules of every protocol, and a refusal is on record."""
+"""Requests of a page are checked at once by the rules of every protocol, and refusals are on record."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def test_it_listens_on_this_machine_only_and_lets_in_no_other_page(server: Recor
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.1:80", "localhost", "LOCALHOST.", "[::1]"])
 def test_a_browser_may_leave_out_the_default_port(server: RecordingServer, host: str) -> None:
-    """As it does where the server listens on port 80."""
+    """Browsers do so when the server listens on port 80."""
     assert get(server, "/data/head", Host=host)[0] == 200
     assert get(server, "/data/head", Host=f"{host}.evil.example")[0] == 403
 

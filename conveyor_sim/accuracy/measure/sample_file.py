@@ -30,7 +30,7 @@ ORIGIN = "origin.json"
 
 _OF_SETTING = ("integrator", "per_tick", "stiffness", "error")
 _COLUMNS = (*_OF_SETTING, "seed", *(observable.name for observable in OBSERVABLES), "cpu", "failure", "checksum")
-"""The checksum of a line is over its other columns, and over scene and version."""
+"""The checksum of a line covers its other columns, the scene and the version."""
 OTHER_STUDY = "study.json"
 """File that `conveyor-sim sweep` writes first into a folder."""
 
@@ -150,7 +150,7 @@ def _line(row: Any) -> str:
 
 
 def _checksum(line: str, of: str) -> str:
-    """Of a line without this column."""
+    """Return the checksum of a line without this column."""
     return _hash(line.encode(), of.encode())
 
 

@@ -1,6 +1,6 @@
 """A study on disk: one JSON with a checksum that holds all of it exactly, and CSV files of its rows for other programs.
 
-`conveyor-sim sweep` writes a `study.json` of its own (`studies/origin.py`); neither command replaces the other's.
+`conveyor-sim sweep` writes another `study.json` (`studies/origin.py`); neither command replaces the other's file.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) 
 
 
 def write(file: Path, content: bytes) -> None:
-    """Write a file in one go; its folder is made. Raises ConveyorError if it can't be written."""
+    """Write a file in one go, and make its folder. Raises ConveyorError if it can't be written."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_file(file, content)

@@ -81,7 +81,10 @@ OPERATIONS = {
 
 
 def argument_problem(name: str, ids: Sequence[str], values: Sequence[float]) -> str:
-    """Return why it can't be done with such arguments, whatever the alarms are; "" if it can. As `problem`."""
+    """Return why an operation can't be done with such arguments in any state of the alarms; "" if it can.
+
+    `problem` documents the arguments.
+    """
     if values and (name != "shelve" or len(values) != len(ids)):
         expected = f"as many as names ({len(ids)}), or none" if name == "shelve" else "none"
         return f"{len(values)} values given, expected {expected}"

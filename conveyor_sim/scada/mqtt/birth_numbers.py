@@ -1,7 +1,7 @@
 """`BirthNumbers`: the number of each connection (bdSeq), which goes on where an earlier process left off.
 
 Hosts match the death of a connection with its birth by this number (Sparkplug 3.0, 6.4.5 and 6.4.19). The will of a
-process that was killed may arrive after the births of the next one, so that one must not begin with the same number.
+killed process may arrive after the births of the next process, so both must have different numbers.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ def state_folder() -> Path:
 
 
 class BirthNumbers:
-    """Numbers of the connections of one edge node at one broker, whichever process makes them."""
+    """Numbers of the connections of one edge node to one broker, from all its processes."""
 
     def __init__(self, broker: str, group: str, node: str, folder: Path | None = None) -> None:
-        """broker: its address. group, node: ids. folder: that of the files, one per edge node; None: of this user."""
+        """broker: its address. group, node: ids. folder: holds one file per edge node; None: `state_folder()`."""
         self._node = {"broker": broker, "group": group, "node": node}
         self._folder = folder
         digest = hashlib.sha256(json.dumps(self._node, sort_keys=True).encode()).hexdigest()
         self._file = Path(f"{digest[:32]}.json")
-        self._next = secrets.randbelow(COUNT)  # where no file can be kept
+        self._next = secrets.randbelow(COUNT)  # without a file
         self._remarked = False
 
     def take(self) -> int:
-        """Return the number of the next connection, which is on the disk before it is used. It may wait for the disk.
+        """Return the number of the next connection, once it is on the disk.
 
-        Without a folder to write to, numbers begin anywhere, with one remark in the log.
+        Without a folder to write to, numbers begin at a random one, with one warning in the log.
         """
         try:
             folder = state_folder() if self._folder is None else self._folder
@@ -87,7 +87,7 @@ class BirthNumbers:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Let one process at a time count; a file system without locks does without. Raises OSError for a held lock."""
+    """Hold the lock of a folder, if its file system has locks. Raises OSError if another process keeps it held."""
     with (folder / _LOCK).open("ab") as stream:
         end = time.monotonic() + _PATIENCE
         while True:

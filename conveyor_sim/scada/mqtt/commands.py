@@ -52,7 +52,7 @@ class Commands:
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
         self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
         self.before = (0, 0)
-        """Commands that were passed on, and that were not, before the edge node was restarted."""
+        """Commands that were passed on, and commands that were refused, before the edge node was restarted."""
         self.writes = self.refused = 0
         """Commands so far that were passed on to the line, and that were not."""
         self.refusal = ""

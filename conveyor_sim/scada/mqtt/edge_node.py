@@ -135,7 +135,7 @@ class EdgeNode:
             self._wake.set()
 
     async def _connect(self) -> Link:
-        """A connection with the next number, by the newest version of MQTT that the broker takes.
+        """Return a connection with the next number, by the newest version of MQTT that the broker accepts.
 
         Raises LinkError, FaceError.
         """
@@ -158,7 +158,7 @@ class EdgeNode:
                     raise
                 version = OLDEST
                 continue
-            self._version = version  # of the next connections: only one that has worked
+            self._version = version  # of later connections, because it has worked
             self._births = number
             self._state = "connected"
             return link

@@ -49,7 +49,7 @@ class LinkError(ConveyorError):
 
 
 class TooNewError(LinkError):
-    """The broker does not know that version of MQTT: it says so, or closes the connection instead of an answer."""
+    """The broker does not know that version of MQTT: it refuses it, or closes the connection without an answer."""
 
 
 class Message(NamedTuple):
@@ -92,7 +92,7 @@ class Link:
         self._arrived: deque[Message] = deque()
         self._decided, self._lost, self._over = threading.Event(), threading.Event(), threading.Event()
         self._refusal = ""
-        self._answered = False  # by an acknowledgement, whatever it says
+        self._answered = False  # by any acknowledgement
         self._published = self._sent = 0
         self.dropped = 0
         """Messages so far that came too fast."""

@@ -20,7 +20,7 @@ EVENTS_QUEUED = 100
 """Events that an item queues at least."""
 
 _BASE_SIZE = 8
-"""Bytes of a value whose size is not looked at."""
+"""Assumed bytes of any other value."""
 
 _HISTORY_UNITS = 2
 """Work units of a value of the history."""
@@ -39,7 +39,7 @@ class Bounds:
 
     @property
     def units(self) -> int:
-        """Work units of the session's requests so far, beside those of decoding."""
+        """Work units of the session's requests so far, without decoding."""
         return self._units + self.views.examined
 
     @property
@@ -80,7 +80,7 @@ class Bounds:
         self._bound_queues(asked)
 
     def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
-        """As `require_new_items`, for items that exist."""
+        """Raise ServiceError for too costly filters of existing items. Reduce queues to the room that is left."""
         asked = params.ItemsToModify
         filters = (item.RequestedParameters.Filter for item in asked)
         self._require_fields(sum(filter_units(one, self.limits) for one in filters if isinstance(one, ua.EventFilter)))
@@ -104,7 +104,7 @@ class Bounds:
             raise ServiceError(Codes.BadTooManyOperations)
 
     def _bound_queues(self, asked: Sequence[Any]) -> None:
-        """Grant queues. The library takes 0 for as long a queue as there may be, or for one without end."""
+        """Set queue sizes within the limits. The library treats 0 as the longest queue, or as no bound."""
         subscriptions = self._service.subscriptions.values()
         most = share_of_guests(self.limits.queued) if self.is_guest else self.limits.queued
         left = most - sum(each.monitored_item_srv.queued for each in subscriptions)

@@ -1,7 +1,7 @@
 """`Views`: Browse, BrowseNext and TranslateBrowsePathsToNodeIds of one session, with bounded work.
 
-The library answers with all references at once, has no continuation points, and walks the tree of reference types for
-each reference anew.
+The library answers with all references at once and has no continuation points. For each reference it walks the tree of
+reference types again.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _REMAINING = ua.Index(4_294_967_295)
 
 
 class Views:
-    """What one session looks at."""
+    """Browsing of one session."""
 
     def __init__(self, aspace: AddressSpace, limits: Limits) -> None:
         """Start without continuation points."""
@@ -115,7 +115,7 @@ class Views:
             code = Codes.BadNodeIdUnknown
         else:
             for element in elements:
-                # Each node once: paths that lead to and fro would otherwise multiply.
+                # Each node once, because paths back and forth would multiply.
                 nodes = list(dict.fromkeys(self._children(nodes, element, kinds)))
             code = Codes.Good if nodes else Codes.BadNoMatch
         targets = [ua.BrowsePathTarget(node, _REMAINING) for node in nodes] if code == Codes.Good else []

@@ -80,7 +80,7 @@ def identity(folder: Path) -> Identity:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, which one process holds at a time."""
+    """Hold the lock of a folder. Wait while another process holds it."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)

@@ -1,9 +1,9 @@
-"""`BoundedBuffer`: the bytes of one message, which refuse to be decoded beyond an allowance.
+"""`BoundedBuffer`: the bytes of one message, decoded only within an allowance.
 
 The library builds Python objects for everything that a message announces. This class relies on how it reads
-(`asyncua.ua.ua_binary`): every element of an array costs at least one `read`, a length is a `read(4)` directly before
-the bytes that it announces, and the body of an extension object is a `copy`. Arrays of null values are the exception:
-their elements cost no `read`, so the length itself is checked.
+(`asyncua.ua.ua_binary`). Every element of an array costs at least one `read`. A length is a `read(4)` directly before
+the bytes that it announces. The body of an extension object is a `copy`. Elements of arrays of null values cost no
+`read`, so their length itself is checked.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _OBJECT = 3
 
 @dataclass
 class Allowance:
-    """What one message may still cost."""
+    """Remaining cost that one message may cause."""
 
     steps: int
     """Elementary values that may be decoded, `_OBJECT` for each single byte."""

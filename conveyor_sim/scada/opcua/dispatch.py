@@ -1,4 +1,4 @@
-"""`Dispatcher`: messages of one connection, each answered with the status code that fits what is wrong with it.
+"""`Dispatcher`: messages of one connection. Each faulty one is answered with the status code of its fault.
 
 The library answers every request that it can't decode or does not expect with BadInternalError.
 """
@@ -135,9 +135,9 @@ class Dispatcher(UaProcessor):
         return True
 
     def _step_back(self, requesthdr: Any) -> None:
-        """Leave a session that could not be activated here, and its notifications to the connection that has it.
+        """Detach from a session that could not be activated here, and return its notifications to its connection.
 
-        The library joins a session, and redirects its subscriptions, before it checks who asks for it.
+        The library joins a session, and redirects its subscriptions, before it checks the client.
         """
         session, self.session = self.iserver.lookup_external_session(requesthdr.AuthenticationToken), None
         if self._session_watchdog_task is not None:

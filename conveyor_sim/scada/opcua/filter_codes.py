@@ -1,4 +1,4 @@
-"""Checks of the filters of monitored items (OPC 10000-4, 7.7, 7.22): the library evaluates whatever it gets."""
+"""Checks of the filters of monitored items (OPC 10000-4, 7.7, 7.22): the library evaluates filters unchecked."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LEAST_OPERANDS = {
     Operators.Between: 3,
     Operators.InList: 2,
 }
-"""Operands of an operator; two of those that are not named, and at least these of InList."""
+"""Number of operands by operator; InList takes more as well. Operators that are not listed have two."""
 
 _UNSUPPORTED = {
     Operators.Like,
@@ -57,7 +57,10 @@ def _event_code(wanted: ua.EventFilter) -> int:
 
 
 def _content_code(elements: Sequence[ua.ContentFilterElement]) -> int:
-    """An element may refer to later elements only, so that the evaluation ends (OPC 10000-4, 7.7.1)."""
+    """Return the status code of a where clause.
+
+    An element may refer to later elements only, so that the evaluation ends (OPC 10000-4, 7.7.1).
+    """
     for place, element in enumerate(elements):
         if element.FilterOperator in _UNSUPPORTED:
             return int(Codes.BadFilterOperatorUnsupported)

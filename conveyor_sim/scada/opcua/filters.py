@@ -29,7 +29,7 @@ def filter_units(wanted: Any, limits: Limits) -> int:
 
 
 def _evaluation(elements: Sequence[ua.ContentFilterElement], limits: Limits) -> int:
-    """Return the operands that one evaluation visits at most; elements that are referenced twice count twice.
+    """Return the greatest number of operands that one evaluation visits; elements referenced twice count twice.
 
     An element may only reference later ones, which excludes cycles (OPC 10000-4, 7.7.4.2).
     """

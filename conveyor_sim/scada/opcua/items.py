@@ -58,7 +58,7 @@ class Items(MonitoredItemService):
         item = None if id is None else self._monitored_items.get(id)
         if id is None or item is None or item.mode == ua.MonitoringMode.Disabled or not self.isub.spend(CHANGE_UNITS):
             return
-        last = item.mvalue.current_dvalue  # that was sent: what is held back does not get there
+        last = item.mvalue.current_dvalue  # the last value sent, not one that the filter held back
         if item.filter and last is not None and not _exceeds(last, value, item.filter):
             return
         item.mvalue.old_dvalue, item.mvalue.current_dvalue = last, value
@@ -150,7 +150,7 @@ def _name(clause: ua.SimpleAttributeOperand) -> str:
 
 
 def _fields(event: Any, names: list[str]) -> list[ua.Variant]:
-    """Return fields of an event, null where it has none. `Emitter` has them made once for all items.
+    """Return fields of an event, null where it has none. They are made once for all items.
 
     The library copies each value for each item, which takes most of the time of an event.
     """

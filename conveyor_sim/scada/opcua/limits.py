@@ -1,4 +1,4 @@
-"""`Limits`: the amount of work that one OPC UA client may ask of the server.
+"""`Limits`: the amount of work that one OPC UA client may cause.
 
 The server publishes them in Server/ServerCapabilities where the standard has a node (OPC 10000-5, 6.3.2 and 6.3.11) and
 refuses requests beyond them with the status code of OPC 10000-4.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Upper bounds for one server. All values are positive integers; units are stated where a value is no count."""
+    """Upper bounds for one server. All values are positive integers: counts, unless another unit is stated."""
 
     nodes_per_read: int = 1000
     """Nodes of one Read request."""

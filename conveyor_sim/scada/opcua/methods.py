@@ -32,7 +32,7 @@ _TEXT, _NUMBER, _WHOLE = ua.VariantType.String, ua.VariantType.Double, ua.Varian
 
 
 _NAME_AND_VALUE: Mapping[int, int] = {Codes.BadNodeIdUnknown: 0, Codes.BadOutOfRange: 1}
-"""Place of the argument that a refusal is about, by its code: names come first, values behind them."""
+"""Place of the argument that caused a refusal, by status code: the name is first, the value second."""
 
 
 class Parameter(NamedTuple):
@@ -176,7 +176,7 @@ class Methods:
         return alarms is not None and id in alarms.id
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """Return what becomes of a call, which is counted; None if it is of no method here."""
+        """Return the result of a call and count it; None for a method that is not of this class."""
         result = self._call(client, request)
         return None if result is None else self._requests.counted(result)
 
@@ -260,7 +260,7 @@ class Methods:
 
 
 def _of_arguments(code: int, places: Mapping[int, int], arguments: Sequence[Any]) -> ua.CallMethodResult:
-    """Return the result of a call, which names the argument that a code is about (OPC 10000-4, 5.11.2)."""
+    """Return the result of a call, with the code at the argument that caused it (OPC 10000-4, 5.11.2)."""
     if code not in places:
         return _result(code)
     codes = [code if place == places[code] else Codes.Good for place in range(len(arguments))]

@@ -1,6 +1,6 @@
 """Ownership of subscriptions: a session acts on its own subscriptions only.
 
-The library finds a subscription by its id and ignores who owns it. `OwnedSession` checks the owner in every service
+The library finds a subscription by its id and ignores its owner. `OwnedSession` checks the owner in every service
 that takes a subscription id: OPC 10000-4, 5.13 (monitored items) and 5.14 (subscriptions), and ConditionRefresh of
 OPC 10000-9. A subscription of another session is answered like one that does not exist, with BadSubscriptionIdInvalid;
 the attempt is counted and logged.
@@ -32,10 +32,10 @@ REFRESH = {
 
 
 class Owners:
-    """Sessions that own subscriptions, kept as long as their subscriptions live; and what was refused to others."""
+    """Sessions that own subscriptions, stored as long as their subscriptions live; refusals to other sessions."""
 
     def __init__(self, refusals: Refusals, *, trusting: bool) -> None:
-        """trusting: the server accepts only certificates of its list, so an application URI in one is proved."""
+        """trusting: True if the server accepts only listed certificates, so application URIs in them are proved."""
         self.refusals, self.trusting = refusals, trusting
         self.of: WeakKeyDictionary[InternalSubscription, OwnedSession] = WeakKeyDictionary()
 
@@ -55,7 +55,7 @@ class OwnedSession(InternalSession):
         raise NotImplementedError
 
     async def create_session(self, params: ua.CreateSessionParameters, *others: Any, **named: Any) -> Any:
-        """Note which application the client states."""
+        """Create the session and store the application that the client states."""
         self.application_uri = params.ClientDescription.ApplicationUri or ""
         return await super().create_session(params, *others, **named)
 
@@ -67,13 +67,13 @@ class OwnedSession(InternalSession):
                 each.pub_request_callback = _no_request  # another session may begin on the same connection
 
     async def create_subscription(self, params: ua.CreateSubscriptionParameters, *others: Any, **named: Any) -> Any:
-        """Note who owns it; the owner outlives its session, for a later transfer."""
+        """Create a subscription and store its owner, which outlives its session for a later transfer."""
         result = await super().create_subscription(params, *others, **named)
         self.owners.of[self.subscription_service.subscriptions[result.SubscriptionId]] = self
         return result
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
-        """Raise BadSubscriptionIdInvalid unless it is owned."""
+        """Raise BadSubscriptionIdInvalid unless the subscription is owned."""
         self._require("ModifySubscription", params.SubscriptionId)
         return super().modify_subscription(params)
 
@@ -228,7 +228,7 @@ class OwnedSession(InternalSession):
 
 
 async def _notify(subscription: InternalSubscription) -> None:
-    """Tell the session that loses a subscription, if it has a publish request waiting (OPC 10000-4, 5.14.7)."""
+    """Notify the session that loses a subscription, if it has a publish request waiting (OPC 10000-4, 5.14.7)."""
     ask = subscription.pub_request_callback
     number = subscription.data.SubscriptionId
     request = None if ask is None else ask(number)

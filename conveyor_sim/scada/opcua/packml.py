@@ -174,7 +174,7 @@ class PackMl:
                     await self._nodes.write(f"{machine}/{NAME}.{name}", value, stamp, code)
 
     def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
-        """Return what becomes of a call of a method of a machine, which is counted; None if it is of none."""
+        """Return the result of a call of a machine's method and count it; None for any other method."""
         result = self._call(client, request)
         return None if result is None else self._requests.counted(result)
 
@@ -251,7 +251,7 @@ class PackMl:
 
 
 def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
-    """Return a speed in packages a minute as a rate in 1/s; one that is a limit in its type is that limit."""
+    """Return a speed (packages per minute) as a rate (1/s). A limit rounded to the sender's type becomes the limit."""
 
     def there_and_back(limit: float) -> float:
         a_minute = limit * A_MINUTE

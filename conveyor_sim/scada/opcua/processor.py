@@ -99,8 +99,8 @@ class Processor(Dispatcher):
         try:
             goes_on = await super().process_message(seqhdr, BoundedBuffer(bytes(body), allowance))
         finally:
-            self.units += allowance.used + max(0, self._examined - examined)  # it may be another session
-        if allowance.exceeded and not was_active:  # a session goes on with the fault that it was sent
+            self.units += allowance.used + max(0, self._examined - examined)  # the session may have changed
+        if allowance.exceeded and not was_active:  # an active session continues after the fault
             raise ServiceError(Codes.BadEncodingLimitsExceeded)
         return goes_on
 

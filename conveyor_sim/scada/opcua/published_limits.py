@@ -1,4 +1,4 @@
-"""Publishes the limits of the server in its address space, where clients look for them (OPC 10000-5, 6.3.2, 6.3.11)."""
+"""Publication of the server's limits in its address space, for clients (OPC 10000-5, 6.3.2 and 6.3.11)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Refusals`: count and log of requests that act on something another session owns."""
+"""`Refusals`: count and log of requests on subscriptions that another session owns."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ CODES: Mapping[Cause, int] = {
     "value": Codes.BadOutOfRange,
     "form": Codes.BadInvalidArgument,
 }
-"""Status code of an input that no state of the line would make good, by its cause."""
+"""Status code of an input that no state of the line allows, by the cause of its refusal."""
 
 
 @dataclass
@@ -87,7 +87,7 @@ class Requests:
         return [ua.StatusCode(code) for code in codes]
 
     def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
-        """Give commands as one input, all or none; a status code, not counted. Names are of commands, each once."""
+        """Give commands as one input, all or none. Return a status code, not counted. Each name occurs once."""
         tags = [self._commands[name] for name in names]
         codes = [self._judge_number(client, tag, value) for tag, value in zip(tags, values, strict=True)]
         bad = next((code for code in codes if code != Codes.Good), None)
@@ -101,11 +101,11 @@ class Requests:
         values: tuple[float, ...] = (),
         texts: tuple[str, ...] = (),
     ) -> int:
-        """Give the line something to do; a status code, not counted."""
+        """Give the line an operation. Return a status code, which is not counted."""
         return self._give(client, operation, names, values, texts)
 
     def control(self, client: User, what: Control, value: float) -> int:
-        """Ask something of the run; a status code, not counted."""
+        """Control the run. Return a status code, which is not counted."""
         if not self.may_control(client):
             return int(Codes.BadUserAccessDenied)
         if what not in self._source.controls:
@@ -117,7 +117,7 @@ class Requests:
         return int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
 
     def may_control(self, client: User) -> bool:
-        """Return True if this client may ask something of the run."""
+        """Return True if this client may control the run."""
         return _kind(client) in MAY_CONTROL
 
     def may(self, client: User, operation: str) -> bool:
@@ -125,7 +125,7 @@ class Requests:
         return operation in MAY and _kind(client) in MAY[operation].writers
 
     def counted(self, result: ua.CallMethodResult) -> ua.CallMethodResult:
-        """Count a call by its result, which is returned."""
+        """Count a call by its result, and return the result."""
         good = result.StatusCode.value == Codes.GoodCompletesAsynchronously
         self.writes, self.refused = self.writes + good, self.refused + (not good)
         return result

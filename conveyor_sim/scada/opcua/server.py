@@ -66,8 +66,7 @@ class OpcUaServer:
         """users: who may do more than read, by name. anonymous: whether those who give no name may read.
         stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
         history: patterns of the tags whose last values are kept. port: 0 for any that is free.
-        limits: of each client. quota: places of the connections.
-        logins: checks passwords, in place of `users`.
+        limits: of each client. quota: places of the connections. logins: checks passwords, in place of `users`.
 
         Raises FaceError for a pattern that no tag fits.
         """
@@ -99,8 +98,8 @@ class OpcUaServer:
     def status(self) -> Status:
         """Return connections, monitored items, and counts of requests.
 
-        Requests that were passed on are writes and calls. Refused are also requests on subscriptions of other sessions,
-        and subscriptions that exceeded a budget.
+        Accepted requests are writes and calls. Refused ones include requests on subscriptions of other sessions, and
+        subscriptions that exceeded a budget.
         """
         server, requests = self._server, self._requests
         if server is None or server.bserver is None:

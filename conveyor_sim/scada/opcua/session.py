@@ -93,7 +93,7 @@ class SafeServer(InternalServer):
         return await super().get_endpoints(params, sockname)
 
     def find_servers(self, params: ua.FindServersParameters, sockname: Any = None) -> list[Any]:
-        """Return this server, if it is wanted. Raise ServiceError for a URL that can't be parsed."""
+        """Return this server, if the request includes it. Raise ServiceError for a URL that can't be parsed."""
         require_url(params.EndpointUrl)
         params.ServerUris = [uri for uri in params.ServerUris or () if uri is not None]
         return list(super().find_servers(params, sockname))
@@ -161,7 +161,7 @@ class Session(InternalSession):
     ) -> ua.ActivateSessionResult:
         """Activate the session. A client that fails to prove its identity has no session afterwards.
 
-        On another connection the user must be the same (OPC 10000-4, 5.6.3.1): a token that was overheard is no proof.
+        On another connection the user must be the same (OPC 10000-4, 5.6.3.1), because a token may be overheard.
         """
         connection, user, nonce = channel.get(), self.user, self.nonce
         moved = self._connection is not None and connection is not self._connection

@@ -1,7 +1,7 @@
 """`Subscriptions`: the subscriptions of all sessions, each with bounded work, answers and memory.
 
-The library answers one Publish request with everything that waits, retains a number of such answers regardless of their
-size, and has no measure of the work that a subscription causes.
+The library answers one Publish request with everything that waits. It retains a number of such answers regardless of
+their size, and it does not measure the work that a subscription causes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Subscription(InternalSubscription):
 
     limits: Limits
     most = 0
-    """MaxNotificationsPerPublish of the client; 0: it states none."""
+    """MaxNotificationsPerPublish of the client; 0: not stated."""
     is_guest = True
     """True if the session that created it has no user."""
     party = ""
@@ -91,7 +91,7 @@ class Subscription(InternalSubscription):
         await self.stop()
 
     async def publish_results(self, requestdata: Any = None) -> bool:
-        """Publish what waits, in as many answers as it needs and clients asked for. Return True if one was sent."""
+        """Publish all waiting notifications, one answer per Publish request. Return True if any was sent."""
         if self.ended:
             return False
         self.spend(1)
@@ -128,7 +128,7 @@ class Subscription(InternalSubscription):
             result.NotificationMessage.NotificationData.append(ua.EventNotificationList(events))
 
     def _room(self, result: ua.PublishResult) -> int:
-        """Return how many notifications an answer still takes."""
+        """Return the number of notifications that still fit in an answer."""
         most = min(self.most or self.limits.notifications_per_publish, self.limits.notifications_per_publish)
         return most - sum(map(_size, result.NotificationMessage.NotificationData))
 

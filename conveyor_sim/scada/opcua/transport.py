@@ -25,7 +25,7 @@ _SIZE = slice(4, 8)
 """Bytes of a message that say how long it is (OPC 10000-6, 7.1.2.2)."""
 
 _WAITING = 16
-"""Messages of a connection that wait to be answered; no more are read of it until then."""
+"""Messages of a connection that may wait to be answered; meanwhile no more are read."""
 
 
 class Connection(OPCUAProtocol):
@@ -105,14 +105,14 @@ class Connection(OPCUAProtocol):
             self.places.leave_user(self.place)
 
     def data_received(self, data: bytes) -> None:
-        """Collect messages. The library would keep all bytes of a packet for each message in it, and read on always."""
+        """Collect messages. The library would copy all bytes of a packet for each message in it, without a bound."""
         if self.transport is None or self.transport.is_closing():
             return
         self._received += data
         self._take()
 
     def _take(self) -> None:
-        """Pass complete messages on, as long as not too many wait."""
+        """Pass complete messages on, unless too many wait."""
         if self.transport is None or self.transport.is_closing():
             return
         while len(self._received) >= _SIZE.stop and self.messages.qsize() < _WAITING:
@@ -186,7 +186,7 @@ class Connection(OPCUAProtocol):
         if not self._is_guest:
             return
         async with self.turn:
-            # One at a time, so that others are answered between the requests of many guests that waited.
+            # One at a time, so that other clients are answered between the requests of many guests.
             await asyncio.sleep(self.guests.delay())
 
     def _make_room(self) -> None:
@@ -207,7 +207,7 @@ class Connection(OPCUAProtocol):
             self._close()
 
     def _close(self) -> None:
-        """Close the connection; at once if the client does not read what it was sent, as that could wait for ever."""
+        """Close the connection; at once if the client has not read everything, because waiting for it may never end."""
         if self.transport is None:
             return
         if self.transport.get_write_buffer_size():
@@ -243,7 +243,7 @@ class BoundedServer(Server):
         self.longest = [0.0]
         self.bounds, self.places = bounds, places
         self.limits = ConnectionLimits.of(bounds)
-        # `places` bounds the connections; those that make room still count here until they have ended.
+        # `places` bounds the connections; here a connection that makes room counts until it has ended.
         self.iserver.max_connections = 1_000_000
         self.iserver.max_pending_activation_seconds = ACTIVATION
         self.iserver.max_pending_messages_per_connection = 0  # `Connection` stops reading instead

@@ -1,4 +1,4 @@
-"""Checks of the form of requests, with the status codes of OPC 10000-4. The library checks little of it."""
+"""Checks of the form of requests, with the status codes of OPC 10000-4. The library has few such checks."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class WellFormedSession(InternalSession):
     """Session whose services refuse requests that the library would fail on."""
 
     async def create_session(self, params: ua.CreateSessionParameters, *others: Any, **named: Any) -> Any:
-        """Treat a timeout that is no number as none."""
+        """Create the session. A timeout that is no finite number is treated as 0."""
         if not math.isfinite(params.RequestedSessionTimeout):
             params.RequestedSessionTimeout = 0.0
         return await super().create_session(params, *others, **named)
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
-        """Raise ServiceError for a request without nodes, with an age or timestamps that can't be."""
+        """Raise ServiceError for a request without nodes, or with an invalid age or invalid timestamps."""
         _require_some(params.NodesToRead)
         if not params.MaxAge >= 0.0:
             raise ServiceError(Codes.BadMaxAgeInvalid)
@@ -76,7 +76,7 @@ class WellFormedSession(InternalSession):
         )
 
     async def translate_browsepaths_to_nodeids(self, params: list[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
-        """Return a status code for each path that leads nowhere."""
+        """Return a status code for each path without elements or with empty names."""
         return await _each(
             _require_some(params),
             _path_code,
@@ -104,7 +104,7 @@ class WellFormedSession(InternalSession):
     async def create_monitored_items(
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
-        """Return a status code for each item whose filter can't be."""
+        """Return a status code for each item with an invalid filter."""
         _require_some(params.ItemsToCreate)
         _require_timestamps(params.TimestampsToReturn)
         return await _each(
@@ -117,7 +117,7 @@ class WellFormedSession(InternalSession):
     async def modify_monitored_items(
         self, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
-        """Raise ServiceError for a request without items, or with timestamps that can't be."""
+        """Raise ServiceError for a request without items, or with invalid timestamps."""
         _require_some(params.ItemsToModify)
         _require_timestamps(params.TimestampsToReturn)
         return await super().modify_monitored_items(params)

@@ -34,7 +34,7 @@ LONGEST_REQUEST = 16_384
 """Bytes that a page sends at once, at most; who sends more is cut off."""
 
 SIGN_IN = 60.0
-"""Seconds in which a user of a page has to sign in where guests hold all their places."""
+"""Seconds that a new page has for a sign-in while guests hold all their places."""
 
 MOST_REQUESTS, RATE = 400, 200.0
 """Of a page: at once, and a second (of wall time) for longer; who sends more is cut off. Of each frame a page says that
@@ -166,7 +166,7 @@ class WebServer:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse a request by a name that is not this machine's, while no other machine is served."""
+        """Refuse a request for another host name while only this machine is served."""
         if self._at[0] == HERE and not is_own(request.headers.getall("Host", []), self._scheme):
             return web.Response(status=403, text=f"expected to be asked for as {HERE}", headers=HEADERS)
         return await handler(request)
@@ -225,13 +225,13 @@ class WebServer:
             self._end(socket)
 
     def _sign_out(self, socket: web.WebSocketResponse, place: Place) -> None:
-        """Have a page go on as a guest, if it had a user."""
+        """Make a page a guest, if it had a user."""
         if place.user:
             self._places.leave_user(place)
             self._expire(socket, place)
 
     async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
-        """Until the connection ends. place: of the page."""
+        """Answer a page until its connection ends. place: of the page."""
         expiry = None
         if not self._places.admit_guest(place):
             expiry = asyncio.get_running_loop().call_later(SIGN_IN, self._expire, socket, place)

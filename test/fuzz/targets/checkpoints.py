@@ -1,6 +1,6 @@
 """Checkpoints that were damaged, or made up with a checksum that fits: refused in a sentence, and nothing changes.
 
-What is loaded with the `full_state_hash` of the state that was saved has its future.
+A loaded state with the `full_state_hash` of the saved one has the same future.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ Raw = tuple[str, int, bytes]
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a recording holds."""
+    """Content of a recording."""
 
     schemas: tuple[Schema, ...]
     channels: tuple[Channel, ...]
@@ -215,7 +215,7 @@ def _foreign(rng: Rng, number: int, schema: int) -> tuple[Channel, Schema | None
 
 
 def _shuffled(messages: list[Message], rng: Rng) -> list[Message]:
-    """Return messages of nearby times in another order; those of one time stay in theirs, which a replay needs."""
+    """Return messages of nearby times in another order; messages of one time keep theirs, which a replay needs."""
     ordered = sorted(messages, key=lambda message: message.log_time)
     groups = [list(group) for _, group in groupby(ordered, key=lambda message: message.log_time)]
     reach = float(rng.choice([0.0, 3.0, 100.0]))

@@ -58,7 +58,7 @@ class Station:
 
     def __init__(self) -> None:
         """Start the server and connect the operator."""
-        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # it logs whatever clients send
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # it logs the messages of clients
         self._open = ExitStack()
         folder = self._open.enter_context(tempfile.TemporaryDirectory(prefix="conveyor_sim_fuzz_"))
         self._simulation = Simulation(load_scene(SCENE), threads=1)

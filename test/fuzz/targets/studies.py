@@ -66,7 +66,7 @@ class Base:
 
 @cache
 def place() -> Path:
-    """Where the intact studies are, until this process ends."""
+    """Return the folder of the intact studies, which stays until this process ends."""
     made = Path(tempfile.mkdtemp(prefix="studies"))
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     return made
@@ -197,7 +197,7 @@ def _exact(row: Row | None) -> str:
     )
 
 
-# What is done to files
+# Changes of files
 
 
 def _edit(copy: Path, rng: Rng, only: Path | None = None) -> bool:
@@ -298,7 +298,7 @@ SHAPES: tuple[Callable[[bytes], bytes], ...] = (
 
 
 def _unseal(copy: Path) -> None:
-    """As an older version wrote it."""
+    """Remove the checksums, as in folders of older versions."""
     for file in _files(copy):
         if file.suffix == ".json":
             data = json.loads(file.read_bytes())

@@ -11,6 +11,6 @@ with suppress(pytest.skip.Exception):
 
 @pytest.fixture(autouse=True)
 def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of this user's state, for one test."""
+    """Set the folder for the state of this user, for one test."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return tmp_path / "state"

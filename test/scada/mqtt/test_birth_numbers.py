@@ -75,7 +75,7 @@ def test_without_a_folder_they_begin_anywhere_with_one_remark(tmp_path: Path, ca
 
 
 def test_a_lock_that_is_not_let_go_holds_up_nobody_for_long(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """As when the process that holds it is stopped."""
+    """A stopped process may hold it."""
     with (tmp_path / "lock").open("ab") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)
         with caplog.at_level(logging.WARNING):

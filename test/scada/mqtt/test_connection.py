@@ -37,7 +37,7 @@ class OldBroker:
     """A broker that knows MQTT 3.1.1 and no later: it refuses what is newer, and hands all else to mosquitto."""
 
     def __init__(self, port: int, answer: bytes = b"\x20\x02\x00\x01", reset: bool = False) -> None:
-        """answer: to what is newer, before the connection is closed. reset: it is closed by RST."""
+        """answer: to newer versions, before the connection is closed. reset: it is closed by RST."""
         self._to, self.answer, self.reset = port, answer, reset
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._server.getsockname()[1])
@@ -127,7 +127,7 @@ def test_a_broker_that_closes_on_all_versions_refuses_the_connection() -> None:
                 while True:
                     client, _ = server.accept()
                     first = client.recv(65536)
-                    if b"MQTT" in first:  # else somebody looks whether anything listens
+                    if b"MQTT" in first:  # else the client only checks that something listens
                         versions.append(first[first.index(b"MQTT") + 4])
                     client.close()
 

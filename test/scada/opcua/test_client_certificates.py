@@ -35,7 +35,7 @@ CASES: dict[str, tuple[int, int, int, int]] = {
 
 
 def made(folder: Path, bits: int, first: int, last: int) -> str:
-    """A self-signed certificate and its key; the parts of a security string that name them."""
+    """Make a self-signed certificate and its key. Return the parts of a security string that name them."""
     key = rsa.generate_private_key(public_exponent=65537, key_size=bits)
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "client")])
     now = datetime.now(timezone.utc) - timedelta(minutes=1)
@@ -64,7 +64,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def trusting(serve: Serve, files: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Line:
-    """A server that trusts all of them."""
+    """Start a server that trusts all of them."""
     own = tmp_path_factory.mktemp("trusting") / "own"
     identity(own)
     for number, pair in enumerate(files.values()):

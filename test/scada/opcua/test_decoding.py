@@ -25,7 +25,7 @@ BOOLEAN, INT32, STRING, EXTENSION, DATA_VALUE, VARIANT = 1, 6, 12, 22, 23, 24
 
 
 def array(kind: int, count: int, elements: bytes = b"") -> bytes:
-    """A variant that announces an array."""
+    """Return a variant that announces an array."""
     return bytes([ARRAY | kind]) + struct.pack("<i", count) + elements
 
 
@@ -102,7 +102,7 @@ def test_one_element_or_byte_more_is_refused(value: ua.Variant, limit: str) -> N
 
 
 def test_the_largest_requests_are_decoded() -> None:
-    """As many operations as the limits of the services allow, with names as long as those of a line."""
+    """Each request has the greatest number of operations, with names as long as on a line."""
     node = ua.NodeId("machines/a_rather_long_name_of_a_machine/produced", 2)
     read = ua.ReadParameters(NodesToRead=[ua.ReadValueId(node, ua.AttributeIds.Value)] * LIMITS.nodes_per_read)
     item = ua.MonitoredItemCreateRequest(ua.ReadValueId(node, ua.AttributeIds.Value))
@@ -154,7 +154,7 @@ class Raw:
         return answer
 
     def send(self, body: bytes, chunk: bytes = b"F", part: int = 60_000) -> None:
-        """A message in parts."""
+        """Send a message in parts."""
         for first in range(0, len(body), part):
             self._number += 1
             last = first + part >= len(body)
@@ -167,7 +167,7 @@ def hello(size: int) -> bytes:
 
 
 def endpoints(additional: bytes) -> bytes:
-    """A GetEndpoints request whose header carries an operand of filters with a value."""
+    """Return a GetEndpoints request whose header carries an operand of filters with a value."""
     request = struct_to_binary(ua.GetEndpointsRequest())
     header = b"\0\0" + struct.pack("<qIIiI", 0, 1, 0, -1, 0)
     operand = b"\x01\x00" + struct.pack("<HBi", 597, 1, len(additional)) + additional

@@ -165,7 +165,7 @@ def test_a_flood_of_sessions_and_sockets_leaves_room_for_an_operator(serve: Serv
         with refused(Codes.BadTooManySessions):
             await client_of(line, "operator").connect()
         silent += [await asyncio.open_connection("127.0.0.1", line.server.port) for _ in range(20)]
-        for client in guests:  # nobody who has a session was dropped
+        for client in guests:  # no client with a session was dropped
             assert await client.get_node(TICK).read_value() is not None
             await client.disconnect()
         for _, writer in silent:

@@ -85,7 +85,7 @@ def history(count: int, values: int = 0, point: bytes | None = None) -> ua.Histo
 
 
 async def services(client: Client) -> dict[str, Callable[[int], Awaitable[Any]]]:
-    """Requests with so many operations, by field of the limits."""
+    """Return requests with `count` operations, by field of the limits."""
     service = client.uaclient.session
     subscription = await client.create_subscription(1000, None)
     id = subscription.subscription_id

@@ -90,7 +90,7 @@ class Follower:
             pass
 
     def end(self) -> None:
-        """Have it go away, and wait for that."""
+        """Ask it to disconnect, and wait for its end."""
         with self.process:
             assert self.process.stdin is not None
             self.process.stdin.close()
@@ -105,7 +105,7 @@ class Follower:
 
 
 def test_it_sees_values_again_after_the_server_was_restarted(serve: Serve, certificates: Path, tmp_path: Path) -> None:
-    """Its subscription is gone, and its id is that of somebody else: it has to make a new one."""
+    """Its subscription is gone, and another client has its id, so it must create a new one."""
     line = serve()
     line.client()
     line.advance(3)

@@ -1,4 +1,4 @@
-"""Subscriptions belong to sessions: no service lets a client act on those of another one."""
+"""Subscriptions belong to sessions: no service lets a client act on the subscriptions of another session."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ WITHOUT_IDS = {
 }
 
 UNREACHABLE = {"add_method_callback"}
-"""Not called for any request of a client."""
+"""Methods that no request of a client leads to."""
 
 
 def test_every_method_of_a_session_is_accounted_for() -> None:
-    """A new version of the library with another service fails here, until somebody has looked at its ids."""
+    """A new version of the library with another service fails here until its ids have been reviewed."""
     public = {name for name, _ in inspect.getmembers(InternalSession, callable) if not name.startswith("_")}
     accounted = [CHECKED, REFUSED, WITHOUT_IDS, UNREACHABLE]
     assert public - {"max_connections"} == set().union(*accounted)
@@ -89,7 +89,7 @@ def test_every_service_that_is_answered_is_accounted_for() -> None:
 
 
 def parameters(kind: Any, **fields: Any) -> Any:
-    """A request of a type with some parameters."""
+    """Return a request of a type with some parameters."""
     request = kind()
     for name, value in fields.items():
         setattr(request.Parameters, name, value)
@@ -97,13 +97,13 @@ def parameters(kind: Any, **fields: Any) -> Any:
 
 
 async def sent(client: AsyncClient, request: Any) -> Any:
-    """The decoded answer to a request. Raises UaStatusCodeError."""
+    """Return the decoded answer to a request. Raises UaStatusCodeError."""
     kind = getattr(ua, type(request).__name__.replace("Request", "Response"))
     return struct_from_binary(kind, await client.uaclient.protocol.send_request(request))
 
 
 async def single(client: AsyncClient, request: Any) -> int:
-    """The status code of a request with one operation: of the service, or of the operation."""
+    """Return the status code of a request with one operation: of the service, or of the operation."""
     try:
         answer = await sent(client, request)
     except ua.UaStatusCodeError as error:
@@ -129,7 +129,7 @@ async def connected(line: Line, user: str = "", security: str = "", uri: str = "
 
 
 async def stepped(line: Line, awaited: Coroutine[Any, Any, T]) -> T:
-    """What a coroutine returns, while the line goes on: a publish request is answered when there is a change."""
+    """Return the result of a coroutine while the line goes on, because only a change answers a publish request."""
     task = asyncio.ensure_future(awaited)
     while not task.done():
         await asyncio.to_thread(line.advance)
@@ -234,7 +234,7 @@ def test_nobody_acts_on_the_subscription_of_another_session(line: Line, user: st
 
 
 def test_another_session_of_the_same_user_owns_nothing_either(line: Line) -> None:
-    """It may take the subscription over first. Methods of the server that would tell of its items are not offered."""
+    """It may take the subscription over first. The server offers no methods that list items."""
 
     async def come() -> tuple[dict[str, int], list[int]]:
         victim, other, screen = await connected(line, "operator"), await connected(line, "operator"), Screen()
@@ -389,7 +389,7 @@ def test_a_transfer_of_nothing_and_of_what_is_not_there(line: Line) -> None:
 
 @pytest.mark.parametrize("token", [ua.AnonymousIdentityToken(), ua.UserNameIdentityToken("username", "operator", b"x")])
 def test_a_session_token_that_was_overheard_silences_nobody(line: Line, token: Any) -> None:
-    """The library redirects notifications to whoever shows a token, before it checks who that is."""
+    """The library redirects notifications to any client with the token, before it checks the user."""
 
     async def come() -> int:
         victim, screen = await connected(line, "operator"), Screen()
@@ -416,7 +416,7 @@ def test_a_session_token_that_was_overheard_silences_nobody(line: Line, token: A
 
 
 def test_a_session_goes_on_over_another_connection(line: Line) -> None:
-    """By the same user, with its subscriptions."""
+    """It is the same user's, and keeps its subscriptions."""
 
     async def come() -> None:
         first, screen = await connected(line, "operator"), Screen()

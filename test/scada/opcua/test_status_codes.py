@@ -116,7 +116,7 @@ OTHERS: tuple[tuple[Any, int], ...] = (
 
 
 def codes_of(line: Line, requests: list[Any]) -> list[int]:
-    """The status codes of requests in one session."""
+    """Return the status codes of requests in one session."""
 
     async def come() -> list[int]:
         client = AsyncClient(line.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
