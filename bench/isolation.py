@@ -67,14 +67,14 @@ def _measure(attack: str, turn: int, seconds: float) -> list[Row]:
             subprocess.Popen([*command, addresses[name], str(seconds)], stdout=subprocess.PIPE, text=True)
             for name in ("modbus", "web")
         ]
-        found: dict[str, list[float]] = {}
+        latencies: dict[str, list[float]] = {}
         for client in clients:
-            found |= json.loads(client.communicate(timeout=PATIENCE)[0])
-        restarts = _told(log).count("it is restarted")
+            latencies |= json.loads(client.communicate(timeout=PATIENCE)[0])
+        restarts = _logged(log).count("it is restarted")
     rows = [Row(CASE, 0, attack, RESTARTS, turn, restarts)]
-    for name, latencies in found.items():
-        rows.append(Row(CASE, 0, attack, f"{name}: {P99}", turn, 1e3 * _percentile(latencies, 0.99)))
-        rows.append(Row(CASE, 0, attack, f"{name}: {WORST}", turn, 1e3 * max(latencies)))
+    for name, seconds_each in latencies.items():
+        rows.append(Row(CASE, 0, attack, f"{name}: {P99}", turn, 1e3 * _percentile(seconds_each, 0.99)))
+        rows.append(Row(CASE, 0, attack, f"{name}: {WORST}", turn, 1e3 * max(seconds_each)))
     return rows
 
 
@@ -91,12 +91,12 @@ def _served() -> Iterator[tuple[dict[str, str], IO[str]]]:
         )
         try:
             end = time.monotonic() + PATIENCE
-            while len(found := re.findall(GREETING, _told(log), re.MULTILINE)) < len(SERVERS):
+            while len(greetings := re.findall(GREETING, _logged(log), re.MULTILINE)) < len(SERVERS):
                 if process.poll() is not None or time.monotonic() > end:
-                    raise RuntimeError(f"the line is not served: {_told(log)}")
+                    raise RuntimeError(f"the line is not served: {_logged(log)}")
                 time.sleep(0.1)
             schemes = {"opc.tcp": "opcua", "modbus": "modbus", "http": "web"}
-            yield {schemes[scheme]: scheme + rest for scheme, rest in found}, log
+            yield {schemes[scheme]: scheme + rest for scheme, rest in greetings}, log
         finally:
             process.send_signal(signal.SIGINT)
             process.wait()
@@ -116,7 +116,7 @@ def _attacked(attack: str, address: str) -> Iterator[None]:
         process.wait()
 
 
-def _told(log: IO[str]) -> str:
+def _logged(log: IO[str]) -> str:
     return os.pread(log.fileno(), 100_000, 0).decode()
 
 

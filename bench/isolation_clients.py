@@ -22,7 +22,7 @@ TICK = struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, 65_534, 2)
 
 def modbus(address: str, seconds: float) -> dict[str, list[float]]:
     """Read the tick repeatedly."""
-    parts, found = urlsplit(address), []
+    parts, latencies = urlsplit(address), list[float]()
     end = time.monotonic() + seconds
     with socket.create_connection((parts.hostname or "", parts.port or 0), 600.0) as connection:
         while time.monotonic() < end:
@@ -30,9 +30,9 @@ def modbus(address: str, seconds: float) -> dict[str, list[float]]:
             connection.sendall(TICK)
             if not connection.recv(100):
                 raise ConnectionError(f"{address}: the connection has ended")
-            found.append(time.perf_counter() - began)
+            latencies.append(time.perf_counter() - began)
             time.sleep(POLL)
-    return {"modbus": found}
+    return {"modbus": latencies}
 
 
 async def page(address: str, seconds: float) -> dict[str, list[float]]:
@@ -69,8 +69,8 @@ async def page(address: str, seconds: float) -> dict[str, list[float]]:
 
 def main(address: str, seconds: float) -> None:
     """Print the latencies of the server at an address: Modbus or the page."""
-    found = modbus(address, seconds) if address.startswith("modbus") else asyncio.run(page(address, seconds))
-    print(json.dumps(found))
+    latencies = modbus(address, seconds) if address.startswith("modbus") else asyncio.run(page(address, seconds))
+    print(json.dumps(latencies))
 
 
 if __name__ == "__main__":

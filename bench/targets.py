@@ -114,8 +114,8 @@ def _attacked(quantity: str) -> Callable[[Rows], float | None]:
     def figure(rows: Rows) -> float | None:
         attacks = {row.contestant for row in rows.all} - {isolation.NONE}
         names = [f"{name}: {quantity}" for name in isolation.SERVED]
-        found = [_middle(rows.spread(isolation.CASE, 0, attack, name)) for attack in attacks for name in names]
-        return max((value for value in found if value is not None), default=None)
+        values = [_middle(rows.spread(isolation.CASE, 0, attack, name)) for attack in attacks for name in names]
+        return max((value for value in values if value is not None), default=None)
 
     return figure
 

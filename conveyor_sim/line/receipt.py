@@ -52,36 +52,36 @@ class Receipt:
         """Tags that an operation may name, with the word for one of them, by operation."""
         self._counting = {LINE, *(tag.device for tag in tags if tag.device_class in COUNTING)}
 
-    def refusal(self, given: Input) -> Refusal | None:
+    def refusal(self, request: Input) -> Refusal | None:
         """Return why no state of the line would allow an input; None if some state may."""
-        operation, names, values = given.operation, given.names, given.values
-        if reason := unauthorized(given, MAY):
+        operation, names, values = request.operation, request.names, request.values
+        if reason := unauthorized(request, MAY):
             return Refusal("operation", reason)
-        if given.texts and operation in (*self._tables, UNFORCE, RESET_COUNTERS):
-            return Refusal("form", f"{len(given.texts)} texts given, expected none")
+        if request.texts and operation in (*self._tables, UNFORCE, RESET_COUNTERS):
+            return Refusal("form", f"{len(request.texts)} texts given, expected none")
         if operation in self._tables:
-            return self._table_refusal(given)
+            return self._table_refusal(request)
         if operation == UNFORCE:
             return _values_refusal(values) or _unknown(self._tables[FORCE][1], "signal", names)
         if operation == RESET_COUNTERS:
             return _values_refusal(values) or _unknown(self._counting, "device that counts", names)
         if operation in (OWN, DISOWN):
-            if reason := hand_over_problem(given):
+            if reason := hand_over_problem(request):
                 return Refusal("form", reason)
-            reason = pattern_problem(given.texts, self._tables[MODE][1], self._where)
+            reason = pattern_problem(request.texts, self._tables[MODE][1], self._where)
             return Refusal("name", reason) if reason else None
         if operation in ALARM_OPERATIONS and (reason := argument_problem(operation, names, values)):
             return Refusal("value" if names and len(values) == len(names) else "form", reason)
         return None
 
-    def _table_refusal(self, given: Input) -> Refusal | None:
-        what, known = self._tables[given.operation]
-        names, values = given.names, given.values
+    def _table_refusal(self, request: Input) -> Refusal | None:
+        what, known = self._tables[request.operation]
+        names, values = request.names, request.values
         if reason := refusal(known, what, names, values):
             return Refusal(_cause(known, what, names, values), reason)
-        for device, mode in zip(names, values, strict=True) if given.operation == MODE else ():
-            if reserved_mode(given.writer_kind, [mode]) is not None:
-                return Refusal("role", reserved(device, given.writer_kind, mode))
+        for device, mode in zip(names, values, strict=True) if request.operation == MODE else ():
+            if reserved_mode(request.writer_kind, [mode]) is not None:
+                return Refusal("role", reserved(device, request.writer_kind, mode))
         return None
 
 

@@ -42,8 +42,3 @@ def die_with_parent() -> None:
     """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def how_it_ended(code: int) -> str:
-    """Return the words for an exit code of `subprocess`."""
-    return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"

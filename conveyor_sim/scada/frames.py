@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 
 from conveyor_sim.scada.face import Health
-from conveyor_sim.scada.server_messages import LIFE_SIGN, Frame
+from conveyor_sim.scada.server_messages import LIFE_SIGN, LineFrame
 from conveyor_sim.scada.source import MOST_EVENTS
 from conveyor_sim.scada.view import DRAWN, PictureSource
 
@@ -33,7 +33,7 @@ class Frames:
         """
         self._view, self._servers = view, servers
         self._wake = threading.Condition(threading.RLock())
-        self._waiting: deque[Frame] = deque()
+        self._waiting: deque[LineFrame] = deque()
         self._bytes = 0  # of the messages in them
         self._states: dict[str, bytes] = {}  # messages since the last frame
         self._passed: deque[bytes] = deque(maxlen=MOST_EVENTS)
@@ -46,7 +46,7 @@ class Frames:
             self._ends = (view.hear(self._hear), view.listen(self._listen))
             self._listen()
 
-    def fetch(self) -> Frame | None:
+    def fetch(self) -> LineFrame | None:
         """Block until there is a frame, or for LIFE_SIGN seconds, and return it; None once this has ended."""
         with self._wake:
             self._wake.wait_for(lambda: self._waiting or self._ended, LIFE_SIGN)
@@ -112,13 +112,13 @@ class Frames:
     def _wants(self, topic: str) -> bool:
         return self._watched or topic not in DRAWN
 
-    def _cut(self, states: dict[str, bytes], shown: int) -> Frame:
+    def _cut(self, states: dict[str, bytes], shown: int) -> LineFrame:
         view, passed, anew = self._view, tuple(self._passed), self._anew
         self._passed.clear()
         self._anew = False
         total, events = view.events(self._total)
         self._total, now = total, view.shown
-        return Frame(
+        return LineFrame(
             anew,
             states,
             passed,
@@ -134,7 +134,7 @@ class Frames:
         )
 
 
-def _merged(old: Frame, new: Frame) -> Frame:
+def _merged(old: LineFrame, new: LineFrame) -> LineFrame:
     if new.anew:
         old = old._replace(states={})
     return new._replace(
@@ -145,5 +145,5 @@ def _merged(old: Frame, new: Frame) -> Frame:
     )
 
 
-def _size(frame: Frame) -> int:
+def _size(frame: LineFrame) -> int:
     return sum(map(len, frame.states.values()))

@@ -42,13 +42,13 @@ def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, w
     return f"{device}: the line is owned by controller {shown.owner}"
 
 
-def refused_for_good(source: TagSource, receipt: Receipt, given: Input) -> Refusal | None:
+def refused_for_good(source: TagSource, receipt: Receipt, request: Input) -> Refusal | None:
     """Return why the line would refuse an input in every state; None if it might accept it.
 
     Such an input is still passed on if its writer may use the operation: the line then records the refusal.
     """
-    refusal = receipt.refusal(given)
+    refusal = receipt.refusal(request)
     # The line may accept a part of several commands, so these are not passed on.
-    if refusal is not None and refusal.cause != "operation" and given.operation != SET:
-        source.give(given)
+    if refusal is not None and refusal.cause != "operation" and request.operation != SET:
+        source.give(request)
     return refusal

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.scada.server_messages import Answer, Call, Frame, ServerTask, What
+from conveyor_sim.scada.server_messages import Answer, Call, LineFrame, ServerTask, What
 from conveyor_sim.scada.source import Control
 from conveyor_sim.scada.users import User
 from conveyor_sim.scada.view import DRAWN, HEARD, View
@@ -120,7 +120,7 @@ class RemoteSource(View):
     def _watched(self, on: bool) -> None:
         self._calls.tell("watch", on)
 
-    def apply(self, frame: Frame) -> None:
+    def apply(self, frame: LineFrame) -> None:
         """Show the data of a frame. Messages that can't be decoded make the line lost, with the reason."""
         try:
             self._apply(frame)
@@ -128,7 +128,7 @@ class RemoteSource(View):
             text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
             self.lose(printable(text, SENTENCE))
 
-    def _apply(self, frame: Frame) -> None:
+    def _apply(self, frame: LineFrame) -> None:
         if frame.anew:
             self.forget()
         for topic in HEARD:

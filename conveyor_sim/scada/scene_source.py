@@ -19,11 +19,12 @@ from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
-from conveyor_sim.scada.child import how_it_ended, start_child
+from conveyor_sim.scada.child import start_child
 from conveyor_sim.scada.handshake import TARGET, problem
 from conveyor_sim.scada.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
 from conveyor_sim.scada.source import MOST_WAITING, Control
 from conveyor_sim.scada.view import DRAWN, HEARD, View, decoded
+from conveyor_sim.support.child_process import how_it_ended
 
 RUNNING_FREE: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
 IN_LOCKSTEP: frozenset[Control] = frozenset({"target"})

@@ -18,7 +18,6 @@ from multiprocessing.connection import Connection
 from typing import Any
 from urllib.parse import urlsplit
 
-from conveyor_sim.scada.child import how_it_ended
 from conveyor_sim.scada.face import FaceError, Health, Settings, Status
 from conveyor_sim.scada.faces import Kind
 from conveyor_sim.scada.frames import Frames
@@ -28,6 +27,7 @@ from conveyor_sim.scada.server_messages import Answer, Beat, Call, End, Failed, 
 from conveyor_sim.scada.source import WEB
 from conveyor_sim.scada.users import Logins
 from conveyor_sim.scada.view import PictureSource
+from conveyor_sim.support.child_process import how_it_ended
 
 STALLED = 5.0
 """s of wall time without a heartbeat after which a protocol server is killed and restarted."""

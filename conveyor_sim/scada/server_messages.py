@@ -41,7 +41,7 @@ class ServerTask:
     """Requests that were passed on, and that were refused, by earlier processes of this protocol server."""
 
 
-class Frame(NamedTuple):
+class LineFrame(NamedTuple):
     """Sent to the process: everything that is new since the frame before."""
 
     anew: bool

@@ -1,4 +1,4 @@
-"""`Budget`: work units that a client may use, refilled at a constant rate (token bucket)."""
+"""`Budget`: work units or requests that a client may use, refilled at a constant rate (token bucket)."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ def _format(kind: Type) -> str:
 
 
 @dataclass(frozen=True)
-class Place:
+class MemoryPlace:
     """Place of a variable in the shared memory. group: number common to all variables that overlap."""
 
     group: int
@@ -133,7 +133,7 @@ class Place:
 class Layout:
     """The shared memory of a program: places by Python class and slot; size in bytes."""
 
-    places: Mapping[tuple[str, str], Place]
+    places: Mapping[tuple[str, str], MemoryPlace]
     size: int
 
 
@@ -146,7 +146,7 @@ def laid_out(located: Iterable[Located], instances: Mapping[str, int]) -> Layout
     instances: number of instances by Python class, if there are several. Raise SourceError for variables that can't
     share the memory that their addresses say.
     """
-    places: dict[tuple[str, str], Place] = {}
+    places: dict[tuple[str, str], MemoryPlace] = {}
     size = 0
     for number, group in enumerate(overlapping((one.space, *one.extent, one) for one in located)):
         if len(group) == 1 and instances.get(group[0].unit, 1) == 1:
@@ -160,7 +160,7 @@ def laid_out(located: Iterable[Located], instances: Mapping[str, int]) -> Layout
             kind, is_memory = one.member.type, one.address.area == "M"
             start = one.extent[0] - first if is_memory else 0
             bit = start % 8 if is_memory and one.address.size == "X" else None
-            place = Place(number, size + start // 8, bit, _format(kind), one is setter)
+            place = MemoryPlace(number, size + start // 8, bit, _format(kind), one is setter)
             places[one.unit, one.member.slot] = place
             end = max(end, start // 8 + struct.calcsize("<" + place.format))
         size += end

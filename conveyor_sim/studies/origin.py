@@ -45,8 +45,8 @@ class Origin:
 
     def content(self) -> bytes:
         """Return the content of the file."""
-        found = {} if self.warm_up is None else {WARM_UP: self.warm_up}
-        return sealed({**self.fields, **found, TEXT: self.text}, indent=1)
+        warm_up = {} if self.warm_up is None else {WARM_UP: self.warm_up}
+        return sealed({**self.fields, **warm_up, TEXT: self.text}, indent=1)
 
 
 def origin_of(setup: Setup) -> dict[str, str]:

@@ -39,9 +39,9 @@ def read_units(file: Path, fields: Mapping[str, str], sealed: bool) -> Units:
     if sealed and not (isinstance(made, dict) and fields.items() <= made.items()):
         raise FileError("was made with another study")
     try:
-        found = Units.model_validate(kept.data)
+        units = Units.model_validate(kept.data)
     except ValidationError:
         raise FileError("has other fields than conveyor-sim sweep writes") from None
-    if found.units.keys() != found.asked.keys():
+    if units.units.keys() != units.asked.keys():
         raise FileError("has units of other metrics than it names")
-    return found
+    return units

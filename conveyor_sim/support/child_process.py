@@ -16,6 +16,11 @@ LIFELINE = Path(__file__).with_name("lifeline.py")
 TAIL = 15  # lines of a log shown when its process fails
 
 
+def how_it_ended(code: int | None) -> str:
+    """Return the words for an exit code of `subprocess`."""
+    return f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
+
+
 class Process:
     """One process, from its start until stop()."""
 
@@ -79,6 +84,4 @@ class Process:
 
     def obituary(self) -> str:
         """How it ended, and the end of its log."""
-        code = self.exit_code
-        how = f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
-        return f"{self.name} {how}; the end of its log:\n{self.last_words()}"
+        return f"{self.name} {how_it_ended(self.exit_code)}; the end of its log:\n{self.last_words()}"

@@ -46,8 +46,8 @@ def is_own(hosts: Sequence[str], scheme: str) -> bool:
     Any port is accepted, because a tunnel has another one than the server. A foreign page whose DNS name leads here
     (DNS rebinding) sends its own name.
     """
-    found = authority(hosts[0], scheme) if len(hosts) == 1 else None
-    return found is not None and found.name in OWN_NAMES
+    asked = authority(hosts[0], scheme) if len(hosts) == 1 else None
+    return asked is not None and asked.name in OWN_NAMES
 
 
 def is_same_origin(origins: Sequence[str], hosts: Sequence[str], scheme: str) -> bool:

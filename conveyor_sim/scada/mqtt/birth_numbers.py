@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from conveyor_sim.support.files import FileError, read_file, write_file
+from conveyor_sim.support.sealed_json import parsed
 
 COUNT = 256
 """Numbers go from 0 to COUNT - 1, and round."""
@@ -69,8 +70,8 @@ class BirthNumbers:
         if not (folder / self._file).exists():
             return 0
         try:
-            last = json.loads(read_file(self._file, _MOST_BYTES, folder))["bdSeq"]
-        except (FileError, ValueError, TypeError, KeyError, RecursionError):
+            last = parsed(read_file(self._file, _MOST_BYTES, folder))["bdSeq"]
+        except (FileError, TypeError, KeyError):
             last = None
         if type(last) is not int or not 0 <= last < COUNT:
             self._remark("its last number can't be read")

@@ -75,16 +75,11 @@ class Bounds:
             or guests + len(asked) > share_of_guests(limits.items)
         ):
             raise ServiceError(Codes.BadTooManyMonitoredItems)
-        filters = (item.RequestedParameters.Filter for item in asked)
-        self._require_fields(sum(filter_units(one, limits) for one in filters if isinstance(one, ua.EventFilter)))
-        self._bound_queues(asked)
+        self._require_cost(asked)
 
     def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
         """Raise ServiceError for too costly filters of existing items. Reduce queues to the room that is left."""
-        asked = params.ItemsToModify
-        filters = (item.RequestedParameters.Filter for item in asked)
-        self._require_fields(sum(filter_units(one, self.limits) for one in filters if isinstance(one, ua.EventFilter)))
-        self._bound_queues(asked)
+        self._require_cost(params.ItemsToModify)
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:
         """Reduce the values per node to what one answer takes."""
@@ -93,8 +88,10 @@ class Bounds:
         details.NumValuesPerNode = min(details.NumValuesPerNode or most, most)
         self._units += _HISTORY_UNITS * most * len(params.NodesToRead)
 
-    def _require_fields(self, fields: int) -> None:
-        """Raise ServiceError if all event filters of the session together select too much."""
+    def _require_cost(self, asked: Sequence[Any]) -> None:
+        """Raise ServiceError if all event filters of the session together select too much. Reduce queues."""
+        filters = (item.RequestedParameters.Filter for item in asked)
+        fields = sum(filter_units(one, self.limits) for one in filters if isinstance(one, ua.EventFilter))
         mine = (
             each.monitored_item_srv.event_fields
             for each in self._service.subscriptions.values()
@@ -102,6 +99,7 @@ class Bounds:
         )
         if fields and sum(mine) + fields > self.limits.event_fields_per_session:
             raise ServiceError(Codes.BadTooManyOperations)
+        self._bound_queues(asked)
 
     def _bound_queues(self, asked: Sequence[Any]) -> None:
         """Set queue sizes within the limits. The library treats 0 as the longest queue, or as no bound."""
@@ -109,10 +107,10 @@ class Bounds:
         most = share_of_guests(self.limits.queued) if self.is_guest else self.limits.queued
         left = most - sum(each.monitored_item_srv.queued for each in subscriptions)
         for item in asked:
-            given = item.RequestedParameters
-            least = EVENTS_QUEUED if isinstance(given.Filter, ua.EventFilter) else 1
-            given.QueueSize = max(1, min(max(given.QueueSize, least), self.limits.queue_size, left))
-            left -= given.QueueSize
+            wanted = item.RequestedParameters
+            least = EVENTS_QUEUED if isinstance(wanted.Filter, ua.EventFilter) else 1
+            wanted.QueueSize = max(1, min(max(wanted.QueueSize, least), self.limits.queue_size, left))
+            left -= wanted.QueueSize
 
     def _items(self, wanted: Any) -> int:
         """Return the number of monitored items of the subscriptions that a function accepts."""

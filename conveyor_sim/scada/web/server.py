@@ -21,6 +21,7 @@ from conveyor_sim.scada.view import PictureSource
 from conveyor_sim.scada.web.commands import NOBODY, Commands, Person
 from conveyor_sim.scada.web.feed import Feed, text_message
 from conveyor_sim.scada.web.viewer import Viewer
+from conveyor_sim.scada.work import Budget
 from conveyor_sim.view.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.view.own_host import is_own, is_same_origin
 
@@ -247,17 +248,16 @@ class WebServer:
             self._feed.join(viewer)
         else:
             viewer.tell(text_message("locked"))
-        left, before = float(MOST_REQUESTS), time.monotonic()
+        budget = Budget(RATE, MOST_REQUESTS)
         async for message in socket:
-            now = time.monotonic()
-            left, before = min(left + RATE * (now - before), MOST_REQUESTS) - 1.0, now
-            if left >= 0.0 and message.type in (WSMsgType.PING, WSMsgType.PONG):  # of which there can be too many, too
+            is_allowed = budget.spend(1.0)
+            if is_allowed and message.type in (WSMsgType.PING, WSMsgType.PONG):  # of which there can be too many, too
                 if message.type is WSMsgType.PING:
                     await socket.pong(message.data)
                 continue
-            request = _request(message.data) if message.type is WSMsgType.TEXT and left >= 0.0 else None
+            request = _request(message.data) if message.type is WSMsgType.TEXT and is_allowed else None
             if request is None:
-                reason = "too many requests" if left < 0.0 else "expected an object in JSON"
+                reason = "expected an object in JSON" if is_allowed else "too many requests"
                 await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason.encode())
                 break
             if request.get("do") != "ping":  # a hidden page pings, and shows no frames
