@@ -203,8 +203,8 @@ def scratch_folder() -> str:
         if re.fullmatch(r"[\w./+-]+", folder, re.ASCII) and os.access(folder, os.W_OK | os.X_OK):
             return folder
     raise SetUpError(
-        f"{tempfile.gettempdir()!r}: found no temporary folder with only letters, digits and ./_+- in its path, which "
-        "building the messages needs, expected TMPDIR to name one."
+        f"{tempfile.gettempdir()!r}: found no temporary folder with only letters, digits and ./_+- in its path, needed "
+        "to build the messages; expected TMPDIR to name one."
     )
 
 

@@ -54,7 +54,7 @@ def _clause(name: str, kind: str) -> str:
     if kind == "sqlite3":
         return f"its storage is sqlite3 ({name}), expected MCAP: `ros2 bag convert` makes an MCAP bag of it"
     if kind == "ROS 1":
-        return f"its storage is that of ROS 1 ({name}), expected MCAP: `rosbags-convert` makes a rosbag2 folder of it"
+        return f"its storage is ROS 1 ({name}), expected MCAP: `rosbags-convert` makes a rosbag2 folder of it"
     command = UNPACKED_BY[kind].format(name=quote(name), unpacked=quote(_unpacked(name)))
     return f"its file is compressed by {kind} ({name}), expected MCAP: `{command}` unpacks it"
 

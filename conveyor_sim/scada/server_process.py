@@ -69,7 +69,7 @@ class _Process:
             if self._frames.poll(SILENCE):
                 self._source.apply(self._frames.recv())
             else:
-                self._source.lose(f"nothing was heard of the process that has the line for {SILENCE:g} s")
+                self._source.lose(f"no data came from the process that has the line for {SILENCE:g} s")
 
     def _listen(self) -> None:
         while True:

@@ -237,7 +237,7 @@ class Journal(AbstractContextManager["Journal"]):
         if reason and any(not isinstance(run, FileError) for _, run in runs):
             self.warm_up = self._warm_up_of(runs, wanted)
             if not origin.exists():
-                self._say(f"{origin}: {reason}; it is written again by what the runs were made with")
+                self._say(f"{origin}: {reason}; it is restored from the origin that the runs state")
         if reason:
             self._set_aside(origin, reason)
         own = Origin(wanted, self.warm_up, self._setup.source, True)
@@ -316,8 +316,8 @@ def read_rows(folder: Path, origin: Origin | None = None) -> list[Row]:
             problem = str(run) if isinstance(run, FileError) else objection(*run, origin)
             if isinstance(run, FileError) or problem:
                 raise StudyError(
-                    f"{file}: {problem}, expected an intact run of this study; the command that made it makes it "
-                    "again, and without the file the other runs are shown"
+                    f"{file}: {problem}, expected an intact run of this study: repeat the command that made "
+                    "it, or remove the file to see the other runs"
                 )
             rows.append(run[0])
     except OSError as error:

@@ -137,7 +137,7 @@ def _is_there(parent: int, name: str, objection: Objection | None) -> bool:
     try:
         kind = stat.S_IFMT(os.fstat(opened).st_mode)
         if kind in _KINDS:
-            raise FileError(f"is a link to what {_KINDS[kind]}")
+            raise FileError(f"is a link, and its target {_KINDS[kind]}")
         with open(os.open(_of(opened), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
             reason = objection(stream)
     finally:

@@ -86,10 +86,10 @@ def test_runs_of_something_else_are_refused(tmp_path: Path) -> None:
         SampleFile(tmp_path, SCENE)
     for broken in ("[]", "{", "", "[" * 100_000, json.dumps({**origin, "sha256": "0" * 64})):
         (tmp_path / ORIGIN).write_text(broken)
-        with pytest.raises(ConveyorError, match=r"origin\.json: .*, so it can't be told what the runs"):
+        with pytest.raises(ConveyorError, match=r"origin\.json: .*, so the origin of the runs beside it is unknown"):
             SampleFile(tmp_path, SCENE)
     (tmp_path / ORIGIN).unlink()
-    with pytest.raises(ConveyorError, match=r"origin\.json: no such file, so it can't be told"):
+    with pytest.raises(ConveyorError, match=r"origin\.json: no such file, so the origin of the runs"):
         SampleFile(tmp_path, SCENE)
 
 

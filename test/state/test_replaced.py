@@ -97,7 +97,7 @@ def test_a_link_is_replaced_only_if_it_leads_to_a_checkpoint(sim: Simulation, co
     for name, target, reason in (
         ("to text", "text", "is not a checkpoint and is not replaced"),
         ("to nothing", "nowhere", "is a link to a file that does not exist"),
-        ("to a device", "/dev/zero", "is a link to what is a device, not a regular file"),
+        ("to a device", "/dev/zero", "is a link, and its target is a device, not a regular file"),
         ("round", "round", "can't be written (Too many levels of symbolic links)"),
         ("to itself", ".", "is a folder"),
     ):

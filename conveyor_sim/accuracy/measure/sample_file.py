@@ -103,7 +103,7 @@ def check_origin(folder: Path, scene: Scene) -> None:
         kept = read_sealed(path)
     except FileError as error:
         raise ConveyorError(
-            f"{path}: {error}, so it can't be told what the runs beside it are of; expected the file as it was, "
+            f"{path}: {error}, so the origin of the runs beside it is unknown; expected the file as it was, "
             "another folder, or this one emptied to begin anew"
         ) from None
     other = [what for what, value in origin.items() if kept.data.get(what) != value]

@@ -49,7 +49,7 @@ def read_study(path: str | Path, say: Callable[[str], object] = lambda _: None) 
         kept = read_sealed(Path(path))
     except FileError as error:
         raise ConveyorError(
-            f"{path}: {error}, expected the whole {STUDY} of a study of conveyor-sim accuracy"
+            f"{path}: {error}, expected an intact {STUDY} of a study of conveyor-sim accuracy"
         ) from None
     try:
         study = typed(Study, kept.data)
