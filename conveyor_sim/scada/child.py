@@ -14,7 +14,7 @@ _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def start_child(module: str, *pipes: Connection, name: str = "") -> subprocess.Popen[bytes]:
-    """Start a Python process that runs `main()` of a module. It inherits `pipes`, and its arguments are their numbers.
+    """Start a Python process that runs `main()` of a module. It inherits `pipes`; its arguments are their descriptors.
 
     name: last argument, by which people recognise the process. It runs in a new session: a Ctrl-C at the terminal must
     reach the parent only, which ends its children in order.

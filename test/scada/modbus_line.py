@@ -28,6 +28,15 @@ LONG, SHORT = 600.0, 0.2  # s of wall time that the server has with who is silen
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
 
 
+def speed_of(client: ModbusTcpClient) -> float | None:
+    """Return the speed of the first belt as a client reads it, which may reconnect; None without an answer."""
+    try:
+        answer = client.read_input_registers(0, count=2)
+    except Exception:
+        return None
+    return None if answer.isError() else float(client.convert_from_registers(answer.registers, client.DATATYPE.FLOAT32))
+
+
 @dataclass
 class Line:
     """One that is stepped by the test, and served."""

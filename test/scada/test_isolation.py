@@ -15,6 +15,7 @@ from typing import Any
 from urllib.request import urlopen
 
 import pytest
+from scada.modbus_line import speed_of
 from scada.served import Served
 from scada.waiting import PATIENCE, until
 
@@ -114,15 +115,6 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
     if served.process.poll() is None:
         served.process.kill()
         served.process.wait()
-
-
-def speed_of(client: ModbusTcpClient) -> float | None:
-    """Return the speed of the first belt as a client reads it; None without an answer."""
-    try:
-        answer = client.read_input_registers(0, count=2)
-    except Exception:
-        return None
-    return None if answer.isError() else float(client.convert_from_registers(answer.registers, client.DATATYPE.FLOAT32))
 
 
 def code_of(client: ModbusTcpClient, value: float) -> int:

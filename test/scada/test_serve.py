@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from scada.modbus_line import speed_of
 from scada.served import Served
 from scada.waiting import PATIENCE, until
 
@@ -26,15 +27,6 @@ pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install con
 from pymodbus.client import ModbusTcpClient
 
 SCENE = "scenarios/zoned_line"
-
-
-def speed_of(client: ModbusTcpClient) -> float | None:
-    """What a client reads of the first belt, which reconnects by itself; None: nothing."""
-    try:
-        answer = client.read_input_registers(0, count=2)
-    except Exception:
-        return None
-    return None if answer.isError() else float(client.convert_from_registers(answer.registers, client.DATATYPE.FLOAT32))
 
 
 def give(client: ModbusTcpClient, value: float) -> None:
