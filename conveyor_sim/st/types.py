@@ -166,7 +166,7 @@ def repeated(kind: Type, code: str, count: int) -> str:
 
 
 def _fixed(kind: Type) -> bool:
-    """Return True if values of a type can't change: a list may hold one object many times, made in a tenth of the time."""
+    """Return True if values of a type can't change, so that a list may hold one object many times."""
     return not isinstance(kind, (Array, Structure))
 
 

@@ -94,7 +94,8 @@ def test_local_arrays_are_made_without_a_step_for_each_element(kind: str) -> Non
 def test_elements_of_arrays_of_arrays_and_structures_are_their_own() -> None:
     types = "TYPE P : STRUCT x : INT; END_STRUCT; Q : ARRAY [0..1] OF INT; END_TYPE"
     declared = """a, b : ARRAY [0..2, 0..1] OF INT; c, d : ARRAY [0..2] OF P; e, f : ARRAY [0..2] OF Q;
-    g : ARRAY [0..2, 0..1] OF INT := [6(0)]; h : ARRAY [0..2] OF P := [3((x := 0))]; k : ARRAY [0..2] OF Q := [3([0, 0])];"""
+    g : ARRAY [0..2, 0..1] OF INT := [6(0)]; h : ARRAY [0..2] OF P := [3((x := 0))];
+    k : ARRAY [0..2] OF Q := [3([0, 0])];"""
     body = "a[1, 0] := 1; c[1].x := 1; e[1][0] := 1; g[1, 0] := 1; h[1].x := 1; k[1][0] := 1;"
     running = Program(compile_text(program(types, declared, body)))
     running.run(0)
