@@ -24,7 +24,7 @@ from conveyor_sim.bag.own_source import own_source
 from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.source import Source
-from conveyor_sim.bag.storage import other_storage
+from conveyor_sim.bag.storage import other_storage, packed_message
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
@@ -156,7 +156,7 @@ class Bag(AbstractContextManager["Bag"]):
 
     def decode(self, topic: str, data: bytes) -> Any:
         """A rosbags message object. Raises BagError if the bytes are not one of the topic's type."""
-        with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded"):
+        with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded", data):
             return self._source.deserialize(data, self.types[topic])
 
     def sense(self) -> AbstractContextManager[None]:
@@ -177,7 +177,7 @@ class Bag(AbstractContextManager["Bag"]):
 
     def tick(self, topic: str, data: bytes) -> int:
         """The tick of a message of a topic that carries one; nothing else of it is decoded."""
-        with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded"):
+        with in_one_sentence(self.path, f"a message of topic {topic} can't be decoded", data):
             return self._source.tick(data, self.types[topic])
 
     def read(self, topic: str, ticks: Collection[int] | None = None) -> Iterator[Frame[Any]]:
@@ -229,11 +229,14 @@ class Bag(AbstractContextManager["Bag"]):
 class in_one_sentence(AbstractContextManager[None]):
     """Turns whatever the libraries raise over a bag that they can't read into a BagError of one sentence."""
 
-    def __init__(self, path: Path, what: str = "can't be read as a bag") -> None:
-        self._path, self._what = path, what
+    def __init__(self, path: Path, what: str = "can't be read as a bag", data: bytes = b"") -> None:
+        """data: the message that is read, if it is one."""
+        self._path, self._what, self._data = path, what, data
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if isinstance(error, Exception) and not isinstance(error, ConveyorError):
+            if packed := packed_message(self._data):
+                raise BagError(f"{self._path}: {self._what}: {packed}") from error
             reason = printable(" ".join(f"{type(error).__name__}: {error}".split()))
             hint = other_storage(self._path) or "`conveyor-sim recover` may help"
             raise BagError(f"{self._path}: {self._what} ({reason}); damaged? {hint}") from error

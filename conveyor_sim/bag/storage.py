@@ -35,6 +35,14 @@ def other_storage(path: Path) -> str:
     return ""
 
 
+def packed_message(data: bytes | memoryview) -> str:
+    """Return a clause for a bag with compressed messages, which only metadata.yaml states; "" for others."""
+    kind = next((MAGICS[magic] for magic in MAGICS if bytes(data[:16]).startswith(magic)), "")
+    if kind not in UNPACKED_BY:
+        return ""
+    return f"its messages are compressed by {kind}, expected the bag's folder with metadata.yaml, which says so"
+
+
 def packed_part(folder: Path) -> str:
     """Return a clause that names an MCAP file of a bag that is compressed and lies there in no other form; "": none."""
     for file in sorted(folder.glob("*.mcap.*")):

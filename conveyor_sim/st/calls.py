@@ -14,6 +14,9 @@ from conveyor_sim.st.work import CALL
 PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 """Sections of what a call passes."""
 
+MOST_CALLS = 100
+"""Calls one within the other: far from the limit of Python, which depends on who calls the program."""
+
 
 class Calls:
     """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2003, 2.5)."""
@@ -94,22 +97,24 @@ class Calls:
         passing = unit is not None and unit.function and root.startswith("(self,")
         return [f"_noted({root}, {at.line}, {at.column})"] if self.trace and not passing else []
 
-    def recursion(self) -> tuple[tree.Call, str] | None:
-        """A call that leads back to where it stands, and to whom; None if there is none."""
-        done: set[str] = set()
+    def require_finite(self) -> None:
+        """Raise SourceError for recursion, and for a chain of more than MOST_CALLS calls."""
+        done: dict[str, int] = {}  # calls below each
         for start in self.edges:
             path = [(start, iter(self.edges[start].items()))]
             while path:
                 name, calls = path[-1]
                 called, node = next(calls, (None, None))
                 if called is None or node is None:
-                    done.add(name)
+                    done[name] = 1 + max((done[one] for one in self.edges.get(name, ())), default=-1)
                     path.pop()
+                    if done[name] > MOST_CALLS:
+                        at = next(iter(self.edges[name].values())).at
+                        raise SourceError(at, f"found calls more than {MOST_CALLS} deep, expected fewer levels")
                 elif any(called == other for other, _ in path):
-                    return node, called[3:]
+                    raise SourceError(node.at, f"found a call that leads back to {called[3:]}, expected no recursion")
                 elif called not in done:
                     path.append((called, iter(self.edges.get(called, {}).items())))
-        return None
 
     def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call) -> None:
         if expressions.scope.unit is not None and not kind.standard:

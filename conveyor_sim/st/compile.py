@@ -107,9 +107,7 @@ def _compile(text: str, file: str, trace: bool) -> Compiled:
         lines.add(f"_memory = _Memory({layout.size})")
     for unit, kind in units:
         _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, layout)
-    if found := calls.recursion():
-        node, name = found
-        raise SourceError(node.at, f"found a call that leads back to {name}, expected no recursion")
+    calls.require_finite()
     for structure in declared.structures:
         _class(lines, structure.python, "_Record", list(structure.members.values()))
     _class(lines, "_Globals", "", list(declared.names.globals.members.values()), layout)

@@ -23,6 +23,7 @@ from conveyor_sim.st.types import (
     Structure,
     Subrange,
     Type,
+    repeated,
 )
 from conveyor_sim.st.values import converted, described
 
@@ -341,8 +342,9 @@ class Declarations:
             deeper = nested or not isinstance(element, tree.InitialArray)
             if element is not None and not deeper:
                 raise SourceError(element.at, f"found a list, expected {inner.name}")
-            codes.append(_times(count, inner.initial if element is None else self._initial(element, inner, known)))
-        codes.append(_times(size - values, inner.initial))
+            value = inner.initial if element is None else self._initial(element, inner, known)
+            codes.append(repeated(inner, value, count))
+        codes.append(repeated(inner, inner.initial, size - values))
         code = f"[{', '.join(filter(None, codes))}]"
         for one, other in reversed(rest):
             code = f"_rows({code}, {other - one + 1})"
@@ -360,11 +362,6 @@ class Declarations:
                 )
             given.append(f"{member.slot}={self._initial(value, member.type, known)}")
         return f"_with({kind.python}(), {', '.join(given)})"
-
-
-def _times(count: int, code: str) -> str:
-    """Code of so many elements of a list, each its own."""
-    return code if count == 1 else f"*({code} for _ in range({count}))" if count else ""
 
 
 def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:

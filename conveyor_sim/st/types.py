@@ -131,9 +131,12 @@ class Array(Type):
     @property
     def initial(self) -> str:
         """A list of lists of the element's initial value, each its own."""
-        code = self.element.initial
+        kind: Type = self.element
+        code = kind.initial
         for low, high in reversed(self.ranges):
-            code = f"[{code} for _ in range({high - low + 1})]"
+            count = high - low + 1
+            code = f"([{code}] * {count})" if _fixed(kind) else f"[{repeated(kind, code, count)}]"
+            kind = self
         return self.start or code
 
     @property
@@ -153,6 +156,18 @@ class Array(Type):
         for low, high in self.ranges:
             lists, elements = lists + elements, elements * (high - low + 1)
         return _LIST * lists + elements // _ELEMENTS + elements * self.element.work
+
+
+def repeated(kind: Type, code: str, count: int) -> str:
+    """Return code of `count` elements of a list, each with a separate value. code: one value of the type."""
+    if count < 2:
+        return code if count else ""
+    return f"*[{code}] * {count}" if _fixed(kind) else f"*({code} for _ in range({count}))"
+
+
+def _fixed(kind: Type) -> bool:
+    """Return True if values of a type can't change, so that a list may hold one object many times."""
+    return not isinstance(kind, (Array, Structure))
 
 
 @dataclass(frozen=True)

@@ -100,6 +100,21 @@ def test_a_part_that_is_still_compressed_is_not_left_out_in_silence(stored: dict
     assert not (folder / "metadata.yaml").exists()
 
 
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_messages_that_are_compressed_one_by_one_are_not_called_damaged(
+    bag: Path, tmp_path: Path, plugin: StoragePlugin
+) -> None:
+    """Only metadata.yaml states the compression, so the file alone can't be read."""
+    folder = stock(bag, tmp_path / "single", plugin, CompressionMode.MESSAGE)
+    assert replay(folder).difference is None
+    (file,) = (path for path in folder.iterdir() if path.suffix != ".yaml")
+    for command in READ:
+        done = CliRunner().invoke(main, [command, str(file)])
+        assert done.exit_code == 1
+        assert "compressed by zstd" in done.output and "metadata.yaml" in done.output
+        assert "damaged" not in done.output and "recover" not in done.output
+
+
 @pytest.mark.parametrize(
     ("name", "content", "named"),
     [

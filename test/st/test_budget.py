@@ -84,6 +84,27 @@ def test_long_scans_of_few_rounds_are_stopped() -> None:
         Program(compile_text(program(TYPES, DECLARED, body))).run(0)
 
 
+@pytest.mark.parametrize("kind", ["ARRAY [1..16000] OF INT", "ARRAY [1..16000] OF STRING := [16000('abc')]"])
+def test_local_arrays_are_made_without_a_step_for_each_element(kind: str) -> None:
+    """Making an array counts as copying one, so it must not take many times as long."""
+    local = f"FUNCTION local : INT VAR v : {kind}; END_VAR local := 1; END_FUNCTION"
+    assert "for _ in" not in compile_text(program(local, "n : INT;", "n := local();")).source
+
+
+def test_elements_of_arrays_of_arrays_and_structures_are_their_own() -> None:
+    types = "TYPE P : STRUCT x : INT; END_STRUCT; Q : ARRAY [0..1] OF INT; END_TYPE"
+    declared = """a, b : ARRAY [0..2, 0..1] OF INT; c, d : ARRAY [0..2] OF P; e, f : ARRAY [0..2] OF Q;
+    g : ARRAY [0..2, 0..1] OF INT := [6(0)]; h : ARRAY [0..2] OF P := [3((x := 0))];
+    k : ARRAY [0..2] OF Q := [3([0, 0])];"""
+    body = "a[1, 0] := 1; c[1].x := 1; e[1][0] := 1; g[1, 0] := 1; h[1].x := 1; k[1][0] := 1;"
+    running = Program(compile_text(program(types, declared, body)))
+    running.run(0)
+    values = {name: variable.read() for name, variable in running.variables.items()}
+    assert {name for name, value in values.items() if value} == {
+        "main/a[1,0]", "main/c[1]/x", "main/e[1][0]", "main/g[1,0]", "main/h[1]/x", "main/k[1][0]",
+    }  # fmt: skip
+
+
 def test_programs_stop_at_the_same_statement_in_every_run() -> None:
     compiled = compile_text(program(TYPES, DECLARED, "WHILE TRUE DO n := f(m); m := m + 1; END_WHILE"))
     states = []

@@ -398,11 +398,14 @@ def test_units_one_within_the_other_are_bounded(tmp_path: Path) -> None:
     path.write_text(chain("blocks", 2000) + "\nEND_PROGRAM")
     with pytest.raises(StructuredTextError, match=r":101:16: found 101 types one within the other, expected at most"):
         StructuredText(path)
-    path.write_text(chain("functions", 2000) + "\nEND_PROGRAM")
+    path.write_text(chain("functions", 99) + "\nEND_PROGRAM")
     plc = StructuredText(path)
     plc.bind(TAGS)
-    with pytest.raises(StructuredTextError, match="found calls too deep within each other, expected fewer levels"):
-        scan(plc, 0)
+    scan(plc, 0)
+    for many in (101, 2000):
+        path.write_text(chain("functions", many) + "\nEND_PROGRAM")
+        with pytest.raises(StructuredTextError, match=r":\d+: found calls more than 100 deep, expected fewer"):
+            StructuredText(path)
     path.write_text("PROGRAM p ; END_PROGRAM " * 5001)
     with pytest.raises(StructuredTextError, match="found 5001 programs, functions and blocks, expected at most 5000"):
         StructuredText(path)
