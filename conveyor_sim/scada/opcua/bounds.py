@@ -10,6 +10,7 @@ from asyncua.common.utils import ServiceError
 
 from conveyor_sim.scada.opcua.browsing import Views
 from conveyor_sim.scada.opcua.filters import filter_units
+from conveyor_sim.scada.opcua.items import CHANGE_UNITS
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import share_of_guests
 from conveyor_sim.scada.work import Budget
@@ -85,6 +86,13 @@ class Bounds:
         filters = (item.RequestedParameters.Filter for item in asked)
         self._require_fields(sum(filter_units(one, self.limits) for one in filters if isinstance(one, ua.EventFilter)))
         self._bound_queues(asked)
+
+    def charge_message(self, message: ua.NotificationMessage) -> None:
+        """Count the values and events of a message that is sent again as work."""
+        notifications = message.NotificationData or []
+        self._units += CHANGE_UNITS * sum(
+            len(getattr(one, "MonitoredItems", None) or getattr(one, "Events", None) or []) for one in notifications
+        )
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:
         """Reduce the values per node to what one answer takes."""

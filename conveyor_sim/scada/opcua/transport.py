@@ -104,6 +104,11 @@ class Connection(OPCUAProtocol):
         if self.place is not None:
             self.places.leave_user(self.place)
 
+    def note_failure(self) -> None:
+        """Note that a client did not prove its identity: its connection makes room before others."""
+        if self.place is not None:
+            self.place.has_failed = True
+
     def data_received(self, data: bytes) -> None:
         """Collect messages. The library would keep all bytes of a packet for each message in it, and read on always."""
         if self.transport is None or self.transport.is_closing():
