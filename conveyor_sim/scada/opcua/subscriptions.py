@@ -233,7 +233,7 @@ class Subscriptions(SubscriptionService):
         self._budget_of(last.session_id).restore(_LEFT)
         self.ended += 1
         logging.getLogger(__name__).warning(
-            "opcua: subscription %d of %s ended: its session needs more than %d work units per second, %.0f of them for it",
+            "opcua: subscription %d of %s ended: its session exceeds %d work units per second, %.0f of them for it",
             costliest.data.SubscriptionId,
             costliest.party or "a client",
             self._limits.subscription_units_per_second,
