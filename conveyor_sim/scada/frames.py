@@ -40,8 +40,10 @@ class Frames:
         self._anew = self._ended = self._watched = False
         self._era, self._total, self._tick = -1, 0, -1
         self._reported = 0.0  # s of wall time of the last report of health
+        self.counts = True
+        """False while the process does not serve yet: then `left_out` does not change."""
         self.left_out = 0
-        """Ticks since this was set to 0 that the process was never sent, because it was too far behind."""
+        """Ticks that the process was never sent, because it was too far behind."""
         with self._wake:
             self._ends = (view.hear(self._hear), view.listen(self._listen))
             self._listen()
@@ -95,7 +97,7 @@ class Frames:
             if last is not None and (len(self._waiting) >= MOST_FRAMES or self._bytes > MOST_BYTES):
                 self._bytes -= _size(last)
                 frame = self._waiting[-1] = _merged(last, frame)
-                self.left_out += self._tick != self._view.shown.tick
+                self.left_out += self.counts and self._tick != self._view.shown.tick
             else:
                 self._waiting.append(frame)
             self._bytes += _size(frame)

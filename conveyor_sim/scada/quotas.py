@@ -1,7 +1,8 @@
 """`Places`: which clients may be connected to a protocol server at once, and which of them make room for others.
 
 A client needs a place before it can identify itself, so connections without a session never block others. When all
-places are taken, the connection at the earliest stage makes room; among several, the one that was idle for longest.
+places are taken, a connection whose login failed makes room, else the connection at the earliest stage. Among several,
+it is the one that was idle for longest.
 Guests have a session and no user. They hold at most three quarters of the places; the rest is for users and for
 connections without a session yet. This also holds for the places of one address. A user is never dropped for a guest.
 """
@@ -54,6 +55,8 @@ class Place:
     user: str = ""
     active: float = field(default_factory=time.monotonic)
     """Time of the last request in s, as time.monotonic() has it."""
+    has_failed: bool = False
+    """True if a login failed and none succeeded since."""
 
     def touch(self, stage: int = NEW) -> None:
         """Note a request, and the stage that the connection has reached."""
@@ -110,6 +113,7 @@ class Places:
             if len(guests) >= share_of_guests(places) and not self._drop_first(self._idle(guests)):
                 self.refused += 1
                 return False
+        place.has_failed = False
         place.touch(GUEST)
         return True
 
@@ -122,7 +126,7 @@ class Places:
                 self.refused += 1
                 return False
             self._drop(min(idle, key=lambda one: one.active))
-        place.user = user
+        place.user, place.has_failed = user, False
         place.touch(USER)
         return True
 
@@ -146,7 +150,7 @@ class Places:
         """Drop the connection that comes first in the order of the module. Return False if there are only users."""
         kept = set(those) - set(self._idle(those)) if self._keeps_active else set()
         may = (one for one in those if one.stage < GUEST or (one.stage == GUEST and one not in kept))
-        first = min(may, key=lambda one: (one.stage, one.active), default=None)
+        first = min(may, key=lambda one: (not one.has_failed, one.stage, one.active), default=None)
         if first is None:
             return False
         self._drop(first)

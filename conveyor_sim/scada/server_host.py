@@ -220,6 +220,7 @@ class ServerHost:
         child, self._ready = self._ready or ServerChild(name), None
         self._process, pipe = child.process, child.pipe
         self._frames = frames = Frames(view, self._everyone)
+        frames.counts = False  # until it serves
         sender = threading.Thread(target=_send_all, args=(frames, child.frames), name=f"frames of {name}", daemon=True)
         with self._sending:
             self._pipe = pipe
@@ -282,7 +283,7 @@ class ServerHost:
     def _take_address(self, address: str) -> None:
         self._silent = 0.0
         if self._frames is not None:
-            self._frames.left_out = 0
+            self._frames.counts = True
         self._address = address
         if isinstance(self._place, int):
             self._place = urlsplit(address).port  # the same one after a restart

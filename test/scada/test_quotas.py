@@ -165,3 +165,17 @@ def test_the_docs_state_all_limits_and_their_defaults() -> None:
     assert set(stated) == set(limit_names())
     settings = Settings(**limit_settings(f"{name}={value}" for name, value in stated.items()))
     assert settings == Settings()
+
+
+def test_a_connection_whose_login_failed_makes_room_first() -> None:
+    clients = Clients()
+    for _ in range(10):
+        clients.come(HERE)
+    waiting, failed = clients.come(HERE), clients.come(HERE)
+    assert waiting is not None and failed is not None
+    waiting.touch(OPENED)
+    failed.touch(OPENED)
+    failed.has_failed = True
+    clients.come(HERE)
+    assert clients.ended == [failed]
+    assert clients.places.admit_user(waiting, "jo")

@@ -173,6 +173,11 @@ def catch_up_until(frames: Frames, view: RemoteSource, condition: Callable[[], b
 def test_who_fetches_nothing_misses_ticks_and_fills_no_memory(running: SceneSource) -> None:
     frames, (pipe, _) = Frames(running), Pipe()
     view = mirror(running, pipe)
+    frames.counts = False  # a process that starts
+    first = running.shown.tick
+    until(lambda: running.shown.tick > first + MOST_FRAMES + 10, "more ticks than wait")
+    assert frames.left_out == 0
+    frames.counts = True
     until(lambda: frames.left_out > 10, "more ticks than wait")
     pause(running)
     tick = running.shown.tick

@@ -10,6 +10,7 @@ from asyncua.common.utils import ServiceError
 
 from conveyor_sim.scada.opcua.browsing import Views
 from conveyor_sim.scada.opcua.filters import filter_units
+from conveyor_sim.scada.opcua.items import CHANGE_UNITS, size_of
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import share_of_guests
 from conveyor_sim.scada.work import Budget
@@ -80,6 +81,10 @@ class Bounds:
     def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
         """Raise ServiceError for too costly filters of existing items. Reduce queues to the room that is left."""
         self._require_cost(params.ItemsToModify)
+
+    def charge_message(self, message: ua.NotificationMessage) -> None:
+        """Count the values and events of a message that is sent again as work."""
+        self._units += CHANGE_UNITS * sum(map(size_of, message.NotificationData or []))
 
     def require_history(self, params: ua.HistoryReadParameters) -> None:
         """Reduce the values per node to what one answer takes."""

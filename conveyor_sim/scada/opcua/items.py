@@ -17,7 +17,7 @@ CHANGE_UNITS, FIELD_UNITS = 4, 2
 """Work units of a change of a value, and of each field or operand of an event."""
 
 _AT_ONCE = 100
-"""Items that are created before other tasks run."""
+"""Items that are created, or whose values are sent again, before other tasks run."""
 
 
 class Items(MonitoredItemService):
@@ -68,13 +68,21 @@ class Items(MonitoredItemService):
             await self.isub.enqueue_datachange_event(id, notification, item.queue_size)
 
     async def resend(self) -> None:
-        """Queue the present value of each item once more, for a session that takes over (OPC 10000-4, 5.14.7)."""
-        for mid in self._monitored_datachange.values():
-            item = self._monitored_items[mid]
-            if item.mode == ua.MonitoringMode.Reporting and item.read_value_id is not None:
-                value = self.aspace.read_attribute_value(item.read_value_id.NodeId, item.read_value_id.AttributeId)
-                notification = ua.MonitoredItemNotification(item.client_handle, value)
-                await self.isub.enqueue_datachange_event(mid, notification, item.queue_size)
+        """Queue the present value of each item once more, for a session that takes over (OPC 10000-4, 5.14.7).
+
+        That is work like a change of each value, and other tasks run in between.
+        """
+        for place, mid in enumerate(list(self._monitored_datachange.values())):
+            item = self._monitored_items.get(mid)
+            if item is None or item.mode != ua.MonitoringMode.Reporting or item.read_value_id is None:
+                continue
+            if not self.isub.spend(CHANGE_UNITS):
+                return
+            value = self.aspace.read_attribute_value(item.read_value_id.NodeId, item.read_value_id.AttributeId)
+            notification = ua.MonitoredItemNotification(item.client_handle, value)
+            await self.isub.enqueue_datachange_event(mid, notification, item.queue_size)
+            if place % _AT_ONCE == _AT_ONCE - 1:
+                await asyncio.sleep(0)
 
     async def _trigger_event(self, event: Any, mid: int) -> None:
         item = self._monitored_items.get(mid)
@@ -137,6 +145,11 @@ class Items(MonitoredItemService):
         self.event_fields += sign * fields
         self.event_units += sign * FIELD_UNITS * fields
         self.queued += sign * item.queue_size
+
+
+def size_of(notification: Any) -> int:
+    """Return the number of values or events in a notification."""
+    return len(getattr(notification, "MonitoredItems", None) or getattr(notification, "Events", None) or [])
 
 
 def _name(clause: ua.SimpleAttributeOperand) -> str:

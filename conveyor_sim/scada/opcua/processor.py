@@ -66,6 +66,8 @@ class Processor(Dispatcher):
     """Messages of one connection, within its limits."""
 
     _limits: ConnectionLimits
+    iserver: Any
+    name: Any
     session: Any
 
     def __init__(self, server: Any, transport: Any, limits: Limits) -> None:
@@ -111,6 +113,8 @@ class Processor(Dispatcher):
                 self.units += require_operations(typeid, body, self._bounds)
             if typeid == _ACTIVATE:
                 self.units += LOGIN_UNITS
+                session = self.session or self.iserver.lookup_external_session(requesthdr.AuthenticationToken)
+                await self.iserver.passwords.check(self.iserver, session, body, str(self.name[0]))
             return await super()._process_message(typeid, requesthdr, seqhdr, body)
         except ServiceError as error:
             if error.code == Codes.BadEncodingLimitsExceeded:  # also nesting deeper than the interpreter allows

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,10 +24,11 @@ from conveyor_sim.scada.opcua.line_events import LineEvents
 from conveyor_sim.scada.opcua.methods import Methods, add_methods
 from conveyor_sim.scada.opcua.nodes import INDEX, NAMESPACE, Nodes
 from conveyor_sim.scada.opcua.packml import PackMl
+from conveyor_sim.scada.opcua.passwords import checked
 from conveyor_sim.scada.opcua.published_limits import publish
 from conveyor_sim.scada.opcua.requests import Client, Requests, reader
 from conveyor_sim.scada.opcua.session import SafeServer
-from conveyor_sim.scada.opcua.transport import BoundedServer, channel
+from conveyor_sim.scada.opcua.transport import BoundedServer
 from conveyor_sim.scada.opcua.tree import add_line
 from conveyor_sim.scada.opcua.updates import Updates
 from conveyor_sim.scada.opcua.weihenstephan import Weihenstephan
@@ -136,7 +136,7 @@ class OpcUaServer:
         """A server with the standard's nodes, and who may come in."""
         host, port = self._at
         own = identity(self._certificates or default_folder())
-        internal = SafeServer(self, own.trusted, self._limits)
+        internal = SafeServer(self, own.trusted, self._limits, self._logins)
         internal.bind_condition_methods = 1
         server = BoundedServer(internal, self._limits, Places(self._quota))
         server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
@@ -193,10 +193,10 @@ class OpcUaServer:
         """Who begins a session; None: nobody who may. Called by the library."""
         if username is None:
             return reader() if self._anonymous else None
-        connection = channel.get()
-        origin = "" if connection is None else connection.origin
-        user = self._logins.enter(username, password or "", origin, time.monotonic())
-        return None if user is None else Client(UserRole.User, username, user.kind)
+        result = checked.get()
+        if result is None or result.user is None or (result.name, result.password) != (username, password or ""):
+            return None
+        return Client(UserRole.User, username, result.user.kind)
 
 
 @contextmanager

@@ -26,11 +26,13 @@ from conveyor_sim.scada.opcua.bounds import Bounds
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.opcua.nodes import WRITE, name_of
 from conveyor_sim.scada.opcua.ownership import REFRESH, OwnedSession, Owners
+from conveyor_sim.scada.opcua.passwords import Passwords
 from conveyor_sim.scada.opcua.refusals import Refusals
 from conveyor_sim.scada.opcua.requests import Codes, Requests
 from conveyor_sim.scada.opcua.subscriptions import Subscriptions
 from conveyor_sim.scada.opcua.transport import Connection, channel
 from conveyor_sim.scada.opcua.well_formed import WellFormedSession, require_url
+from conveyor_sim.scada.users import LoginService
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""
@@ -55,10 +57,13 @@ class SafeServer(InternalServer):
 
     subscription_service: Subscriptions
 
-    def __init__(self, user_manager: Any, trusted: Collection[bytes], limits: Limits) -> None:
-        """trusted: certificates of clients that are let in; empty: all are. limits: of each client."""
+    def __init__(self, user_manager: Any, trusted: Collection[bytes], limits: Limits, logins: LoginService) -> None:
+        """trusted: certificates of clients that are let in; empty: all are. limits: of each client.
+        logins: checks passwords.
+        """
         super().__init__(user_manager)
         self.limits = limits
+        self.passwords = Passwords(logins)
         self.subscription_service = Subscriptions(self.aspace, self, limits)
         self.isession.subscription_service = self.subscription_service
         self._trusted = trusted
@@ -173,6 +178,8 @@ class Session(InternalSession):
         except BaseException:
             if connection is not None and connection is not self._connection:
                 connection.leave()
+            if connection is not None:
+                connection.note_failure()
             raise
         if self._connection is not None and connection is not self._connection:
             self._connection.leave()
@@ -300,6 +307,12 @@ class Session(InternalSession):
 
 class ClientSession(WellFormedSession, OwnedSession, Session):
     """Session of one client: its requests are checked for their form, then for ownership, then for limits."""
+
+    def republish(self, params: ua.RepublishParameters) -> ua.NotificationMessage:
+        """Return a retained message, which costs as much as its values and events did."""
+        message = super().republish(params)
+        self.bounds.charge_message(message)
+        return message
 
     @property
     def owners(self) -> Owners:

@@ -18,7 +18,7 @@ from asyncua.common.utils import ServiceError
 from asyncua.server.internal_subscription import InternalSubscription
 from asyncua.server.subscription_service import SubscriptionService
 
-from conveyor_sim.scada.opcua.items import Items
+from conveyor_sim.scada.opcua.items import Items, size_of
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import share_of_guests
 from conveyor_sim.scada.work import Budget
@@ -27,6 +27,9 @@ Codes = ua.StatusCodes
 
 EXCEEDED = Codes.BadResourceUnavailable
 """Status of the notification that ends a subscription beyond the budget of its session."""
+
+NOTICE = 30.0
+"""s for which a subscription that was ended waits for a Publish request that can report it."""
 
 REFRESH_PERIOD = 1.0
 """s between two refreshes of the conditions of one subscription."""
@@ -56,6 +59,7 @@ class Subscription(InternalSubscription):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.ended = False
+        self._code = 0
         self.refreshed = -REFRESH_PERIOD
         self._began, self._spent = time.monotonic(), 0.0
         self._owner: ua.NodeId | None = None
@@ -79,21 +83,37 @@ class Subscription(InternalSubscription):
         return not self.ended
 
     async def end(self, code: int) -> None:
-        """Delete the subscription, with a StatusChangeNotification if a Publish request waits (OPC 10000-4, 7.25.4)."""
+        """Stop the subscription. Delete it once a Publish request was answered with a StatusChangeNotification.
+
+        OPC 10000-4, 7.25.4. Without a Publish request it is deleted after `NOTICE` seconds.
+        """
+        await self.stop()
+        self._code = code
         request = self.pub_request_callback(self.data.SubscriptionId) if self.pub_request_callback else None
-        if request is not None:
-            result = ua.PublishResult(SubscriptionId=self.data.SubscriptionId)
-            result.NotificationMessage.SequenceNumber = self._notification_seq
-            result.NotificationMessage.NotificationData = [ua.StatusChangeNotification(ua.StatusCode(code))]
-            await self.pub_result_callback(result, request)
+        if request is None:
+            await asyncio.sleep(NOTICE)
+            self._delete()
+        else:
+            await self._publish_end(request)
+
+    async def _publish_end(self, request: Any) -> None:
+        result = ua.PublishResult(SubscriptionId=self.data.SubscriptionId)
+        result.NotificationMessage.SequenceNumber = self._notification_seq
+        result.NotificationMessage.NotificationData = [ua.StatusChangeNotification(ua.StatusCode(self._code))]
+        self._delete()
+        await self.pub_result_callback(result, request)
+
+    def _delete(self) -> None:
         if self.delete_callback:
             self.delete_callback()
-        await self.stop()
 
     async def publish_results(self, requestdata: Any = None) -> bool:
         """Publish all waiting notifications, one answer per Publish request. Return True if any was sent."""
         if self.ended:
-            return False
+            if requestdata is None or not self._code:
+                return False
+            await self._publish_end(requestdata)
+            return True
         self.spend(1)
         published = again = await super().publish_results(requestdata)
         while again and self._publishing_enabled and self._waits:
@@ -110,7 +130,7 @@ class Subscription(InternalSubscription):
         result.MoreNotifications = self._publishing_enabled and self._waits
         message = result.NotificationMessage
         if message.SequenceNumber in self._not_acknowledged_results:
-            self._sizes[message.SequenceNumber] = sum(map(_size, message.NotificationData))
+            self._sizes[message.SequenceNumber] = sum(map(size_of, message.NotificationData))
         kept = {number: size for number, size in self._sizes.items() if number in self._not_acknowledged_results}
         while len(kept) > 1 and sum(kept.values()) > self.limits.unacknowledged:
             oldest = next(iter(kept))
@@ -130,12 +150,7 @@ class Subscription(InternalSubscription):
     def _room(self, result: ua.PublishResult) -> int:
         """Return the number of notifications that still fit in an answer."""
         most = min(self.most or self.limits.notifications_per_publish, self.limits.notifications_per_publish)
-        return most - sum(map(_size, result.NotificationMessage.NotificationData))
-
-
-def _size(notification: Any) -> int:
-    """Return the number of values or events in a notification."""
-    return len(getattr(notification, "MonitoredItems", None) or getattr(notification, "Events", None) or [])
+        return most - sum(map(size_of, result.NotificationMessage.NotificationData))
 
 
 def _take(queues: dict[int, list[Any]], most: int) -> list[Any]:
@@ -213,11 +228,11 @@ class Subscriptions(SubscriptionService):
         self._budget_of(last.session_id).restore(_LEFT)
         self.ended += 1
         logging.getLogger(__name__).warning(
-            "opcua: subscription %d of %s ended: it needs %.0f work units per second, expected at most %d per session",
+            "opcua: subscription %d of %s ended: its session exceeds %d work units per second, %.0f of them for it",
             costliest.data.SubscriptionId,
             costliest.party or "a client",
-            costliest.rate,
             self._limits.subscription_units_per_second,
+            costliest.rate,
         )
         task = asyncio.create_task(costliest.end(EXCEEDED))  # not here: the library is looping over its items
         self._ending.add(task)

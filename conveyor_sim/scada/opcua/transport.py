@@ -13,6 +13,7 @@ from asyncua.common.utils import Buffer, ServiceError
 from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.ua.ua_binary import header_from_binary, uatcp_to_binary
 
+from conveyor_sim.scada.opcua.client_certificates import without_issuers
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.opcua.processor import CHUNK, ConnectionLimits, Processor
 from conveyor_sim.scada.quotas import GREETED, OPENED, Place, Places
@@ -86,7 +87,9 @@ class Connection(OPCUAProtocol):
     def peer(self) -> bytes | None:
         """Certificate of the client, which has proved that it is its own; None: the channel is not secured."""
         policy = self.processor._connection.security_policy if self.processor else None
-        return policy.peer_certificate if policy is not None and policy.Mode != ua.MessageSecurityMode.None_ else None
+        if policy is None or policy.Mode == ua.MessageSecurityMode.None_:
+            return None
+        return without_issuers(policy.peer_certificate)
 
     def require_place(self, user: str) -> None:
         """Raise ServiceError and end the connection if a session of a user, or of a guest (""), gets no place."""
@@ -103,6 +106,11 @@ class Connection(OPCUAProtocol):
             self.processor.session = None
         if self.place is not None:
             self.places.leave_user(self.place)
+
+    def note_failure(self) -> None:
+        """Note that a client did not prove its identity: its connection makes room before others."""
+        if self.place is not None:
+            self.place.has_failed = True
 
     def data_received(self, data: bytes) -> None:
         """Collect messages. The library would copy all bytes of a packet for each message in it, without a bound."""

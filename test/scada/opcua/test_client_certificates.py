@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from asyncua import ua
+from asyncua import Client, ua
+from asyncua.common.utils import ServiceError
+from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import rsa
@@ -15,7 +17,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import NameOID
 
 from conveyor_sim.scada.opcua.certificates import TRUSTED, identity
-from test.scada.opcua.conftest import refused
+from conveyor_sim.scada.opcua.client_certificates import require_usable
+from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone, refused
 
 if TYPE_CHECKING:
     from test.scada.opcua.conftest import Line, Serve
@@ -89,3 +92,32 @@ def test_expired_early_and_short_certificates_are_refused(line: Line, files: dic
 
 def test_trust_does_not_make_up_for_that(trusting: Line, files: dict[str, str]) -> None:
     connect(trusting, files, "SignAndEncrypt")
+
+
+@pytest.mark.parametrize("name", ["good", "expired"])
+def test_certificates_of_issuers_may_follow(trusting: Line, files: dict[str, str], name: str) -> None:
+    """The first certificate counts, also for the list of trusted ones."""
+    leaf, key = files[name].split(",")
+
+    async def connect() -> None:
+        client = Client(trusting.server.address, timeout=PATIENCE, watchdog_intervall=PATIENCE)
+        client.set_user("viewer")
+        client.set_password(PASSWORD)
+        await client.set_security(
+            SecurityPolicyBasic256Sha256, leaf, key, certificate_chain=[files["long"].split(",")[0]]
+        )
+        async with client:
+            assert await client.get_node("ns=2;s=run/tick").read_value() is not None
+
+    if name == "good":
+        alone(connect())
+    else:
+        with refused(Codes.BadCertificateTimeInvalid):
+            alone(connect())
+
+
+@pytest.mark.parametrize("certificate", [b"", b"0", b"0\x82", b"0\x82\x01\x00" + b"0" * 300, b"\x31\x03" * 40])
+def test_what_is_no_certificate_is_refused(certificate: bytes) -> None:
+    with pytest.raises(ServiceError) as refusal:
+        require_usable(certificate)
+    assert refusal.value.code == Codes.BadCertificateInvalid

@@ -7,9 +7,11 @@ from typing import Any
 
 import pytest
 from asyncua import Client, ua
+from asyncua.ua.ua_binary import struct_from_binary
 
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import Quota, share_of_guests
+from conveyor_sim.scada.users import Logins
 from test.scada.opcua.conftest import Line, Serve, alone, refused
 from test.scada.opcua.limit_clients import (
     TICK,
@@ -145,6 +147,27 @@ def test_a_subscription_that_costs_too_much_ends_and_others_go_on(serve: Serve) 
     assert line.server.status().refused == 1
 
 
+def test_values_that_are_sent_again_are_work_like_changes(serve: Serve) -> None:
+    """One request transfers to the same session many times: the subscription ends, not the server."""
+    line = serve(limits=Limits(subscription_units_per_second=1000))
+
+    async def work(client: Client) -> tuple[list[int], list[int]]:
+        heard = Heard()
+        subscription = await client.create_subscription(50, heard)
+        await subscription.subscribe_data_change([client.get_node(TICK)] * 100)
+        request = ua.TransferSubscriptionsRequest()
+        request.Parameters.SubscriptionIds = [subscription.subscription_id] * 200
+        request.Parameters.SendInitialValues = True
+        answer = await client.uaclient.protocol.send_request(request)
+        results = struct_from_binary(ua.TransferSubscriptionsResponse, answer).Parameters.Results
+        await until(lambda: heard.status)
+        return [result.StatusCode.value for result in results], heard.status
+
+    codes, status = connected(line, work)
+    assert len(codes) == 200 and codes[0] == Codes.Good
+    assert status == [Codes.BadResourceUnavailable]
+
+
 def test_a_flood_of_sessions_and_sockets_leaves_room_for_an_operator(serve: Serve) -> None:
     line = serve(quota=Quota(connections=12, connections_per_address=12, connections_per_user=2))
 
@@ -203,6 +226,54 @@ def test_requests_beyond_the_budget_wait_and_hold_up_nobody(serve: Serve) -> Non
 
     mine, during = connected(line, work)
     assert mine == 50 and during < 50
+
+
+def test_a_password_that_is_checked_holds_up_no_request(serve: Serve) -> None:
+    """Clients that wait for a check hold up no request either."""
+    line = serve()
+    logins = line.server._logins
+    assert isinstance(logins, Logins)
+
+    async def work(client: Client) -> None:
+        clients = [client_of(line, "operator") for _ in range(5)]
+        with logins._checking:
+            waiting = [asyncio.create_task(each.connect()) for each in clients]
+            await until(lambda: line.server.status().clients == 6)
+            for _ in range(20):
+                assert await client.get_node(TICK).read_value() is not None
+                await asyncio.sleep(0.02)
+            assert not any(task.done() for task in waiting)
+        await asyncio.gather(*waiting)
+        for each in clients:
+            await each.disconnect()
+
+    connected(line, work)
+
+
+def test_a_message_that_is_sent_again_costs_as_much_as_its_values(serve: Serve) -> None:
+    """A flood of Republish requests therefore waits like a flood of Read requests."""
+    line = serve()
+
+    async def work(client: Client) -> tuple[int, int]:
+        send = client.uaclient.protocol.send_request
+        request = ua.CreateSubscriptionRequest(Parameters=ua.CreateSubscriptionParameters(50.0, 1000, 100))
+        made = struct_from_binary(ua.CreateSubscriptionResponse, await send(request)).Parameters.SubscriptionId
+        await client.uaclient.session.create_monitored_items(
+            ua.CreateMonitoredItemsParameters(made, ua.TimestampsToReturn.Both, [item()] * 500)
+        )
+        answer = struct_from_binary(ua.PublishResponse, await send(ua.PublishRequest()))
+        message = answer.Parameters.NotificationMessage
+        values = sum(len(one.MonitoredItems) for one in message.NotificationData)
+        server: Any = line.server._server
+        (session,) = server.iserver._external_sessions.values()
+        before = session.bounds.units
+        again = ua.RepublishRequest()
+        again.Parameters = ua.RepublishParameters(made, message.SequenceNumber)
+        await send(again)
+        return values, session.bounds.units - before
+
+    values, units = connected(line, work)
+    assert values == 500 and units == 4 * values
 
 
 def test_a_client_that_reads_no_answers_is_ended(small: Line) -> None:
