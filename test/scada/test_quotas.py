@@ -110,7 +110,7 @@ def test_without_users_only_idle_connections_make_room() -> None:
     assert clients.come(THERE) is not None and len(clients.ended) == 1, "there is a place for another address"
     for _ in range(4):
         clients.come(HERE)
-    assert clients.ended[1:2] != places[1:2], "who never asked for anything goes first"
+    assert clients.ended[1:2] != places[1:2], "connections without a request make room first"
 
 
 def test_a_guest_that_becomes_a_user_and_a_guest_again_is_counted_as_such() -> None:
