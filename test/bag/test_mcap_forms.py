@@ -92,7 +92,11 @@ def test_ros_messages_are_read_in_the_order_of_the_library_in_every_form(tmp_pat
 
 
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
-@pytest.mark.parametrize("features", [INDEXED, {"ch"}, {"ch", "mx"}, {"ch", "chx"}, {"st"}, set()], ids=str)
+@pytest.mark.parametrize(
+    "features",
+    [INDEXED, {"ch"}, {"ch", "mx"}, {"ch", "chx"}, {"st"}, set()],
+    ids=lambda features: " ".join(sorted(features)) or "none",
+)
 def test_unknown_records_appended_fields_and_foreign_channels_are_skipped(
     features: set[str], compression: str, tmp_path: Path
 ) -> None:

@@ -120,7 +120,7 @@ def test_messages_that_are_compressed_one_by_one_are_not_called_damaged(
     [
         ("odd.mcap", zstandard.compress(b"x"), "zstd -d odd.mcap -o unpacked_odd.mcap"),
         ("a b.mcap.lz4", lz4.frame.compress(b"x"), "lz4 -d 'a b.mcap.lz4' 'a b.mcap'"),
-        ("x.mcap.gz", gzip.compress(b"x"), "gzip -dc x.mcap.gz > x.mcap"),
+        ("x.mcap.gz", gzip.compress(b"x", mtime=0), "gzip -dc x.mcap.gz > x.mcap"),
         ("x.bag", b"#ROSBAG V2.0\n", "rosbags-convert"),
         ("empty.db3", b"", "ros2 bag convert"),
     ],
@@ -138,7 +138,7 @@ def test_formats_are_known_by_how_files_begin(tmp_path: Path, name: str, content
 
 
 def test_other_files_of_a_folder_are_not_treated_as_a_bag(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt.gz").write_bytes(gzip.compress(b"x"))
+    (tmp_path / "notes.txt.gz").write_bytes(gzip.compress(b"x", mtime=0))
     os.mkfifo(tmp_path / "pipe.mcap.zstd")
     with pytest.raises(BagError, match="no MCAP file found"):
         recover(tmp_path)
