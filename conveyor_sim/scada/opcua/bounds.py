@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import is_dataclass
 from typing import Any
 
 from asyncua import ua
@@ -22,6 +23,9 @@ EVENTS_QUEUED = 100
 
 _BASE_SIZE = 8
 """Assumed bytes of any other value."""
+
+_STRUCTURE_SIZE = 1000
+"""Bytes that a structure counts for: about that many bytes of text are encoded in the same time."""
 
 _HISTORY_UNITS = 2
 """Work units of a value of the history."""
@@ -131,4 +135,6 @@ def _bytes(value: Any) -> int:
     """Return the approximate size of a value in an answer."""
     if isinstance(value, str | bytes):
         return len(value)
-    return sum(map(_bytes, value)) if isinstance(value, list) else _BASE_SIZE
+    if isinstance(value, list):
+        return sum(map(_bytes, value))
+    return _STRUCTURE_SIZE if is_dataclass(value) else _BASE_SIZE

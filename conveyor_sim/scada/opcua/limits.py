@@ -79,7 +79,9 @@ class Limits:
     string_bytes_before_login: int = 16_384
     """Bytes of one string from a client whose session is not activated; a certificate chain has to fit."""
     answer_bytes: int = 4_000_000
-    """Bytes of values in one Read answer, and bytes of answers that a client may leave unread."""
+    """Bytes of values in one Read answer, 1000 for each structure, and bytes of answers that a client may leave
+    unread.
+    """
     request_units_per_second: int = 50_000
     """Work units per second for requests of one session, with twice that at once; requests beyond wait."""
     guest_units_per_second: int = 100_000

@@ -39,7 +39,7 @@ class Connection(OPCUAProtocol):
     guests: Budget
     """Work of all sessions without a user."""
     turn: asyncio.Lock
-    """Held by the session without a user whose request is next."""
+    """Held by the session without a user whose request is next, until it is answered."""
     place: Place | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -157,7 +157,15 @@ class Connection(OPCUAProtocol):
     async def _process_one_msg(self, header: Any, buf: Any) -> bool:
         """The library leaves a client without an answer whose message it can't make out."""
         channel.set(self)
-        await self._wait()
+        await asyncio.sleep(self.work.delay())  # until the work of earlier messages is within the budget
+        if not self._is_guest:
+            return await self._answer(header, buf)
+        async with self.turn:
+            # One at a time, so that others are answered between the requests of many guests that waited.
+            await asyncio.sleep(self.guests.delay())
+            return await self._answer(header, buf)
+
+    async def _answer(self, header: Any, buf: Any) -> bool:
         if self.transport is None or self.transport.is_closing() or not isinstance(self.processor, Processor):
             return False
         before, began = self.processor.units, time.perf_counter()
@@ -187,15 +195,6 @@ class Connection(OPCUAProtocol):
         self.work.spend(units)
         if self._is_guest:
             self.guests.spend(units)
-
-    async def _wait(self) -> None:
-        """Wait until the work of earlier messages is within the budget."""
-        await asyncio.sleep(self.work.delay())
-        if not self._is_guest:
-            return
-        async with self.turn:
-            # One at a time, so that other clients are answered between the requests of many guests.
-            await asyncio.sleep(self.guests.delay())
 
     def _make_room(self) -> None:
         """Close the connection because another one needs its place, with its session."""

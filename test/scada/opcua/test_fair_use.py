@@ -12,7 +12,7 @@ from asyncua.ua.ua_binary import struct_from_binary
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import Quota, share_of_guests
 from conveyor_sim.scada.users import Logins
-from test.scada.opcua.conftest import Line, Serve, alone, refused
+from test.scada.opcua.conftest import PASSWORD, Line, Serve, alone, refused
 from test.scada.opcua.limit_clients import (
     TICK,
     Codes,
@@ -274,6 +274,49 @@ def test_a_message_that_is_sent_again_costs_as_much_as_its_values(serve: Serve) 
 
     values, units = connected(line, work)
     assert values == 500 and units == 4 * values
+
+
+def test_an_answer_costs_work_by_its_size_and_structures_most(serve: Serve) -> None:
+    """A structure takes far longer to encode than its bytes say."""
+    line = serve(limits=Limits(answer_bytes=100_000))
+    structures = ua.ReadValueId(ua.NodeId(ua.ObjectIds.NodeAttributesMask_EnumValues), ua.AttributeIds.Value)  # 35
+
+    async def work(client: Client) -> tuple[int, int, int]:
+        server: Any = line.server._server
+        (connection,) = server.bserver.clients
+        read = ua.ReadRequest()
+        read.Parameters.NodesToRead = [structures] * 2
+        before = connection.processor.units
+        answer = await client.uaclient.protocol.send_request(read)
+        cost = connection.processor.units - before
+        read.Parameters.NodesToRead.append(structures)
+        return len(answer), cost, await code_of(client.uaclient.protocol.send_request(read))
+
+    size, units, code = connected(line, work)
+    assert size > 2000 and units >= size // 25
+    assert code == Codes.BadResponseTooLarge
+
+
+def test_guests_are_answered_one_at_a_time_and_users_in_between(serve: Serve) -> None:
+    line = serve()
+    logins = line.server._logins
+    assert isinstance(logins, Logins)
+
+    async def work(user: Client) -> None:
+        async with client_of(line) as first, client_of(line) as second:
+            with logins._checking:
+                first.set_user("operator")
+                first.set_password(PASSWORD)
+                slow = asyncio.create_task(first._activate_with_credentials())
+                await until(lambda: line.server._server.bserver.turn.locked())
+                waiting = asyncio.create_task(second.get_node(TICK).read_value())
+                for _ in range(10):
+                    assert await user.get_node(TICK).read_value() is not None
+                assert not waiting.done()
+            await slow
+            assert await waiting is not None
+
+    connected(line, work, "operator")
 
 
 def test_a_client_that_reads_no_answers_is_ended(small: Line) -> None:
