@@ -39,8 +39,8 @@ def problem(what: Control, value: float, tick: int) -> str:
     """Why something can't be asked of a line in lockstep that is at a tick; "" if it can."""
     if what != "target":
         return f"{what}: the line is in lockstep, expected {TARGET} alone"
-    if not float(value).is_integer() or value > tick + FURTHEST:
-        return f"{TARGET}: {value:g} given, expected a whole number of at most {tick + FURTHEST}"
+    if not float(value).is_integer() or not 0 <= value <= tick + FURTHEST:
+        return f"{TARGET}: {value:g} given, expected a whole number from 0 to {tick + FURTHEST}"
     return ""
 
 
