@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import re
@@ -17,7 +16,7 @@ from urllib.request import urlopen
 import pytest
 from scada.modbus_line import speed_of
 from scada.served import Served
-from scada.waiting import PATIENCE, until
+from scada.waiting import PATIENCE, alone, until
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
@@ -94,7 +93,7 @@ class Line(Served):
                     if data[0] == 0 and (message := json.loads(data[1:]))["kind"] == "reply":
                         return not message["refused"]
 
-        return asyncio.run(work())
+        return alone(work())
 
     def health(self) -> dict[str, dict[str, Any]]:
         """Return the health of the protocol servers by name, as the page gets it; empty before that."""
@@ -104,7 +103,7 @@ class Line(Served):
                 data = (await page.receive(PATIENCE)).data
                 return {each["name"]: each for each in json.loads(data[1:])["status"]["servers"]}
 
-        return asyncio.run(work())
+        return alone(work())
 
 
 @pytest.fixture(scope="module")

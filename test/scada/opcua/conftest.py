@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
-from collections.abc import Callable, Coroutine, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -224,9 +222,3 @@ def refused(code: int) -> Iterator[None]:
     with pytest.raises(ua.UaStatusCodeError) as caught:
         yield
     assert caught.value.code == code, caught.value
-
-
-def alone(coroutine: Coroutine[Any, Any, T]) -> T:
-    """What a coroutine comes to, in a thread of its own: browsers of other tests may keep a loop in this one."""
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(asyncio.run, coroutine).result()

@@ -7,8 +7,9 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from asyncua import Client, ua
+from scada.waiting import alone
 
-from test.scada.opcua.conftest import PASSWORD, PATIENCE, Line, alone
+from test.scada.opcua.conftest import PASSWORD, PATIENCE, Line
 
 Codes = ua.StatusCodes
 

@@ -15,10 +15,11 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import NameOID
+from scada.waiting import alone
 
 from conveyor_sim.scada.opcua.certificates import TRUSTED, identity
 from conveyor_sim.scada.opcua.client_certificates import require_usable
-from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone, refused
+from test.scada.opcua.conftest import PASSWORD, PATIENCE, refused
 
 if TYPE_CHECKING:
     from test.scada.opcua.conftest import Line, Serve

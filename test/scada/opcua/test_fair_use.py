@@ -8,11 +8,12 @@ from typing import Any
 import pytest
 from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_from_binary
+from scada.waiting import alone
 
 from conveyor_sim.scada.opcua.limits import Limits
 from conveyor_sim.scada.quotas import Quota, share_of_guests
 from conveyor_sim.scada.users import Logins
-from test.scada.opcua.conftest import PASSWORD, Line, Serve, alone, refused
+from test.scada.opcua.conftest import PASSWORD, Line, Serve, refused
 from test.scada.opcua.limit_clients import (
     TICK,
     Codes,
@@ -121,12 +122,12 @@ def test_conditions_are_refreshed_once_a_second(small: Line) -> None:
 
 def test_a_subscription_that_costs_too_much_ends_and_others_go_on(serve: Serve) -> None:
     """The costliest of the session, with a notification that says so."""
-    line = serve(limits=Limits(subscription_units_per_second=1000))
+    line = serve(limits=Limits(subscription_units_per_second=2000))
 
     async def work(client: Client) -> tuple[Heard, Heard, Heard]:
         async with client_of(line) as other:
             cheap, costly, foreign = Heard(), Heard(), Heard()
-            for each, heard, count in ((client, cheap, 1), (client, costly, 100), (other, foreign, 1)):
+            for each, heard, count in ((client, cheap, 1), (client, costly, 1000), (other, foreign, 1)):
                 subscription = await each.create_subscription(50, heard)
                 await subscription.subscribe_data_change([each.get_node(TICK)] * count)
             for _ in range(200):

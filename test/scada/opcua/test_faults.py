@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from asyncua import Client as AsyncClient
 from asyncua import ua
+from scada.waiting import alone
 
 from conveyor_sim.scada.face import FaceError
 from conveyor_sim.scada.opcua import session, transport
@@ -20,7 +21,7 @@ from conveyor_sim.scada.opcua.server import OpcUaServer
 from conveyor_sim.scada.quotas import QUOTA
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import MOST_WAITING
-from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone
+from test.scada.opcua.conftest import PASSWORD, PATIENCE
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,12 +14,13 @@ from asyncua import Client as AsyncClient
 from asyncua import ua
 from asyncua.server.internal_session import InternalSession
 from asyncua.ua.ua_binary import struct_from_binary
+from scada.waiting import alone
 
 from conveyor_sim.scada.opcua import refusals
 from conveyor_sim.scada.opcua.dispatch import REQUESTS, SESSIONLESS
 from conveyor_sim.scada.opcua.ownership import OwnedSession
 from conveyor_sim.scada.opcua.session import Session
-from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone
+from test.scada.opcua.conftest import PASSWORD, PATIENCE
 from test.scada.opcua.test_security import own_certificate
 
 if TYPE_CHECKING:

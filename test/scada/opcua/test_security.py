@@ -16,6 +16,7 @@ from asyncua import ua
 from asyncua.crypto.cert_gen import generate_private_key, generate_self_signed_app_certificate
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from scada.waiting import alone
 from warm import run
 
 from conveyor_sim.scada.opcua.certificates import CERTIFICATE, KEY, TRUSTED, CertificateError, identity
@@ -30,7 +31,7 @@ from conveyor_sim.scada.users import (
     new_user,
     read_users,
 )
-from test.scada.opcua.conftest import PASSWORD, PATIENCE, alone, refused
+from test.scada.opcua.conftest import PASSWORD, PATIENCE, refused
 
 if TYPE_CHECKING:
     from test.scada.opcua.conftest import Line, Serve

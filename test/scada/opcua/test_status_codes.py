@@ -10,8 +10,9 @@ import pytest
 from asyncua import Client as AsyncClient
 from asyncua import ua
 from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
+from scada.waiting import alone
 
-from test.scada.opcua.conftest import PATIENCE, alone
+from test.scada.opcua.conftest import PATIENCE
 from test.scada.opcua.test_ownership import TICK, Screen, parameters, refresh, single
 
 if TYPE_CHECKING:
