@@ -27,7 +27,8 @@ SCENES = {
     "one bottle in one tick": BARE.format(0.01) + BOTTLE,
     "a belt and a bottle": BARE.format(0.05) + BOTTLE + BELT,
     "an eye": BARE.format(0.05) + "photo_eyes: {e: {from: [0, 0], to: [0, 1]}}\n",
-    "an infeed": BARE.format(0.05) + "infeeds: {i: {bottle: b, position: [0, 0], direction: 0, speed: 0.5, rate: 1}}\n"
+    "an infeed": BARE.format(0.05)
+    + "infeeds: {i: {bottle: b, position: [0, 0], direction: 0, speed: 0.5, rate: 1, count: 1}}\n"
     "contacts: [{between: [glass, glass], stiffness: 5000}]\n",
 }
 ODD = re.compile(r"\bnan\b|\binf\b|\b0\.0 of 0\.0\b|\b0 of 0\b|Traceback", re.IGNORECASE)
