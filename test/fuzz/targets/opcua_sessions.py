@@ -91,7 +91,7 @@ class Station:
             codes = self._clients.run(self._attack(rng))
             if (after := self._state()) != before:
                 raise Violation("foreign subscription", f"{after} is {before} before")
-            self._advance()
+            self.advance()
             if internal := codes & Counter(dict.fromkeys(INTERNAL, 10**9)):
                 raise Violation("internal error", f"{internal}")
         except Violation:
@@ -134,8 +134,12 @@ class Station:
             [(key, item.mode, item.queue_size, item.client_handle, item.filter) for key, item in items],
         )
 
-    def _advance(self) -> None:
-        """Step the line, and wait until the operator's screen shows that."""
+    def publish(self, enabled: bool) -> None:
+        """Have the operator enable or disable the publishing of its subscription."""
+        self._clients.run(self.victim[1].set_publishing_mode(enabled))
+
+    def advance(self, patience: float = PATIENCE) -> None:
+        """Step the line. Raise Violation unless the operator's screen shows that within `patience` seconds."""
         self._source.before_tick()
         self._simulation.advance()
         self._source.after_tick()
@@ -145,7 +149,7 @@ class Station:
                 await asyncio.sleep(0.01)
 
         try:
-            self._clients.run(asyncio.wait_for(see(), PATIENCE))
+            self._clients.run(asyncio.wait_for(see(), patience))
         except asyncio.TimeoutError:
             raise Violation("silenced", f"the operator sees {self.ticks[-1:]}, not {self._simulation.tick}") from None
         del self.ticks[:-100]
