@@ -84,7 +84,14 @@ class Bounds:
 
     def require_changed_items(self, params: ua.ModifyMonitoredItemsParameters) -> None:
         """Raise ServiceError for too costly filters of existing items. Reduce queues to the room that is left."""
-        self._require_cost(params.ItemsToModify)
+        subscription = self._service.subscriptions.get(params.SubscriptionId)
+        replaced = {
+            item.MonitoredItemId
+            for item in params.ItemsToModify
+            if isinstance(item.RequestedParameters.Filter, ua.EventFilter)
+        }
+        freed = 0 if subscription is None else subscription.monitored_item_srv.fields_of(replaced)
+        self._require_cost(params.ItemsToModify, freed)
 
     def charge_message(self, message: ua.NotificationMessage) -> None:
         """Count the values and events of a message that is sent again as work."""
@@ -97,8 +104,11 @@ class Bounds:
         details.NumValuesPerNode = min(details.NumValuesPerNode or most, most)
         self._units += _HISTORY_UNITS * most * len(params.NodesToRead)
 
-    def _require_cost(self, asked: Sequence[Any]) -> None:
-        """Raise ServiceError if all event filters of the session together select too much. Reduce queues."""
+    def _require_cost(self, asked: Sequence[Any], freed: int = 0) -> None:
+        """Raise ServiceError if all event filters of the session together select too much. Reduce queues.
+
+        freed: fields and operands of the filters that are replaced.
+        """
         filters = (item.RequestedParameters.Filter for item in asked)
         fields = sum(filter_units(one, self.limits) for one in filters if isinstance(one, ua.EventFilter))
         mine = (
@@ -106,7 +116,7 @@ class Bounds:
             for each in self._service.subscriptions.values()
             if each.session_id == self._session.session_id
         )
-        if fields and sum(mine) + fields > self.limits.event_fields_per_session:
+        if fields and sum(mine) + fields - freed > self.limits.event_fields_per_session:
             raise ServiceError(Codes.BadTooManyOperations)
         self._bound_queues(asked)
 

@@ -246,6 +246,21 @@ def test_filters_within_the_limits_and_all_of_a_session_together(small: Line) ->
     assert connected(small, work) == [Codes.Good, Codes.Good, Codes.Good, Codes.BadTooManyOperations]
 
 
+def test_a_filter_that_replaces_one_of_the_same_cost_is_accepted(small: Line) -> None:
+    async def work(client: Client) -> list[int]:
+        subscription = await client.create_subscription(1000, None)
+        session, full = client.uaclient.session, item(ua.EventFilter([clause()] * 12))
+        (made,) = await session.create_monitored_items(items_of(subscription, full))
+        codes = [await code_of(session.create_monitored_items(items_of(subscription, full))) for _ in range(3)]
+        change = ua.MonitoredItemModifyRequest(made.MonitoredItemId, full.RequestedParameters)
+        params = ua.ModifyMonitoredItemsParameters(subscription.subscription_id, ItemsToModify=[change])
+        (changed,) = await session.modify_monitored_items(params)
+        return [*codes, changed.StatusCode.value]
+
+    codes = connected(small, work)
+    assert codes[-2:] == [Codes.BadTooManyOperations, Codes.Good], codes
+
+
 def test_an_answer_that_is_too_large_is_refused(small: Line) -> None:
     large = large_node(small)
 
