@@ -121,7 +121,7 @@ def next_chunk(data: Data, position: int, stop: int) -> Chunk | None:
     Zeros behind a counter look like an empty chunk. One with appended fields counts only if its content has the
     checksum that it states: other bytes look like one, too.
     """
-    while (found := BEGINNING.search(data, position, stop)) is not None:
+    while (found := BEGINNING.search(data, position, stop + RECORD_HEAD.size - 1)) is not None:
         chunk = chunk_at(data, found.start())
         if (
             chunk is not None

@@ -16,7 +16,7 @@ from conveyor_sim.bag.line_copy import LineCopy, read_line_copy
 from conveyor_sim.bag.losses import Loss, lose, without_one
 from conveyor_sim.bag.messages import LINE
 from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, Data, checksum, parse
-from conveyor_sim.bag.walk import Walk
+from conveyor_sim.bag.walk import MISMATCH, Walk
 
 WRONG = "the checksum over all data is wrong"
 LISTED = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)
@@ -137,8 +137,11 @@ class Salvage(Walk):
             self._judge_index(self.index, counts)
         elif self._holes:
             self._lose_by_neighbours()
-        if WRONG in self.damage and not self._holes and (self.index is None or not self.index.counts_messages):
-            self.damage.append("whether messages are lost can't be known: the index that counted them is damaged")
+        uncertain = WRONG in self.damage or MISMATCH in self.damage
+        if uncertain and not self._holes and (self.index is None or not self.index.counts_messages):
+            self.damage.append(
+                "whether messages are lost can't be known: the index that counted them is damaged or missing"
+            )
 
     def _restore_line(self) -> None:
         """Take the line message from its copy if no other one is left of its topic."""

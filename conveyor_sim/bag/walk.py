@@ -32,6 +32,9 @@ TOP_LEVEL = (
 """Known records that the data section may hold beside chunks and messages."""
 
 
+MISMATCH = "the index of a chunk's messages is damaged, or is that of a chunk that is missing"
+
+
 @dataclass(frozen=True)
 class ValidChunk:
     """A valid chunk, or one that the end of the file cuts."""
@@ -219,7 +222,8 @@ class Walk:
             record, length = parse_part(opcode, self.data[body:stop])
         except Malformed:
             return False
-        if body + length < stop and self._swallows(start, stop):
+        # A record that lost its end goes on in the bytes that follow, which can be a chunk.
+        if (body + length < stop or self._differs(record, body, body + length)) and self._swallows(start, stop):
             return False
         if isinstance(record, MessageIndex):
             self._match(record)
@@ -240,14 +244,27 @@ class Walk:
         if self._holes and self._holes[-1][0] == len(self.chunks):
             at, count = self._holes[-1]
             self._holes[-1] = (at, (count or 0) + len(record.records))
-        # Writers may put the entries in the order of time.
-        elif self._last is not None and sorted(record.records) != sorted(self._last.places.get(record.channel_id, [])):
-            self._once("the index of a chunk's messages is damaged")
+        elif self._last is not None and not self._is_index_of(record, self._last):
+            self._once(MISMATCH)
+
+    def _is_index_of(self, record: MessageIndex, content: Content) -> bool:
+        """Return True for the index of a chunk's messages. Writers may put the entries in the order of time."""
+        return sorted(record.records) == sorted(content.places.get(record.channel_id, []))
+
+    def _differs(self, record: McapRecord | None, start: int, stop: int) -> bool:
+        """Return True for an index that is not that of the chunk before it, or an attachment with a wrong checksum."""
+        if isinstance(record, MessageIndex):
+            return self._last is None or not self._is_index_of(record, self._last)
+        return isinstance(record, Attachment) and self._is_damaged(start, stop)
+
+    def _is_damaged(self, start: int, stop: int) -> bool:
+        """Return True if the checksum of an attachment, whose fields lie between two bytes, is wrong."""
+        crc = int.from_bytes(self.data[stop - CRC_SIZE : stop], "little")
+        return crc != 0 and checksum(self.data, start, stop - CRC_SIZE) != crc
 
     def _attach(self, record: Attachment, start: int, stop: int) -> None:
         """Take an attachment in, whose fields, the last of them its checksum, lie between two bytes."""
-        crc = int.from_bytes(self.data[stop - CRC_SIZE : stop], "little")
-        if crc and checksum(self.data, start, stop - CRC_SIZE) != crc:
+        if self._is_damaged(start, stop):
             self.damage.append(f"the attachment {record.name} is damaged and was left out")
         else:
             self.attachments.append(record)

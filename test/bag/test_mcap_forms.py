@@ -240,3 +240,39 @@ def test_the_checksum_of_an_extended_attachment_is_compared(tmp_path: Path) -> N
     assert recovered(tmp_path, content).healthy
     with pytest.raises(BagError, match="nothing can be recovered"):
         recovered(tmp_path, content.replace(b"\1\2\3", b"\1\2\4"))
+
+
+@pytest.fixture
+def ten_chunks() -> bytes:
+    """Ten chunks of one message, each with its message index, without checksum and index at the end."""
+    form = Form({"ch", "mx"}, ends_chunk=lambda: True, data_crc=False)
+    return build([ROS_SCHEMA, ROS_CHANNEL, *TEN], form).content
+
+
+def test_an_index_that_lost_its_end_costs_no_chunk(ten_chunks: bytes, tmp_path: Path) -> None:
+    """It would go on in the head of the chunk that follows."""
+    _, stop = records_of(ten_chunks, Opcode.MESSAGE_INDEX)[4]
+    file = tmp_path / "form.mcap"
+    file.write_bytes(ten_chunks[: stop - 8] + ten_chunks[stop:])
+    report = recover(file)
+    assert (report.healthy, report.message_count) == (False, 10)
+
+
+def test_a_chunk_of_which_only_its_index_is_left_is_reported(ten_chunks: bytes, tmp_path: Path) -> None:
+    """Without an index at the end, its messages can't be counted."""
+    start, stop = records_of(ten_chunks, Opcode.CHUNK)[6]
+    file = tmp_path / "form.mcap"
+    file.write_bytes(ten_chunks[:start] + ten_chunks[stop:])
+    report = recover(file)
+    assert (report.healthy, report.message_count) == (False, 9)
+    assert any("lost" in phrase for phrase in report.damage), report.damage
+
+
+def records_of(content: bytes, opcode: int) -> list[tuple[int, int]]:
+    """Return first byte and end of all records of a kind."""
+    ranges, position = [], len(MAGIC)
+    while position + len(MAGIC) < len(content):
+        stop = position + 9 + int.from_bytes(content[position + 1 : position + 9], "little")
+        ranges += [(position, stop)] if content[position] == opcode else []
+        position = stop
+    return ranges
