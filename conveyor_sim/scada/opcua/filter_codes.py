@@ -1,4 +1,7 @@
-"""Checks of the filters of monitored items (OPC 10000-4, 7.7, 7.22): the library evaluates filters unchecked."""
+"""Checks of the filters of monitored items (OPC 10000-4, 7.7, 7.22): the library evaluates filters unchecked.
+
+A null array is None after decoding, and means the same as an empty one.
+"""
 
 from __future__ import annotations
 
@@ -48,12 +51,12 @@ def filter_code(wanted: Any, *, of_events: bool) -> int:
 
 
 def _event_code(wanted: ua.EventFilter) -> int:
-    for clause in wanted.SelectClauses:
-        if any(not name.Name for name in clause.BrowsePath):
+    for clause in wanted.SelectClauses or []:
+        if any(not name.Name for name in clause.BrowsePath or []):
             return int(Codes.BadBrowseNameInvalid)
         if clause.AttributeId not in set(ua.AttributeIds):
             return int(Codes.BadAttributeIdInvalid)
-    return _content_code(wanted.WhereClause.Elements)
+    return _content_code(wanted.WhereClause.Elements or [])
 
 
 def _content_code(elements: Sequence[ua.ContentFilterElement]) -> int:
@@ -64,7 +67,7 @@ def _content_code(elements: Sequence[ua.ContentFilterElement]) -> int:
     for place, element in enumerate(elements):
         if element.FilterOperator in _UNSUPPORTED:
             return int(Codes.BadFilterOperatorUnsupported)
-        operands, least = element.FilterOperands, _LEAST_OPERANDS.get(element.FilterOperator, 2)
+        operands, least = element.FilterOperands or [], _LEAST_OPERANDS.get(element.FilterOperator, 2)
         if len(operands) < least or (len(operands) > least and element.FilterOperator != Operators.InList):
             return int(Codes.BadFilterOperandCountMismatch)
         for operand in operands:
@@ -77,9 +80,9 @@ def _operand_code(operand: Any, place: int, count: int) -> int:
     if isinstance(operand, ua.ElementOperand):
         return int(Codes.Good if place < operand.Index < count else Codes.BadFilterOperandInvalid)
     if isinstance(operand, ua.SimpleAttributeOperand):
-        names = [name.Name for name in operand.BrowsePath]
+        names = [name.Name for name in operand.BrowsePath or []]
     elif isinstance(operand, ua.AttributeOperand):
-        names = [element.TargetName.Name for element in operand.BrowsePath.Elements]
+        names = [element.TargetName.Name for element in operand.BrowsePath.Elements or []]
     else:
         return int(Codes.Good if isinstance(operand, ua.LiteralOperand) else Codes.BadFilterOperandInvalid)
     return int(Codes.Good if all(names) else Codes.BadBrowseNameInvalid)

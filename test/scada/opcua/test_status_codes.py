@@ -64,6 +64,14 @@ ITEMS: tuple[tuple[Any, int], ...] = (
         monitor(EVENTS, ua.EventFilter([ua.SimpleAttributeOperand(BrowsePath=[ua.QualifiedName(None)])])),
         Codes.BadBrowseNameInvalid,
     ),
+    # Null arrays, which mean the same as empty ones:
+    (monitor(EVENTS, ua.EventFilter([ua.SimpleAttributeOperand(BrowsePath=None, AttributeId=13)])), Codes.Good),
+    (monitor(EVENTS, ua.EventFilter(None, ua.ContentFilter(None))), Codes.Good),
+    (
+        monitor(EVENTS, ua.EventFilter([], ua.ContentFilter([ua.ContentFilterElement(FilterOperands=None)]))),
+        Codes.BadFilterOperandCountMismatch,
+    ),
+    (monitor(EVENTS, where(ua.FilterOperator.IsNull, ua.SimpleAttributeOperand(BrowsePath=None))), Codes.Good),
     (monitor(VALUE, ua.EventFilter()), Codes.BadMonitoredItemFilterUnsupported),
     (monitor(VALUE, ua.DataChangeFilter(DeadbandType=1, DeadbandValue=math.nan)), Codes.BadDeadbandFilterInvalid),
     (monitor(VALUE, ua.DataChangeFilter(DeadbandType=1, DeadbandValue=-1.0)), Codes.BadDeadbandFilterInvalid),
