@@ -21,7 +21,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "errors": "",
     "engine": "| llvmlite numba numpy",
     "version": "engine",
-    "support": "errors | rich",
+    "support": "errors | numpy rich",
     "control": "",
     "scene": "errors support | annotated_types numpy pydantic pydantic_core ruamel yaml",
     "laws": "engine scene | numpy",
@@ -46,7 +46,7 @@ MAY_IMPORT: Mapping[str, str] = {
     "live": "bag errors line observe runs simulation support",
     "scada": "bag control errors line live observe runs scene simulation support view | aiohttp asyncua cryptography "
     "foxglove google numpy paho pymodbus",
-    "st": "control scada support | lark",
+    "st": "control support | lark",
     "studies": "bag control engine errors line model observe plot runs scene simulation statistics st support "
     "version | SALib annotated_types distributed numpy optuna pyarrow pydantic rich scipy",
     "ros": "bag control errors explain line live model observe runs scada scene simulation st support version | "

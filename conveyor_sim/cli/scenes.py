@@ -12,7 +12,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from conveyor_sim.scada.modbus_map import WordOrder
+    from conveyor_sim.support.modbus_rows import WordOrder
 
 
 @click.command()
@@ -62,8 +62,9 @@ def tags(
     """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
     from conveyor_sim.line.line import image_of
     from conveyor_sim.runs.tags import tag_csv, tag_table
-    from conveyor_sim.scada.modbus_map import keep_map, modbus_map, to_csv
+    from conveyor_sim.scada.modbus_map import keep_map, modbus_map
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.modbus_rows import to_csv
     from conveyor_sim.support.resources import scene_path
 
     loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
