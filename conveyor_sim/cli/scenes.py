@@ -27,7 +27,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     from conveyor_sim.explain.account import account
     from conveyor_sim.model import build_model
     from conveyor_sim.model.remedies import step_limit
-    from conveyor_sim.runs.report import plot_function
+    from conveyor_sim.runs.report import can_draw
     from conveyor_sim.runs.speed import expected
     from conveyor_sim.runs.tags import tag_rows
     from conveyor_sim.scene import load_scene
@@ -40,8 +40,9 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     show(account(checked, model))
     for line in expected(step_limit(checked)):
         click.echo(line)
-    plot_scene = plot_function("plot_scene")
-    if plot_scene is not None:
+    if can_draw():
+        from conveyor_sim.plot import plot_scene
+
         try:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
