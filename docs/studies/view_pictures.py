@@ -19,13 +19,13 @@ from typing import Any
 from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
-from conveyor_sim.runs.runner import run_scene
-from conveyor_sim.scada.scene_messages import Task
-from conveyor_sim.scada.scene_source import SceneSource
-from conveyor_sim.scada.users import keep_user, new_user
+from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.protocols.scene_messages import Task
+from conveyor_sim.protocols.scene_source import SceneSource
+from conveyor_sim.protocols.users import keep_user, new_user
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
-from conveyor_sim.view.one_file import Failure, write_page
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"

@@ -12,7 +12,7 @@ from st.test_twins import PROGRAMS, TWINS
 
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.scan import Constant, ControlError, Inputs, together
-from conveyor_sim.st import StructuredText
+from conveyor_sim.control.st import StructuredText
 from conveyor_sim.testing import Scenario
 
 

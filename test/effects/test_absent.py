@@ -7,9 +7,9 @@ import pytest
 from scenes import NO_FLOOR, arc, base, belt, bottle, contact, kind, line, scene, segment, simulation
 
 from conveyor_sim.engine.arrays.world import World
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state import State
 
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]
 GLASS = [contact(1000.0)]

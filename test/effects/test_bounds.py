@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, scene, segment
 
-from conveyor_sim.effects.terms import impact_speed
 from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
 from conveyor_sim.engine.contact.laws.linear import contact_time
 from conveyor_sim.engine.contact.laws.onset import onset_damping
 from conveyor_sim.engine.contact.laws.tsuji import tsuji_damping
-from conveyor_sim.model import Model, build_model
-from conveyor_sim.timestep.bounds import (
+from conveyor_sim.physics.effects.terms import impact_speed
+from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.physics.timestep.bounds import (
     base_friction_bound,
     contact_friction_bound,
     damping_bound,

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 from scenes import NO_FLOOR, NO_OUTPUTS, arc, base, belt, bottle, contact, kind, line, scene, segment
 
-from conveyor_sim.effects import EFFECTS, choose_effects, most_bottles
 from conveyor_sim.errors import SceneError
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.effects import EFFECTS, choose_effects, most_bottles
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.scene.effect_names import EFFECT_NAMES
 

@@ -7,9 +7,9 @@ import pytest
 from pressing import DRAG, felt, hopper, lane
 from scenes import MASS, RADIUS, base, belt, bottle, contact, kind, scene
 
-from conveyor_sim.effects.load import FILE, PILE, WEDGED, Load, contact_load
-from conveyor_sim.model import build_model
-from conveyor_sim.model.step_choice import choose_steps
+from conveyor_sim.physics.effects.load import FILE, PILE, WEDGED, Load, contact_load
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path

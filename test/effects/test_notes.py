@@ -7,8 +7,8 @@ from click.testing import CliRunner
 from scenes import base, belt, bottle, contact, kind, scene, segment
 
 from conveyor_sim.cli import main
-from conveyor_sim.effects.notes import CAN, notes
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.effects.notes import CAN, notes
+from conveyor_sim.physics.model import build_model
 
 RAIL = {"side": segment((0.0, -0.1), (1.0, -0.1))}
 GATE = {

@@ -8,11 +8,11 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from conveyor_sim.cli import main
-from conveyor_sim.explain.choices import explanation, price_table, setting_line
-from conveyor_sim.explain.effect_cost import ALL, Price, PriceList
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.prediction import WHOLE_SCENE, percent
+from conveyor_sim.report.explain.choices import explanation, price_table, setting_line
+from conveyor_sim.report.explain.effect_cost import ALL, Price, PriceList
 from conveyor_sim.scene import parse_scene
-from conveyor_sim.timestep.prediction import WHOLE_SCENE, percent
 
 TEXT = """\
 name: small

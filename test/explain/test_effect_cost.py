@@ -5,7 +5,7 @@ from math import comb
 import pytest
 from scenes import bottle, contact, scene
 
-from conveyor_sim.explain.effect_cost import ALL, Pricing, _rank
+from conveyor_sim.report.explain.effect_cost import ALL, Pricing, _rank
 
 FIELDS = {
     "tick": 0.001,

@@ -12,8 +12,8 @@ from conveyor_sim.engine.contact.laws.normal import normal_damping
 from conveyor_sim.engine.contact.laws.onset import onset_damping
 from conveyor_sim.engine.contact.laws.paper import paper_damping
 from conveyor_sim.engine.contact.laws.tsuji import tsuji_damping
-from conveyor_sim.laws.coefficients import base_radius
-from conveyor_sim.model import Model, build_model
+from conveyor_sim.physics.laws.coefficients import base_radius
+from conveyor_sim.physics.model import Model, build_model
 
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]
 RAIL = {"edge": segment((0.0, 6.0), (1.0, 6.0))}

@@ -6,7 +6,7 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from conveyor_sim.live.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
+from conveyor_sim.run.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 
 END = 1000
 RUN = "5ee2"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conveyor_sim.live.pacing import MAX_LAG, Pacer, RateCap
+from conveyor_sim.run.pacing import MAX_LAG, Pacer, RateCap
 
 TICK = 0.01
 

@@ -9,8 +9,8 @@ from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, line, p
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import SceneError
-from conveyor_sim.laws.coefficients import base_friction
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.laws.coefficients import base_friction
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.simulation import Simulation
 
 TWO = [bottle(0.0, 0.0), bottle(1.0, 0.0)]

@@ -8,8 +8,8 @@ from pressing import hopper
 from scenes import MASS, base, belt, bottle, contact, kind, scene
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.model import build_model
-from conveyor_sim.model.remedies import StepLimit, step_limit, with_remedy
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.model.remedies import StepLimit, step_limit, with_remedy
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
 from conveyor_sim.support.resources import scene_path

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from conveyor_sim.observe.alarm_figures import AlarmTally
-from conveyor_sim.observe.alarms import AlarmColumns
+from conveyor_sim.columns.alarms import AlarmColumns
+from conveyor_sim.report.alarm_figures import AlarmTally
 
 
 def tally(times: list[float]) -> AlarmTally:

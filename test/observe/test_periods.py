@@ -2,7 +2,7 @@
 
 import pytest
 
-from conveyor_sim.observe.periods import Period, longest_stops, stop_reasons
+from conveyor_sim.report.periods import Period, longest_stops, stop_reasons
 
 
 @pytest.mark.parametrize(

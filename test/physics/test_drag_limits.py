@@ -13,9 +13,9 @@ import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, order, scene, segment
 from worlds import FAR, advance, state_of
 
-from conveyor_sim.model import build_model
-from conveyor_sim.state import State
-from conveyor_sim.timestep.methods import METHODS
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.timestep.methods import METHODS
 
 LIMIT, MU, G = 1e-5, 0.5, 9.81
 """v_lim (m/s) is so low that steps in question are far too short for the springs to matter."""

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Contacts, Frame, Plant
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Contacts, Frame, Plant
 from conveyor_sim.scene import Scene, load_scene
 
 SCENE = Path(__file__).with_name("small_plant.yaml")

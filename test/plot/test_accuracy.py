@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from conveyor_sim.accuracy.figures.draw import accuracy_figures, plot_accuracy
+from conveyor_sim.accuracy.figures.logarithmic import logarithmic_x
+from conveyor_sim.accuracy.figures.notes import Note, place_notes
+from conveyor_sim.accuracy.figures.pareto import pareto_figure
 from conveyor_sim.accuracy.report.pareto import front
 from conveyor_sim.accuracy.results import Point, Study
-from conveyor_sim.plot import plot_accuracy, style
-from conveyor_sim.plot.accuracy import accuracy_figures
-from conveyor_sim.plot.logarithmic import logarithmic_x
-from conveyor_sim.plot.notes import Note, place_notes
-from conveyor_sim.plot.pareto import pareto_figure
+from conveyor_sim.report.figures import style
 
 VERDICTS = ("equivalent", "different", "undecided")
 

@@ -11,8 +11,8 @@ import pytest
 from plot.small_bag import record
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.plot import plot_bag
-from conveyor_sim.runs.drawing import Drawing
+from conveyor_sim.report.drawing import Drawing
+from conveyor_sim.report.figures.draw import plot_bag
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from conveyor_sim.plot import style
-from conveyor_sim.plot.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
-from conveyor_sim.plot.data import Contacts, Frame
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.bottles import ForceScale, draw_bottles, draw_forces, draw_orientation, speed_scale
+from conveyor_sim.report.figures.data import Contacts, Frame
 
 NORM = Normalize(0.0, 1.0)
 

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Energy
-from conveyor_sim.plot.energy import energy_figure
-from conveyor_sim.plot.recording import Recording
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Energy
+from conveyor_sim.report.figures.energy import energy_figure
+from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.scene import load_scene
 
 

@@ -9,9 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Flow, PeakForce
-from conveyor_sim.plot.flow import entries_per_minute, flow_figure, force_figure, rate_window
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Flow, PeakForce
+from conveyor_sim.report.figures.flow import entries_per_minute, flow_figure, force_figure, rate_window
 
 TIME = np.arange(0, 1001) * 0.02
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from conveyor_sim.plot.data import Plant
-from conveyor_sim.plot.labels import belt_labels, mark_labels, place, rail_labels
-from conveyor_sim.plot.plant import draw_plant
+from conveyor_sim.report.figures.data import Plant
+from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, rail_labels
+from conveyor_sim.report.figures.plant import draw_plant
 
 
 def test_belts_carry_name_and_speed(plant: Plant) -> None:

@@ -10,9 +10,9 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Contacts, Frame, Plant
-from conveyor_sim.plot.moment import Event, Trace, moment_figure
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Contacts, Frame, Plant
+from conveyor_sim.report.figures.moment import Event, Trace, moment_figure
 
 TIME = np.linspace(0.0, 2.5, 251)
 STEP = np.where(TIME < 1.0, 0.0, 1.0)

@@ -10,11 +10,11 @@ from scenes import NO_OUTPUTS, RADIUS, bottle
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.plot import style
-from conveyor_sim.plot.energy import energy_figure
-from conveyor_sim.plot.plant import draw_rails
-from conveyor_sim.plot.recording import Recording
-from conveyor_sim.runs.summarize import summarize
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.energy import energy_figure
+from conveyor_sim.report.figures.plant import draw_rails
+from conveyor_sim.report.figures.recording import Recording
+from conveyor_sim.report.summarize import summarize
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection
 from matplotlib.colors import Normalize
 
-from conveyor_sim.plot.data import Plant
-from conveyor_sim.plot.plant import draw_belts, draw_plant, draw_rails, draw_travel
+from conveyor_sim.report.figures.data import Plant
+from conveyor_sim.report.figures.plant import draw_belts, draw_plant, draw_rails, draw_travel
 
 NORM = Normalize(0.0, 1.0)
 

@@ -12,10 +12,11 @@ from plot.small_bag import SLOW_SPEED, record
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.plot import plot_bag, style
-from conveyor_sim.plot.bottles import draw_bottles
-from conveyor_sim.plot.recording import Recording, entries
-from conveyor_sim.plot.views import table_figure
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.bottles import draw_bottles
+from conveyor_sim.report.figures.draw import plot_bag
+from conveyor_sim.report.figures.recording import Recording, entries
+from conveyor_sim.report.figures.views import table_figure
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Velocity
-from conveyor_sim.plot.series import ordinal, velocity_figure
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Velocity
+from conveyor_sim.report.figures.series import ordinal, velocity_figure
 
 
 @pytest.fixture(autouse=True)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.line.time_account import CATEGORIES
-from conveyor_sim.observe.counters import CounterColumns
-from conveyor_sim.observe.periods import Period, longest_stops, shares, stop_reasons
-from conveyor_sim.plot import style
-from conveyor_sim.plot.line_efficiency import efficiency_figure
-from conveyor_sim.plot.state_bars import COLOURS, state_bars_figure
-from conveyor_sim.plot.stop_reasons import MOST, stop_reasons_figure
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.line_efficiency import efficiency_figure
+from conveyor_sim.report.figures.state_bars import COLOURS, state_bars_figure
+from conveyor_sim.report.figures.stop_reasons import MOST, stop_reasons_figure
+from conveyor_sim.report.periods import Period, longest_stops, shares, stop_reasons
 
 FILLER = [
     Period("machines/filler", 0.0, 40.0, "running", ""),

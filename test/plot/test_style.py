@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.plot import plot_scene, style
-from conveyor_sim.plot.style import nice_above, nice_below
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.draw import plot_scene
+from conveyor_sim.report.figures.style import nice_above, nice_below
 from conveyor_sim.scene import Scene
 
 

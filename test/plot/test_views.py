@@ -11,9 +11,9 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Contacts, Frame, Plant
-from conveyor_sim.plot.views import plant_figure, scene_figure, table_figure, table_region
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Contacts, Frame, Plant
+from conveyor_sim.report.figures.views import plant_figure, scene_figure, table_figure, table_region
 from conveyor_sim.scene import Scene
 
 

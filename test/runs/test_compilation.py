@@ -12,7 +12,7 @@ CODE = """
 from scenes import NO_FLOOR, bottle, scene
 from conveyor_sim import Simulation
 from conveyor_sim.engine.sensors.regions import find_inside
-from conveyor_sim.runs.compilation import compile_kernels
+from conveyor_sim.run.compilation import compile_kernels
 
 region = [[0.2, -1.0], [0.3, -1.0], [0.3, 1.0]]
 parts = {{"part": {{"region": region{more}}}}}

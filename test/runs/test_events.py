@@ -17,7 +17,7 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.bag.typestore import definition
 from conveyor_sim.cli import main
-from conveyor_sim.runs.events import KINDS
+from conveyor_sim.report.events import KINDS
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

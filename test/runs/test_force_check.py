@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from scenes import MASS, NO_FLOOR, PEAKS, RADIUS, base, belt, bottle, contact, kind, scene, segment, simulation
 
-from conveyor_sim.model import build_model
-from conveyor_sim.runs.force_check import ForceCheck, PeakWatch, achieved, pressed
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.run.force_check import ForceCheck, PeakWatch, achieved, pressed
 
 K = 5e3
 TWO: dict[str, Any] = {"contacts": [contact(K)], "bottles": [bottle(0.0, 0.0, 1.0), bottle(1.0, 0.0)], **NO_FLOOR}

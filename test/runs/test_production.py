@@ -18,9 +18,9 @@ from conveyor_sim.errors import BagError
 from conveyor_sim.line.counters import RESET_COUNTERS
 from conveyor_sim.line.inputs import FORCE, Input
 from conveyor_sim.line.time_account import CATEGORIES
-from conveyor_sim.observe.periods import longest_stops, stop_reasons
-from conveyor_sim.observe.production import Production
-from conveyor_sim.runs.production import read_production
+from conveyor_sim.report.periods import longest_stops, stop_reasons
+from conveyor_sim.report.production import read_production
+from conveyor_sim.report.production_record import Production
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
 

@@ -12,7 +12,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.runs.runner import run_scene
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -84,7 +84,7 @@ LONG_RUN = """
 import sys
 from pathlib import Path
 from bag.small_line import SMALL_LINE
-from conveyor_sim.runs.runner import run_scene
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 scene = load_scene(SMALL_LINE, {"duration": 1e6})
 run = run_scene(scene, Path(sys.argv[1]), lambda done: print(done, flush=True))

@@ -9,9 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from conveyor_sim.cli import main
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Frame, Plant
-from conveyor_sim.plot.views import plant_figure, scene_figure, table_figure
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Frame, Plant
+from conveyor_sim.report.figures.views import plant_figure, scene_figure, table_figure
 from conveyor_sim.scene import parse_scene
 
 BARE = "name: sparse\nduration: {}\nbottle_types: {{b: {{radius: 0.03, mass: 0.1, material: glass}}}}\n"

@@ -9,9 +9,9 @@ from bag.small_line import SMALL_LINE
 from pressing import hopper
 from scenes import bottle, scene
 
-from conveyor_sim.model.remedies import step_limit
-from conveyor_sim.runs.runner import run_scene
-from conveyor_sim.runs.speed import Spent, TopicCount, expected, measured
+from conveyor_sim.physics.model.remedies import step_limit
+from conveyor_sim.run.runner import run_scene
+from conveyor_sim.run.speed import Spent, TopicCount, expected, measured
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
 

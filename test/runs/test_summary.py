@@ -15,11 +15,11 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.line.authority import AUTOMATIC, MANUAL
 from conveyor_sim.line.inputs import MODE, Input
-from conveyor_sim.model import build_model
-from conveyor_sim.model.remedies import step_limit
-from conveyor_sim.runs.summarize import summarize
-from conveyor_sim.runs.summary import Summary, write_summary
-from conveyor_sim.runs.summary_table import render
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.model.remedies import step_limit
+from conveyor_sim.report.summarize import summarize
+from conveyor_sim.report.summary import Summary, write_summary
+from conveyor_sim.report.summary_table import render
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.simulation import Simulation
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from scenes import SHIPPED, shipped_name
 
 from conveyor_sim.cli import main
-from conveyor_sim.runs.tags import NONE, Row, tag_csv, tag_rows
+from conveyor_sim.report.tags import NONE, Row, tag_csv, tag_rows
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

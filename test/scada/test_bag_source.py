@@ -17,8 +17,8 @@ from conveyor_sim.errors import BagError
 from conveyor_sim.line.inputs import FORCE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING
-from conveyor_sim.scada import past
-from conveyor_sim.scada.bag_source import BagSource
+from conveyor_sim.protocols import past
+from conveyor_sim.protocols.bag_source import BagSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

@@ -18,10 +18,10 @@ from scada.waiting import PATIENCE, until
 from view.line import record
 
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.scada.bag_source import BagSource
-from conveyor_sim.scada.face import FaceError, Settings
-from conveyor_sim.scada.faces import FACES
-from conveyor_sim.scada.serving import Serving
+from conveyor_sim.protocols.bag_source import BagSource
+from conveyor_sim.protocols.face import FaceError, Settings
+from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.serving import Serving
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed: pip install conveyor-sim[foxglove]")

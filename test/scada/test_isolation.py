@@ -20,8 +20,8 @@ from scada.waiting import PATIENCE, alone, until
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.scada.server_messages import BEAT
-from conveyor_sim.scada.users import MOST_WRONG, line_of, new_user
+from conveyor_sim.protocols.server_messages import BEAT
+from conveyor_sim.protocols.users import MOST_WRONG, line_of, new_user
 
 pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
 pytest.importorskip("asyncua", reason="asyncua is not installed: pip install conveyor-sim[scada]")

@@ -23,8 +23,8 @@ from scada.load_clients import QUEUE
 from scada.waiting import PATIENCE, until
 
 from bench.scada import CHANGING, CLIENTS, EVERY, KINDS, TICK, Counting
-from conveyor_sim.scada.face import Settings
-from conveyor_sim.scada.serving import Serving
+from conveyor_sim.protocols.face import Settings
+from conveyor_sim.protocols.serving import Serving
 
 ROOT = Path(__file__).parents[2]
 CHANGES = 200

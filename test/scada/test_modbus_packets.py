@@ -10,7 +10,7 @@ from contextlib import suppress
 import pytest
 from scada.modbus_line import ILLEGAL_ADDRESS, ILLEGAL_FUNCTION, ILLEGAL_VALUE, SETPOINT, SPEED, Line, serving
 
-from conveyor_sim.scada.modbus_server import MOST_UNANSWERED
+from conveyor_sim.protocols.modbus.server import MOST_UNANSWERED
 
 
 @pytest.fixture

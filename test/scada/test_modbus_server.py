@@ -30,18 +30,18 @@ from conveyor_sim.bag.messages import Header, line_message
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.inputs import DISOWN, OWN
-from conveyor_sim.scada.face import FaceError
-from conveyor_sim.scada.modbus_map import HANDSHAKE
-from conveyor_sim.scada.quotas import QUOTA
-from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import MOST_WAITING, Control
-from conveyor_sim.scada.view import View
+from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.modbus.address_map import HANDSHAKE
+from conveyor_sim.protocols.quotas import QUOTA
+from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.source import MOST_WAITING, Control
+from conveyor_sim.protocols.view import View
 
 pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
 
 from pymodbus.client import ModbusTcpClient
 
-from conveyor_sim.scada.modbus_server import ModbusServer
+from conveyor_sim.protocols.modbus.server import ModbusServer
 
 
 @pytest.fixture(params=["operator"])

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.scada.face import FaceError, Settings
-from conveyor_sim.scada.limit_options import limit_names, limit_settings
-from conveyor_sim.scada.opcua.limits import Limits
-from conveyor_sim.scada.quotas import GREETED, GUEST, OPENED, Place, Places, Quota, share_of_guests
-from conveyor_sim.scada.work import Budget
+from conveyor_sim.protocols.face import FaceError, Settings
+from conveyor_sim.protocols.limit_options import limit_names, limit_settings
+from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.quotas import GREETED, GUEST, OPENED, Place, Places, Quota, share_of_guests
+from conveyor_sim.protocols.work import Budget
 
 HERE, THERE = "10.0.0.1", "10.0.0.2"
 

@@ -21,14 +21,14 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPED
-from conveyor_sim.scada.face import Settings
-from conveyor_sim.scada.frames import MOST_FRAMES, Frames
-from conveyor_sim.scada.remote_source import Calls, RemoteSource
-from conveyor_sim.scada.scene_messages import Task
-from conveyor_sim.scada.scene_source import SceneSource
-from conveyor_sim.scada.server_messages import ServerTask
-from conveyor_sim.scada.source import MOST_WAITING, Shown
-from conveyor_sim.scada.view import decoded
+from conveyor_sim.protocols.face import Settings
+from conveyor_sim.protocols.frames import MOST_FRAMES, Frames
+from conveyor_sim.protocols.remote_source import Calls, RemoteSource
+from conveyor_sim.protocols.scene_messages import Task
+from conveyor_sim.protocols.scene_source import SceneSource
+from conveyor_sim.protocols.server_messages import ServerTask
+from conveyor_sim.protocols.source import MOST_WAITING, Shown
+from conveyor_sim.protocols.view import decoded
 from conveyor_sim.scene import Scene, load_scene
 
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"

@@ -17,7 +17,7 @@ from testing.soft_plc import BOTTLES, SETPOINT, speed
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.control.scan import Inputs
-from conveyor_sim.scada.users import line_of, new_user
+from conveyor_sim.protocols.users import line_of, new_user
 from conveyor_sim.testing.plc import ADDRESS, PASSWORD
 from conveyor_sim.testing.scenario import Scenario
 

@@ -22,8 +22,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.program import Program
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.program import Program
 
 CASES = Path(__file__).parent / "cases"
 TICK = 10_000_000  # ns

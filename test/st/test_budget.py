@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from st.conformance import program
 
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.errors import StructuredTextError
-from conveyor_sim.st.program import BUDGET, Program
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.errors import StructuredTextError
+from conveyor_sim.control.st.program import BUDGET, Program
 
 TYPES = """
 TYPE P : STRUCT x : INT; y : INT; END_STRUCT; END_TYPE

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from st.conformance import Case, cases, play
 
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.errors import StructuredTextError
 
 CASES = list(cases())
 

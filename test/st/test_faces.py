@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError
-from conveyor_sim.st import StructuredText
-from conveyor_sim.st.load import load
+from conveyor_sim.control.st import StructuredText
+from conveyor_sim.control.st.load import load
 from conveyor_sim.testing import Scenario
 
 PROGRAMS = Path(__file__).parent.parent.parent / "examples" / "st"

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.control.scan import ControlError
-from conveyor_sim.st import StructuredText
-from conveyor_sim.st.library import CompiledProgram
+from conveyor_sim.control.st import StructuredText
+from conveyor_sim.control.st.library import CompiledProgram
 from conveyor_sim.testing import Scenario
 
 ROOT = Path(__file__).parent.parent.parent

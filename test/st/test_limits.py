@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conveyor_sim.control.st import StructuredText
 from conveyor_sim.errors import CommandError
-from conveyor_sim.runs.controlled import Controlled
+from conveyor_sim.run.controlled import Controlled
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.st import StructuredText
 from conveyor_sim.testing import Scenario
 
 COMMAND = "belts/zone1/cmd_speed"

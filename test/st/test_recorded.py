@@ -15,11 +15,11 @@ from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.cli import main
 from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import ControlError, together
-from conveyor_sim.st import StructuredText
+from conveyor_sim.control.st import StructuredText
+from conveyor_sim.page.content import Collector
+from conveyor_sim.page.recording import Detail, Recording
+from conveyor_sim.page.watch import Watch
 from conveyor_sim.testing import Scenario
-from conveyor_sim.view.content import Collector
-from conveyor_sim.view.recording import Detail, Recording
-from conveyor_sim.view.watch import Watch
 
 PROGRAMS = Path(__file__).parent.parent.parent / "examples" / "st"
 TABLE = Path(__file__).parent.parent / "testing" / "table.yaml"

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from conveyor_sim.st import StructuredText
+from conveyor_sim.control.st import StructuredText
 from conveyor_sim.testing import Scenario
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.errors import StructuredTextError
-from conveyor_sim.st.program import Program
-from conveyor_sim.st.sections import OUTSIDE, TAKES
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.errors import StructuredTextError
+from conveyor_sim.control.st.program import Program
+from conveyor_sim.control.st.sections import OUTSIDE, TAKES
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "structured_text.md"
 SECTIONS = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_EXTERNAL", "VAR_TEMP", "VAR_GLOBAL")

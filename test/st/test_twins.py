@@ -16,8 +16,8 @@ from conveyor_sim.control.jam import JamAlarm, JamClearing
 from conveyor_sim.control.level import Count, table_level
 from conveyor_sim.control.reject import TrackedReject
 from conveyor_sim.control.scan import Constant, Controller, priority
+from conveyor_sim.control.st.controller import StructuredText
 from conveyor_sim.control.v_curve import Neighbour, VCurve
-from conveyor_sim.st.controller import StructuredText
 from conveyor_sim.testing import Scenario
 
 PROGRAMS = Path(__file__).parent.parent.parent / "examples" / "st"

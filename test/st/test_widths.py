@@ -8,8 +8,8 @@ from __future__ import annotations
 import random
 from typing import NamedTuple
 
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.program import Program
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.program import Program
 
 BITS = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64, "USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64}
 SIGNED = ("SINT", "INT", "DINT", "LINT")

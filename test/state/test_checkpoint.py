@@ -40,12 +40,12 @@ from scenes import (
 from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.errors import CheckpointError
+from conveyor_sim.physics.state.checkpoint import FORMAT, sealed, versions
+from conveyor_sim.physics.state.snapshot import snapshot
+from conveyor_sim.physics.state.world_arrays import CONSTANT, changing_arrays
+from conveyor_sim.physics.state.world_checks import FIXED, SCRATCH, indices, ranges
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.checkpoint import FORMAT, sealed, versions
-from conveyor_sim.state.snapshot import snapshot
-from conveyor_sim.state.world_arrays import CONSTANT, changing_arrays
-from conveyor_sim.state.world_checks import FIXED, SCRATCH, indices, ranges
 
 INTEGRATORS: dict[str, dict[str, Any]] = {
     "semi_implicit_euler": {"per_tick": 50},

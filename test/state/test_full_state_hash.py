@@ -14,12 +14,12 @@ from line.test_station import LOADED, stationed
 from scenes import SPRINGS_AND_RINGS, line, scene
 from state.test_checkpoint import INTEGRATORS, queue, run
 
+from conveyor_sim.physics.state.full_state_hash import LIMITED, MEMORY, OBSERVERS, SCRATCH, full_state_hash
+from conveyor_sim.physics.state.world_arrays import changing_arrays
+from conveyor_sim.physics.state.world_checks import FIXED
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.limits import Limits
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.full_state_hash import LIMITED, MEMORY, OBSERVERS, SCRATCH, full_state_hash
-from conveyor_sim.state.world_arrays import changing_arrays
-from conveyor_sim.state.world_checks import FIXED
 
 LIMITS = {"scuffing_work": 1e-6, "impact_speed": 0.05, "crushing_force": 0.5, "tipping": 0.01, "clogging_time": 0.2}
 SCENES: dict[str, Callable[[], Scene]] = {

@@ -12,8 +12,8 @@ import pytest
 from scenes import bottle, scene
 
 from conveyor_sim.errors import CheckpointError
+from conveyor_sim.physics.state.checkpoint import FORMAT
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.checkpoint import FORMAT
 from conveyor_sim.support.files import FileError, write_file
 
 EXPECTED = "expected a new name or a checkpoint"

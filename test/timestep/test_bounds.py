@@ -6,7 +6,7 @@ import pytest
 
 from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
 from conveyor_sim.engine.contact.laws.linear import contact_time
-from conveyor_sim.timestep.bounds import (
+from conveyor_sim.physics.timestep.bounds import (
     Bound,
     base_friction_bound,
     contact_friction_bound,

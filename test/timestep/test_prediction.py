@@ -23,12 +23,12 @@ from scenes import (
 )
 from scipy.integrate import solve_ivp
 
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.methods import METHODS
+from conveyor_sim.physics.timestep.prediction import WHOLE_SCENE
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.timestep.methods import METHODS
-from conveyor_sim.timestep.prediction import WHOLE_SCENE
 
 SPEED = 0.7
 """m/s"""

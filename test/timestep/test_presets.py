@@ -5,12 +5,12 @@ import math
 import pytest
 from scenes import bottle, contact, scene
 
-from conveyor_sim.model import Model, build_model
+from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.physics.timestep.methods import METHODS
+from conveyor_sim.physics.timestep.presets import PRESETS, table, target
 from conveyor_sim.scene import load_scene
 from conveyor_sim.scene.accuracy import Accuracy
 from conveyor_sim.support.resources import scene_path
-from conveyor_sim.timestep.methods import METHODS
-from conveyor_sim.timestep.presets import PRESETS, table, target
 
 
 def steps_a_contact(**accuracy: object) -> float:

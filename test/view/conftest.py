@@ -13,11 +13,11 @@ from scada.waiting import PATIENCE
 from view.line import LINE, record
 from view.live_line import PASSWORD, PEOPLE, Live
 
-from conveyor_sim.scada.scene_messages import Task
-from conveyor_sim.scada.scene_source import SceneSource
-from conveyor_sim.scada.users import keep_user, new_user
+from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.protocols.scene_messages import Task
+from conveyor_sim.protocols.scene_source import SceneSource
+from conveyor_sim.protocols.users import keep_user, new_user
 from conveyor_sim.scene import load_scene
-from conveyor_sim.view.one_file import Failure, write_page
 
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 

@@ -9,10 +9,10 @@ from typing import Any
 from scada.waiting import until
 from view.pixels import settled
 
-from conveyor_sim.scada.face import Settings
-from conveyor_sim.scada.faces import FACES
-from conveyor_sim.scada.serving import Serving
-from conveyor_sim.scada.users import Role
+from conveyor_sim.protocols.face import Settings
+from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.users import Role
 
 WEB = next(kind for kind in FACES if kind.name == "web")
 PEOPLE: dict[str, Role] = {"vic": "viewer", "jo": "operator", "tess": "test"}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.columns.bottles import BottleColumns
 
 TYPE_COLOURS = ((0, 114, 178), (213, 94, 0))
 """Of the first two bottle types, in the colouring by type."""

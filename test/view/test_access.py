@@ -13,8 +13,8 @@ from view.conftest import opened_page
 from view.live_line import PASSWORD, Live, show_device, signed_in, soon
 from view.test_page import clock, press, settled
 
-from conveyor_sim.view.bundle import text
-from conveyor_sim.view.one_file import Failure, write_page
+from conveyor_sim.page.bundle import text
+from conveyor_sim.page.one_file import Failure, write_page
 
 PANELS = ("line", "alarms", "events", "device", "bottle")
 

@@ -14,8 +14,8 @@ from view.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
 from view.test_page import clock, press, seek
 
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.view.one_file import write_page
-from conveyor_sim.view.server import RecordingServer
+from conveyor_sim.page.one_file import write_page
+from conveyor_sim.page.server import RecordingServer
 
 MARK = np.array((0x82, 0x50, 0xDF))
 """Colour of a difference on the scrubber."""

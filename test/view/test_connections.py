@@ -21,14 +21,14 @@ pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install con
 
 from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeError
 
-from conveyor_sim.scada.face import FaceError, Settings
-from conveyor_sim.scada.quotas import QUOTA, share_of_guests
-from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.serving import Serving
-from conveyor_sim.scada.web import feed, server
-from conveyor_sim.scada.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
-from conveyor_sim.scada.web.tls import server_context
-from conveyor_sim.scada.web.viewer import MOST_WAITING, UNSEEN
+from conveyor_sim.protocols.face import FaceError, Settings
+from conveyor_sim.protocols.quotas import QUOTA, share_of_guests
+from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.web import feed, server
+from conveyor_sim.protocols.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
+from conveyor_sim.protocols.web.tls import server_context
+from conveyor_sim.protocols.web.viewer import MOST_WAITING, UNSEEN
 
 T = TypeVar("T")
 
@@ -357,7 +357,7 @@ def test_a_flood_of_pages_leaves_a_place_for_a_user(live: Live) -> None:
 
 
 def test_what_waits_for_a_page_is_bounded() -> None:
-    from conveyor_sim.scada.web.viewer import Viewer
+    from conveyor_sim.protocols.web.viewer import Viewer
 
     async def work() -> None:
         viewer = Viewer(None)  # type: ignore[arg-type]  # nothing is sent

@@ -15,11 +15,11 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.page.difference import Comparison
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.view.difference import Comparison
 
 
 def test_a_recording_equals_itself_up_to_its_end(bag: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from conveyor_sim.view.own_host import authority, is_own, is_same_origin
+from conveyor_sim.page.own_host import authority, is_own, is_same_origin
 
 OWN = [
     "127.0.0.1",

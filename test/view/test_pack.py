@@ -12,12 +12,12 @@ from view.line import record
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.observe.columns import BottleColumns, ContactColumns
-from conveyor_sim.view.block import Content, levels, pack
-from conveyor_sim.view.one_file import write_page
-from conveyor_sim.view.recording import Detail, Recording
-from conveyor_sim.view.varints import varints
+from conveyor_sim.page.block import Content, levels, pack
+from conveyor_sim.page.one_file import write_page
+from conveyor_sim.page.recording import Detail, Recording
+from conveyor_sim.page.varints import varints
 
 BOTTLES, SECONDS, RATE = 300, 60.0, 25.0
 ALLOWED = 1_000_000

@@ -12,7 +12,7 @@ from view.line import LINE, record
 from view.pixels import canvas, count_where_they_are, settled, to_pixels
 
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.view.one_file import write_page
+from conveyor_sim.page.one_file import write_page
 
 
 def clock(page: Any) -> float:

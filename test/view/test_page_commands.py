@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import pytest
 
-from conveyor_sim.scada.source import TickSource
-from conveyor_sim.scada.view import PictureSource
-from conveyor_sim.scada.web.commands import Commands, Person
+from conveyor_sim.protocols.source import TickSource
+from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.web.commands import Commands, Person
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

@@ -14,7 +14,7 @@ from view.conftest import opened_page
 from view.states import STATES
 from view.test_page import settled
 
-from conveyor_sim.view.one_file import Failure, write_page
+from conveyor_sim.page.one_file import Failure, write_page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 BLOCK = 20

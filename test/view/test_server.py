@@ -28,14 +28,14 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.observe.columns import BottleColumns
-from conveyor_sim.observe.events import Event, event_columns
+from conveyor_sim.page.one_file import write_page
+from conveyor_sim.page.recording import Recording
+from conveyor_sim.page.server import MOST_CONNECTIONS, SERVED, RecordingServer, _Handler
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.view.one_file import write_page
-from conveyor_sim.view.recording import Recording
-from conveyor_sim.view.server import MOST_CONNECTIONS, SERVED, RecordingServer, _Handler
 
 
 @pytest.fixture

@@ -17,8 +17,8 @@ import pytest
 from scada.waiting import PATIENCE, until
 
 from conveyor_sim.line.run_state import RUNNING, RunState
-from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import TickSource
+from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.source import TickSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -28,9 +28,9 @@ pytest.importorskip("google.protobuf", reason="protobuf is not installed: pip in
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from conveyor_sim.scada.mqtt.broker import Broker
-from conveyor_sim.scada.mqtt.edge_node import EdgeNode
-from conveyor_sim.scada.mqtt.payload import BOOLEAN, DOUBLE, Payload, add_metric, decoded, whole
+from conveyor_sim.protocols.mqtt.broker import Broker
+from conveyor_sim.protocols.mqtt.edge_node import EdgeNode
+from conveyor_sim.protocols.mqtt.payload import BOOLEAN, DOUBLE, Payload, add_metric, decoded, whole
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
 if MOSQUITTO is None:

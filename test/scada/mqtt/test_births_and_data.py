@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 from conveyor_sim.line.inputs import FORCE, Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, RUNNING, RunState
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
-from conveyor_sim.scada.mqtt import edge_node
-from conveyor_sim.scada.mqtt.session import BETWEEN
+from conveyor_sim.protocols.mqtt import edge_node
+from conveyor_sim.protocols.mqtt.session import BETWEEN
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from test.scada.mqtt.kit import BOOLEAN, DOUBLE, SCENE, SETPOINT, SPEED, properties_of, value_of

@@ -10,9 +10,9 @@ from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_from_binary
 from scada.waiting import alone
 
-from conveyor_sim.scada.opcua.limits import Limits
-from conveyor_sim.scada.quotas import Quota, share_of_guests
-from conveyor_sim.scada.users import Logins
+from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.quotas import Quota, share_of_guests
+from conveyor_sim.protocols.users import Logins
 from test.scada.opcua.conftest import PASSWORD, Line, Serve, refused
 from test.scada.opcua.limit_clients import (
     TICK,

@@ -13,14 +13,14 @@ from asyncua import Client as AsyncClient
 from asyncua import ua
 from scada.waiting import alone
 
-from conveyor_sim.scada.face import FaceError
-from conveyor_sim.scada.opcua import session, transport
-from conveyor_sim.scada.opcua.limits import Limits
-from conveyor_sim.scada.opcua.processor import CHUNK
-from conveyor_sim.scada.opcua.server import OpcUaServer
-from conveyor_sim.scada.quotas import QUOTA
-from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import MOST_WAITING
+from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.opcua import session, transport
+from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.processor import CHUNK
+from conveyor_sim.protocols.opcua.server import OpcUaServer
+from conveyor_sim.protocols.quotas import QUOTA
+from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.source import MOST_WAITING
 from test.scada.opcua.conftest import PASSWORD, PATIENCE
 
 if TYPE_CHECKING:

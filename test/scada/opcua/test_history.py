@@ -9,9 +9,9 @@ from asyncua import ua
 from asyncua.sync import Client
 from scada.waiting import until
 
-from conveyor_sim.scada.bag_source import BagSource
-from conveyor_sim.scada.opcua.server import OpcUaServer
-from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.protocols.bag_source import BagSource
+from conveyor_sim.protocols.opcua.server import OpcUaServer
+from conveyor_sim.protocols.server_thread import ServerThread
 from conveyor_sim.testing.scenario import Scenario
 from test.scada.opcua.conftest import PATIENCE, refused
 

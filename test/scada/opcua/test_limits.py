@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from asyncua import Client, ua
 
-from conveyor_sim.scada.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
-from conveyor_sim.scada.quotas import QUOTA
+from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
+from conveyor_sim.protocols.quotas import QUOTA
 from test.scada.opcua.conftest import HISTORY, Line, Serve
 from test.scada.opcua.limit_clients import TICK, Codes, code_of, connected, item, items_of, large_node
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from conveyor_sim.line.packml import STATE_TEXTS
-from conveyor_sim.scada.opcua.server import OpcUaServer
+from conveyor_sim.protocols.opcua.server import OpcUaServer
 from test.scada.opcua.conftest import PASSWORD, PATIENCE
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ from asyncua.server.internal_session import InternalSession
 from asyncua.ua.ua_binary import struct_from_binary
 from scada.waiting import alone
 
-from conveyor_sim.scada.opcua import refusals
-from conveyor_sim.scada.opcua.dispatch import REQUESTS, SESSIONLESS
-from conveyor_sim.scada.opcua.ownership import OwnedSession
-from conveyor_sim.scada.opcua.session import Session
+from conveyor_sim.protocols.opcua import refusals
+from conveyor_sim.protocols.opcua.dispatch import REQUESTS, SESSIONLESS
+from conveyor_sim.protocols.opcua.ownership import OwnedSession
+from conveyor_sim.protocols.opcua.session import Session
 from test.scada.opcua.conftest import PASSWORD, PATIENCE
 from test.scada.opcua.test_security import own_certificate
 

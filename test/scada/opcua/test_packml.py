@@ -11,7 +11,7 @@ from asyncua import ua
 from conveyor_sim.line.alarms.alarm import AlarmState
 from conveyor_sim.line.packml import Command, State
 from conveyor_sim.line.tag import number
-from conveyor_sim.scada.opcua.packml import NAMESPACE, NODESET, _a_second
+from conveyor_sim.protocols.opcua.packml import NAMESPACE, NODESET, _a_second
 from test.scada.opcua.conftest import refused
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from asyncua import ua
 
-from conveyor_sim.scada.source import MOST_WAITING
+from conveyor_sim.protocols.source import MOST_WAITING
 from test.scada.opcua.conftest import ROLES, refused
 
 if TYPE_CHECKING:

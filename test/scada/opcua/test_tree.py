@@ -8,8 +8,8 @@ import pytest
 from asyncua import ua
 
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
-from conveyor_sim.scada.opcua.nodes import NAMESPACE
-from conveyor_sim.scada.opcua.values import unit_of
+from conveyor_sim.protocols.opcua.nodes import NAMESPACE
+from conveyor_sim.protocols.opcua.values import unit_of
 
 if TYPE_CHECKING:
     from test.scada.opcua.conftest import Line, Serve

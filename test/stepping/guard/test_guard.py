@@ -29,10 +29,10 @@ from scenes import (
 )
 
 from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.columns.events import GuardEvent
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.physics.stepping.guard.chatter import EVERY
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard import GuardEvent
-from conveyor_sim.stepping.guard.chatter import EVERY
 
 STOP = {"stop": segment((0.6, -1.0), (0.6, 1.0))}
 

@@ -17,9 +17,9 @@ from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.runs.runner import run_scene
-from conveyor_sim.runs.summarize import summarize
-from conveyor_sim.runs.summary_table import render
+from conveyor_sim.report.summarize import summarize
+from conveyor_sim.report.summary_table import render
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

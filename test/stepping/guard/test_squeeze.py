@@ -8,7 +8,7 @@ import pytest
 from scenes import NO_FLOOR, RADIUS, bottle, contact, scene, segment
 from worlds import ALONE, state_of
 
-from conveyor_sim.stepping.guard.squeeze import Squeeze, squeeze_of
+from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
 
 DEEP = 1e-3
 """m, of every contact."""
