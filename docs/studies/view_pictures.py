@@ -42,10 +42,10 @@ def test_a_wedged_pair_is_alarmed_within_5_s(line):
 """A test with a controller that raises its alarm too late."""
 
 sys.path.insert(0, str(ROOT / "test"))
-from view.conftest import BROWSERS  # noqa: E402
-from view.line import LINE, record  # noqa: E402
-from view.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
-from view.states import STATES, State, at  # noqa: E402
+from page.conftest import BROWSERS  # noqa: E402
+from page.line import LINE, record  # noqa: E402
+from page.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
+from page.states import STATES, State, at  # noqa: E402
 
 
 class Studio:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from st.test_twins import PROGRAMS, TWINS
+from control.st.test_twins import PROGRAMS, TWINS
 
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.scan import Constant, ControlError, Inputs, together

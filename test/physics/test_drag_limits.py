@@ -121,7 +121,7 @@ def test_bounds_keep_the_same_share_of_the_limit(integrator: str) -> None:
         "spin on the base": 0.25 * 2.0 * MU * G / LIMIT,
         "normal damping": 2.0 * 3.0 / (MASS / 2.0),
         "tangential damping": 2.0 * 2.0 / (MASS / 2.0),
-        # At the load of a few bottles in a zigzag, three times the pull of all (test/effects/test_load.py).
+        # At the load of a few bottles in a zigzag, three times the pull of all (test/physics/effects/test_load.py).
         "contact friction": 2.0 * MU * (2.0 / MASS) * (3.0 * 2.0 * MU * MASS * G) / LIMIT,
     }
     shares = {b.name: gammas[b.name] * b.dt / LIMITS[integrator] for b in model.bounds if b.name in gammas}

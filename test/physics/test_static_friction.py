@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from physics.state.test_checkpoint import END, SAVED, everything, queue, run
 from scenes import (
     COMMON,
     MASS,
@@ -24,7 +25,6 @@ from scenes import (
     segment,
     simulation,
 )
-from state.test_checkpoint import END, SAVED, everything, queue, run
 
 from conveyor_sim.physics.state.world_arrays import changing_arrays
 from conveyor_sim.physics.state.world_checks import indices, ranges

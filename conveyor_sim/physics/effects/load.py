@@ -6,7 +6,7 @@ several sides. The factors below are measured: the load at which two bottles alo
 contacts of the pile together (the largest eigenvalue of their friction at rest), over mu m g and the bottles that fit
 in a file along the pile. Hoppers of 400 to 1 000 bottles with walls at 20 to 90 degrees: 1.9 to 3.2; files between
 rails 1.05 to 1.2 diameters apart: 1.0 to 1.2; zigzags in lanes of 1.35 to 2.5 diameters: 1.7 to 3.3, and up to 2.6 over
-the number of bottles (test/effects/test_load.py). Impacts are not in it, nor those of a whole queue that runs up.
+the number of bottles (test/physics/effects/test_load.py). Impacts are not in it, nor those of a queue that runs up.
 """
 
 import math

@@ -1,7 +1,7 @@
 """What each integrator misses of an impact: laws of error in the peak force, with measured coefficients.
 
 Measured in head-on impacts, RMS over 64 phases of entry into a step, at 10 to 200 steps a contact (fractions, too) and
-damping ratios from 0 to 1; test/timestep/test_prediction.py holds them to it in the engine.
+damping ratios from 0 to 1; test/physics/timestep/test_prediction.py holds them to it in the engine.
 """
 
 import math

@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from control.st.conformance import cases
 from fuzz.invariants import Violation
-from st.conformance import cases
 
 from conveyor_sim.control.st.compile import compile_text
 from conveyor_sim.control.st.errors import StructuredTextError
