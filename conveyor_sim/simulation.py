@@ -333,13 +333,13 @@ class Simulation:
         return self._line.signals().values
 
     def state_hash(self) -> int:
-        """Return 64 bits over tick, bottles, stretched springs, belts and moving rails (`state/state_hash.py`)."""
+        """Return a 64-bit hash of tick, bottles, stretched springs, belts and moving rails."""
         bottles, now = self.bottles(), self._line.now
         columns = [*(getattr(bottles, name) for name in COLUMNS), now.setpoints, now.speeds]
         return state_hash(self.tick, columns, self._state)
 
     def full_state_hash(self) -> int:
-        """Return 64 bits over everything that decides how the run continues (`state/full_state_hash.py`)."""
+        """Return 64 bits over everything that decides how the run continues (`physics/state/full_state_hash.py`)."""
         return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
     def rehearse(self) -> None:

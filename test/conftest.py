@@ -10,8 +10,8 @@ from ctrl_c import restore_for_children
 
 HERE = Path(__file__).parent
 QUICK = (
-    "control/test_", "physics/effects/", "physics/laws/", "physics/model/", "physics/state/", "physics/timestep/", "scene/",
-    "support/",
+    "control/test_", "physics/effects/", "physics/laws/", "physics/model/", "physics/state/", "physics/timestep/",
+    "scene/", "support/",
 )  # fmt: skip
 """Starts of paths. Other tests start nodes and processes, simulate minutes of complete lines, or draw."""
 

@@ -1,6 +1,6 @@
 """`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
 
-It goes in lockstep by two tags (scada/handshake.py), so the test has the same bits however fast the PLC is.
+It goes in lockstep by two tags (protocols/handshake.py), so the test has the same bits however fast the PLC is.
 """
 
 from __future__ import annotations

@@ -136,7 +136,7 @@ CONTACT_FRICTION = Effect(
     needs="mu by pair of materials",
     bounds=_contact_friction_bounds,
     bound="v_lim / [2 mu (1/m + R^2/J) N], N what belts full of bottles press with on "
-    "a contact, at most all bottles there can be (effects/load.py)",
+    "a contact, at most all bottles there can be (physics/effects/load.py)",
     side=_kick,
     beside="of the tangential speed after an impact, mu (w dt)^2 / 2 of the speed of impact, in fewer steps a contact "
     "than 2 pi mu v / v_lim",

@@ -71,7 +71,7 @@ class PriceList:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a remedy (`model/remedies.py`) brings in time: a tick of the scene over one with it, from the same state."""
+    """Speed-up by a remedy (`physics/model/remedies.py`): time of a tick of the scene over that with it, from one state."""
 
     words: str
     steps: int
