@@ -10,30 +10,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accounts.clogging import clogging_of
-from conveyor_sim.accounts.damage import DamageAccount
-from conveyor_sim.accounts.energy import EnergyAccount
+from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.columns.counts import Counts
+from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.columns.events import Event, GuardEvent
+from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
 from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, OPERATE, SET, WATCHDOG, CommandOutcome, Input, WriterKind
 from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.model import build_model
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.observe.counts import Counts
-from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.observe.events import Event
-from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.physics.accounts.clogging import clogging_of
+from conveyor_sim.physics.accounts.damage import DamageAccount
+from conveyor_sim.physics.accounts.energy import EnergyAccount
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
+from conveyor_sim.physics.state.full_state_hash import full_state_hash
+from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed
+from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
+from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
+from conveyor_sim.physics.state.world_arrays import changing_arrays
+from conveyor_sim.physics.stepping.tick import Integration
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
-from conveyor_sim.state.full_state_hash import full_state_hash
-from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
-from conveyor_sim.state.state import FIRST_SLOTS, Held, State
-from conveyor_sim.state.state_hash import COLUMNS, state_hash
-from conveyor_sim.state.world_arrays import changing_arrays
-from conveyor_sim.stepping.guard import GuardEvent
-from conveyor_sim.stepping.tick import Integration
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
 """The seconds of a message header are 32 bits."""
