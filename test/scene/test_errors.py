@@ -99,7 +99,13 @@ def test_not_utf_8(tmp_path: Path) -> None:
         ("a: 1\n---\nb: 2\n", "plant.yaml:2: not valid YAML: expected a single document in the stream"),
         ("a: \x01\n", "plant.yaml:1: not valid YAML: a control character that YAML does not allow"),
         ("a: &a [*a]\n", "plant.yaml:1: not a scene: nested too deeply"),
-        ("[" * 5000, "plant.yaml:1: not a scene: nested too deeply"),
+        ("[" * 5000, "plant.yaml:1: not valid YAML: while increasing flow level, exceeded maximum nesting depth"),
+        ("- " * 5000, "plant.yaml:1: not a scene: nested too deeply"),
+        (
+            "é: µµµ\n\n# ééé\nb: \x01\n\n\n",
+            "plant.yaml:4: not valid YAML: a control character that YAML does not allow",
+        ),
+        ("a: 1\nb: \ud800\n", "plant.yaml:2: not valid YAML: half of a character"),
         ("a: *nowhere\n", "plant.yaml:1: not valid YAML: found undefined alias 'nowhere'"),
     ],
 )
