@@ -9,7 +9,7 @@ from typing import Any
 
 from llvmlite.binding import Linkage
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core import ir, typed_passes, types, untyped_passes
+from numba.core import ir, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, DefaultPassBuilder, _LowerResult
 from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
@@ -130,15 +130,6 @@ class PartEntry(LoweringPass):
         return True
 
 
-NOT_NEEDED = frozenset({
-    untyped_passes.WithLifting, untyped_passes.InlineClosureLikes, untyped_passes.GenericRewrites,
-    untyped_passes.RewriteDynamicRaises, untyped_passes.MakeFunctionToJitFunction, untyped_passes.InlineInlinables,
-    untyped_passes.FindLiterallyCalls, untyped_passes.LiteralUnroll, untyped_passes.LiteralPropagationSubPipelinePass,
-    typed_passes.InlineOverloads, typed_passes.NopythonRewrites,
-})  # fmt: skip
-"""What numba does for code that no kernel has: closures, contexts, exceptions, array expressions, literals."""
-
-
 class _InLibrary(Compiler):
     library: type[JITCodeLibrary]
 
@@ -147,7 +138,6 @@ class _InLibrary(Compiler):
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         passes = DefaultPassBuilder.define_nopython_pipeline(state)
-        passes.passes = [step for step in passes.passes if step[0] not in NOT_NEEDED]
         passes.add_pass_after(AbsentMembers, RewriteSemanticConstants)
         self.change(passes)
         passes.finalize()
