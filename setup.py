@@ -11,7 +11,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "conveyor_sim"
-VERSION = re.search(r'^__version__ = "(.+)"$', Path(NAME, "version.py").read_text(), re.MULTILINE).group(1)
+VERSION = re.search(r'^__version__ = "(.+)"$', Path(NAME, "__init__.py").read_text(), re.MULTILINE).group(1)
 
 
 def requirements(name: str) -> list[str]:

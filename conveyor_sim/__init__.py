@@ -15,17 +15,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from conveyor_sim.version import __version__
-
 if TYPE_CHECKING:
     from conveyor_sim.scene import load_scene
     from conveyor_sim.simulation import Simulation
+
+__version__ = "0.1.0"
+"""Version of this package; package.xml repeats it, and a test compares them."""
 
 __all__ = ["Simulation", "__version__", "load_scene"]
 
 
 def __getattr__(name: str) -> Any:
-    """Imports the two entry points when they are first asked for, so that importing the package stays cheap."""
+    """Import an entry point on first use, so that importing the package stays cheap."""
     if name == "Simulation":
         from conveyor_sim.simulation import Simulation
 

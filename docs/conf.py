@@ -13,7 +13,7 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[1]
-VERSION = ROOT / "conveyor_sim" / "version.py"
+VERSION = ROOT / "conveyor_sim" / "__init__.py"
 
 project = "conveyor_sim"
 release = re.search(r'^__version__ = "(.+)"$', VERSION.read_text(encoding="utf-8"), re.MULTILINE).group(1)

@@ -198,7 +198,7 @@ def empty_machine(tmp_path: Path) -> Path:
     """A copy of the set-up, and a folder `bin` with the few commands it needs before it looks for Python."""
     copy_project(tmp_path, "tools", "requirements", "msg_defs", "setup.py", "setup.cfg")
     (tmp_path / "conveyor_sim").mkdir()
-    copy_project(tmp_path, "conveyor_sim/version.py")
+    copy_project(tmp_path, "conveyor_sim/__init__.py")
     (tmp_path / "bin").mkdir()
     for command in ("sh", "dirname"):
         (tmp_path / "bin" / command).symlink_to(shutil.which(command) or "")

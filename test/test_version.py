@@ -10,7 +10,7 @@ import pytest
 
 import conveyor_sim
 
-HASH = "from conveyor_sim.version import sources_hash; print(sources_hash())"
+HASH = "from conveyor_sim.model.sources_hash import sources_hash; print(sources_hash())"
 
 
 @pytest.fixture

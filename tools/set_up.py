@@ -223,7 +223,7 @@ def set_up(distro: str, tools: list[str]) -> None:
     requirements = ROOT / "requirements"
     build = (requirements / f"ros-{distro}.txt", requirements / "build-messages.txt")
     lists = ("plot", "accuracy", "pytest")
-    described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/version.py")
+    described = (*(f"requirements/{name}.txt" for name in lists), "setup.py", "setup.cfg", "conveyor_sim/__init__.py")
     ros = key(*build, requirements / "run.txt")
     packages = key(ros, *(ROOT / name for name in described))
     sources = (*MESSAGE_BUILD.glob("*.*"), *(p for p in (ROOT / "msg_defs").rglob("*") if p.is_file()))

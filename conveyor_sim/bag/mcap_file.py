@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import IO, Any
 
+from conveyor_sim import __version__
 from conveyor_sim.bag.mcap_writer import McapWriter
 from conveyor_sim.bag.metadata import (
     RECORD_KEY,
@@ -15,7 +16,6 @@ from conveyor_sim.bag.metadata import (
     from_yaml,
     to_yaml,
 )
-from conveyor_sim.version import __version__
 
 QOS_KEY = "offered_qos_profiles"
 HASH_KEY = "topic_type_hash"

@@ -45,7 +45,7 @@ def accuracy(
         from conveyor_sim.accuracy.report.tables import terminal
         from conveyor_sim.accuracy.session import Session
         from conveyor_sim.accuracy.study import study_folder
-        from conveyor_sim.runs.report import plot_function
+        from conveyor_sim.runs.report import can_draw
         from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path
 
@@ -58,9 +58,11 @@ def accuracy(
     if study is not None:
         if details:
             show(terminal(study))
-        plot_accuracy = plot_function("plot_accuracy")
-        for picture in [] if plot_accuracy is None else plot_accuracy(study, folder):
-            click.echo(f"picture: {picture}")
+        if can_draw():
+            from conveyor_sim.plot import plot_accuracy
+
+            for picture in plot_accuracy(study, folder):
+                click.echo(f"picture: {picture}")
         click.echo(f"numbers: {folder}/study.json, and CSV files beside it")
     if write and session.setting is not None:
         copy = folder / path.name

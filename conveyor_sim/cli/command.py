@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from conveyor_sim import __version__
 from conveyor_sim.cli.accuracy import accuracy
 from conveyor_sim.cli.attach import attach
 from conveyor_sim.cli.optimise import optimise
@@ -24,7 +25,6 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.interrupt import one_line
 from conveyor_sim.support.printable import printable_lines
 from conveyor_sim.support.signals import HandledOnce
-from conveyor_sim.version import __version__
 
 # Commands import what they need when they run, so that `conveyor-sim --help` answers at once.
 

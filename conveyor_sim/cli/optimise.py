@@ -25,7 +25,7 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
     kept: the same command goes on after a Ctrl-C, a crash or a full disk, and with more trials.
     """
     with collected_later():
-        from conveyor_sim.runs.report import plot_function
+        from conveyor_sim.runs.report import can_draw
         from conveyor_sim.studies.check import check_study
         from conveyor_sim.studies.load import load_study
         from conveyor_sim.studies.optimisation.answer import answer, trials_data
@@ -45,8 +45,9 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
     units = results.units
     for line in answer(optimum, units):
         click.echo(line)
-    plot_trials = None if no_pictures else plot_function("plot_trials")
-    if plot_trials is not None:
+    if not no_pictures and can_draw():
+        from conveyor_sim.plot import plot_trials
+
         for picture in plot_trials(trials_data(setup.study.name, optimum, units), folder / "pictures"):
             click.echo(f"picture: {picture}")
     if find_spec("pyarrow") is None:

@@ -12,7 +12,7 @@ from conveyor_sim.errors import ConveyorError
 from conveyor_sim.support.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from conveyor_sim.scada.modbus_map import WordOrder
+    from conveyor_sim.support.modbus_rows import WordOrder
 
 
 @click.command()
@@ -27,7 +27,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     from conveyor_sim.explain.account import account
     from conveyor_sim.model import build_model
     from conveyor_sim.model.remedies import step_limit
-    from conveyor_sim.runs.report import plot_function
+    from conveyor_sim.runs.report import can_draw
     from conveyor_sim.runs.speed import expected
     from conveyor_sim.runs.tags import tag_rows
     from conveyor_sim.scene import load_scene
@@ -40,8 +40,9 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     show(account(checked, model))
     for line in expected(step_limit(checked)):
         click.echo(line)
-    plot_scene = plot_function("plot_scene")
-    if plot_scene is not None:
+    if can_draw():
+        from conveyor_sim.plot import plot_scene
+
         try:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -62,8 +63,9 @@ def tags(
     """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
     from conveyor_sim.line.line import image_of
     from conveyor_sim.runs.tags import tag_csv, tag_table
-    from conveyor_sim.scada.modbus_map import keep_map, modbus_map, to_csv
+    from conveyor_sim.scada.modbus_map import keep_map, modbus_map
     from conveyor_sim.scene import load_scene
+    from conveyor_sim.support.modbus_rows import to_csv
     from conveyor_sim.support.resources import scene_path
 
     loaded = load_scene(scene_path(scene), outside_tables=outside_tables)

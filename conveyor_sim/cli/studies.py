@@ -147,7 +147,7 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
     RESULTS is its folder, finished or not, or its Parquet file.
     """
     with collected_later():
-        from conveyor_sim.runs.report import plot_function
+        from conveyor_sim.runs.report import can_draw
         from conveyor_sim.studies.effects import indices, interactions, main_effects, maps
         from conveyor_sim.studies.results import read_results
         from conveyor_sim.studies.table import points_table
@@ -163,9 +163,10 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
         click.echo(f"warm-up: {found.warm_up:g} s, by rule MSER-5")
     for sentence in verdicts(found):
         click.echo(sentence)
-    plot_study = None if no_pictures else plot_function("plot_study")
     shares = indices(found) if sobol else []
-    if plot_study is not None:
+    if not no_pictures and can_draw():
+        from conveyor_sim.plot import plot_study
+
         pairs = {metric: panels for metric in found.units if (panels := interactions(found, metric))}
         place = out or (results if results.is_dir() else results.parent) / "pictures"
         for picture in plot_study(found.name, main_effects(found), pairs, maps(found), shares, place):

@@ -9,6 +9,7 @@ from importlib.metadata import version
 import llvmlite.binding as llvm
 import numpy as np
 
+from conveyor_sim import __version__
 from conveyor_sim.effects import EffectChoice, prediction_of
 from conveyor_sim.effects.load import Load, contact_load
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
@@ -23,6 +24,7 @@ from conveyor_sim.laws.coefficients import BaseSprings, Laws
 from conveyor_sim.model.mouths import cut_at_mouths
 from conveyor_sim.model.plant import plant_grid, rail_arrays
 from conveyor_sim.model.remedies import too_many
+from conveyor_sim.model.sources_hash import sources_hash
 from conveyor_sim.model.step_choice import choose_steps
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EffectName
@@ -32,7 +34,6 @@ from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import BottleType, Scene
 from conveyor_sim.timestep.bounds import Bound
 from conveyor_sim.timestep.prediction import Impact, Prediction
-from conveyor_sim.version import __version__, sources_hash
 
 SKIN = 0.2
 """Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""

@@ -20,11 +20,11 @@ from rclpy.node import Node
 from rclpy.task import Future as RosFuture
 from std_srvs.srv import Trigger
 
+from conveyor_sim import __version__
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.live.lockstep import Refused
 from conveyor_sim.live.run_state import State
 from conveyor_sim.live.stepper import Stepper
-from conveyor_sim.version import __version__
 
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from conveyor_sim.runs.production import read_production
 from conveyor_sim.runs.production_table import render
-from conveyor_sim.runs.report import plot_function
+from conveyor_sim.runs.report import can_draw
 
 
 def report_production(bag: Path, out: Path | None, no_pictures: bool) -> None:
@@ -20,6 +20,8 @@ def report_production(bag: Path, out: Path | None, no_pictures: bool) -> None:
     production = read_production(bag)
     Console(markup=False, highlight=False).print(render(production))
     folder = out or (bag if bag.is_dir() else bag.parent) / "report"
-    draw = None if no_pictures else plot_function("plot_production")
-    for picture in [] if draw is None else draw(production, folder):
-        click.echo(f"picture: {picture}")
+    if not no_pictures and can_draw():
+        from conveyor_sim.plot import plot_production
+
+        for picture in plot_production(production, folder):
+            click.echo(f"picture: {picture}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import click
 from rich.console import Console
@@ -64,17 +63,8 @@ def report_unrecorded(scene: Scene, model: Model, run: Run) -> None:
 
 
 def can_draw() -> bool:
-    """Whether matplotlib is installed; if not, a sentence says so."""
+    """Return True if matplotlib is installed; print one sentence if it is not."""
     if find_spec("matplotlib") is None:
         click.echo("no pictures: matplotlib is not installed (pip install 'conveyor_sim[plot]')", err=True)
         return False
     return True
-
-
-def plot_function(name: str) -> Any:
-    """A function of conveyor_sim.plot; None, and a sentence that says so, if matplotlib is not installed."""
-    if not can_draw():
-        return None
-    import conveyor_sim.plot
-
-    return getattr(conveyor_sim.plot, name)

@@ -6,13 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from conveyor_sim.model.remedies import StepLimit
-from conveyor_sim.runs.summary import TopicCount
 
 NAMED = 2
 """Topics that are named, those of most bytes."""
 
 NO_BOUND = "nothing in the scene bounds the time step"
 NO_REMEDY = "no single change of the scene that is known to help takes fewer steps"
+
+
+@dataclass(frozen=True)
+class TopicCount:
+    """Recorded messages and bytes of one topic."""
+
+    messages: int
+    bytes: int
+    """Serialized, before compression."""
 
 
 @dataclass(frozen=True)

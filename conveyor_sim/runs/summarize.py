@@ -26,7 +26,8 @@ from conveyor_sim.observe.itinerary import Itinerary
 from conveyor_sim.observe.ledger import Ledger
 from conveyor_sim.observe.load_history import LoadHistory
 from conveyor_sim.runs.force_check import PressWatch, achieved, pressed
-from conveyor_sim.runs.summary import BeltFlow, Energy, Loop, Summary, TopicCount
+from conveyor_sim.runs.speed import TopicCount
+from conveyor_sim.runs.summary import BeltFlow, Energy, Loop, Summary
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.support.printable import SENTENCE, printable
 

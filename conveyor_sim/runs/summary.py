@@ -11,6 +11,7 @@ from conveyor_sim.model.remedies import StepLimit
 from conveyor_sim.observe.alarm_figures import AlarmFigures
 from conveyor_sim.observe.load_history import LoadHistory
 from conveyor_sim.runs.force_check import ForceCheck, Pressed
+from conveyor_sim.runs.speed import TopicCount
 
 FILE_NAME = "summary.json"
 
@@ -68,15 +69,6 @@ class Energy:
             f"{self.contact_friction:.4g} J in friction at contacts, {self.damping:.4g} J in damping; "
             f"residual {100.0 * share:.2g} % of a turnover of {self.turnover:.4g} J"
         )
-
-
-@dataclass(frozen=True)
-class TopicCount:
-    """What was recorded of one topic."""
-
-    messages: int
-    bytes: int
-    """Serialized, before compression."""
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,10 @@ from conveyor_sim.scada.face import HERE, FaceError, Status, require_free
 from conveyor_sim.scada.hands import objection, refused_for_good
 from conveyor_sim.scada.handshake import MAY_GO_ON, TARGET, TICK
 from conveyor_sim.scada.holding import Holding, HoldingService
-from conveyor_sim.scada.modbus_map import SET_MODE, Row, Table, decode, encode
+from conveyor_sim.scada.modbus_map import SET_MODE
 from conveyor_sim.scada.quotas import GUEST, QUOTA, Place, Places, Quota
 from conveyor_sim.scada.source import MODBUS, TagSource
+from conveyor_sim.support.modbus_rows import Row, Table, decode, encode
 
 MOST_UNREAD = 64 * 1024
 """Bytes of answers that a client may leave lying; then its connection ends."""

@@ -13,6 +13,7 @@ from conveyor_sim.st.compile import Compiled
 from conveyor_sim.st.errors import Position, StructuredTextError
 from conveyor_sim.st.located import address_of, overlapping
 from conveyor_sim.st.types import ELEMENTARY, Member, Type
+from conveyor_sim.support.modbus_rows import GONE, WORDS, read_map
 
 _TABLES = {
     ("I", True): "discrete input",
@@ -69,9 +70,7 @@ def _listed(names: tuple[str, ...]) -> str:
 
 
 def read_addresses(path: Path) -> Addresses:
-    """A Modbus map (docs/scada.md), by table and address. Raises MapError."""
-    from conveyor_sim.scada.modbus_map import GONE, WORDS, read_map
-
+    """Return the tags of a Modbus map (docs/scada.md) by table and address. Raise MapError if it can't be read."""
     return {
         (row.table, row.address): (row.name, "bool" if row.type == "bool" else 16 * WORDS[row.type])
         for row in read_map(path)

@@ -14,6 +14,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from conveyor_sim import __version__
 from conveyor_sim.errors import SceneError, StudyError
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.studies.journal import SOURCE, read_rows, unusable
@@ -24,7 +25,6 @@ from conveyor_sim.studies.study import HALF_WIDTH, Seeds, Until
 from conveyor_sim.studies.units_file import UNITS, read_units
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import SEAL, parsed
-from conveyor_sim.version import __version__
 
 PARQUET = "results.parquet"
 METADATA = "conveyor_sim"

@@ -10,11 +10,11 @@ from typing import Any
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import StudyError
+from conveyor_sim.model.sources_hash import sources_hash
 from conveyor_sim.scene.load import merged
 from conveyor_sim.studies.code import digest_of
 from conveyor_sim.studies.metrics import Metric, metric_of
 from conveyor_sim.studies.study import Study
-from conveyor_sim.version import sources_hash
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from conveyor_sim.line.inputs import WriterKind
 from conveyor_sim.scada.face import Face, Stamps
-from conveyor_sim.scada.modbus_map import Row, modbus_map
+from conveyor_sim.scada.modbus_map import modbus_map
 from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.support.modbus_rows import Row
 
 if TYPE_CHECKING:
     from conveyor_sim.scada.modbus_server import ModbusServer

@@ -16,11 +16,12 @@ from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.scada.face import Face
 from conveyor_sim.scada.handshake import TARGET, HandshakeSource
-from conveyor_sim.scada.modbus_map import Row, modbus_map
+from conveyor_sim.scada.modbus_map import modbus_map
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import TagSource
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
+from conveyor_sim.support.modbus_rows import Row
 
 ADDRESS = "CONVEYOR_SIM_ADDRESS"
 """Environment variable of the PLC's process: where the server is, "modbus://127.0.0.1:49152"."""

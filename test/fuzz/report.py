@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.version import __version__
+from conveyor_sim import __version__
 
 BEGIN, END = "<!-- figures -->\n", "<!-- end: figures -->"
 

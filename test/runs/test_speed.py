@@ -11,8 +11,7 @@ from scenes import bottle, scene
 
 from conveyor_sim.model.remedies import step_limit
 from conveyor_sim.runs.runner import run_scene
-from conveyor_sim.runs.speed import Spent, expected, measured
-from conveyor_sim.runs.summary import TopicCount
+from conveyor_sim.runs.speed import Spent, TopicCount, expected, measured
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
 

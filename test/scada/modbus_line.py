@@ -15,13 +15,14 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 from pymodbus.client import ModbusTcpClient
 
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.scada.modbus_map import Row, modbus_map
+from conveyor_sim.scada.modbus_map import modbus_map
 from conveyor_sim.scada.modbus_server import ModbusServer
 from conveyor_sim.scada.quotas import Quota
 from conveyor_sim.scada.server_thread import ServerThread
 from conveyor_sim.scada.source import TickSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.modbus_rows import Row
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, BUSY, NO_RESPONSE = 1, 2, 3, 6, 11
 LONG, SHORT = 600.0, 0.2  # s of wall time that the server has with who is silent

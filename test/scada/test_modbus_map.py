@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from conveyor_sim.cli import main
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.tag import Tag, choice, count, number, seconds, switch
-from conveyor_sim.scada.modbus_map import GONE, MapError, Row, decode, encode, modbus_map, read_map, to_csv
+from conveyor_sim.scada.modbus_map import modbus_map
 from conveyor_sim.scene import load_scene
+from conveyor_sim.support.modbus_rows import GONE, MapError, Row, decode, encode, read_map, to_csv
 
 SPEED = number("belts/a/speed", "actual", "Speed of the belt.", "m/s", -2.0, 2.0)
 SETPOINT = number("belts/a/cmd_speed", "setpoint", "Speed that is wanted.", "m/s", -2.0, 2.0)

@@ -19,7 +19,7 @@ from scada.waiting import PATIENCE, until
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
-from conveyor_sim.scada.modbus_map import read_map
+from conveyor_sim.support.modbus_rows import read_map
 
 pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
 pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")

@@ -10,9 +10,10 @@ import pytest
 
 from conveyor_sim.control.line_tags import LineTags
 from conveyor_sim.control.scan import Inputs, together
-from conveyor_sim.scada.modbus_map import modbus_map, to_csv
+from conveyor_sim.scada.modbus_map import modbus_map
 from conveyor_sim.st.controller import StructuredText
 from conveyor_sim.st.errors import StructuredTextError
+from conveyor_sim.support.modbus_rows import to_csv
 from conveyor_sim.testing import Scenario
 from conveyor_sim.testing.evidence import draw_moment, traced
 

@@ -14,7 +14,7 @@ from conveyor_sim.line.tag import SIGNALS
 from conveyor_sim.scada.attach.link import PATIENCE, LinkError
 from conveyor_sim.scada.attach.tag_map import OWN, Mapped, TagMapError
 from conveyor_sim.scada.handshake import TICK
-from conveyor_sim.scada.modbus_map import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
+from conveyor_sim.support.modbus_rows import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
 from conveyor_sim.support.printable import printable
 
 MOST_WORDS = 100
