@@ -12,18 +12,18 @@ import pytest
 from conveyor_sim.engine.compiler import claims
 from conveyor_sim.engine.compiler.claims import Claims
 from conveyor_sim.engine.compiler.compile import OPTIONS
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import KernelDispatcher
+from conveyor_sim.engine.compiler.numba_internals.pipelines import KernelCompiler
 
 # It says when it waits: before the second look, for the first comes before it reads.
 WANTING = """
 import sys
 from pathlib import Path
 from conveyor_sim.engine.compiler.compile import OPTIONS
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler
+from conveyor_sim.engine.compiler.numba_internals.pipelines import KernelCompiler
 
 def twice(x):
     return 2.0 * x

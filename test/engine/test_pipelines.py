@@ -9,11 +9,11 @@ import numba
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.compiler.call_by_address import address, call
 from conveyor_sim.engine.compiler.compile import OPTIONS
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.groups import fewer, group
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
+from conveyor_sim.engine.compiler.numba_internals.call_by_address import address, call
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import KernelDispatcher
+from conveyor_sim.engine.compiler.numba_internals.pipelines import KernelCompiler, PartCompiler
 
 
 def kernel(function: Any) -> Any:

@@ -19,9 +19,9 @@ import llvmlite.binding as llvm
 import numba
 
 from conveyor_sim.engine.compiler.cache_folder import choose_cache_folder
-from conveyor_sim.engine.compiler.dispatcher import KernelDispatcher
 from conveyor_sim.engine.compiler.kernel_cache import KernelCache, KernelFolder
-from conveyor_sim.engine.compiler.pipelines import KernelCompiler, PartCompiler
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import KernelDispatcher
+from conveyor_sim.engine.compiler.numba_internals.pipelines import KernelCompiler, PartCompiler
 from conveyor_sim.engine.compiler.reads import SOURCE
 from conveyor_sim.engine.compiler.source_hash import source_hash
 

@@ -24,7 +24,7 @@ from numba.core.imputils import lower_cast, lower_getattr_generic
 from numba.extending import NativeValue, register_model, typeof_impl, unbox
 from numba.np.numpy_support import from_dtype
 
-from conveyor_sim.engine.compiler.columns import Column
+from conveyor_sim.engine.compiler.numba_internals.columns import Column
 from conveyor_sim.engine.compiler.reads import ALL, Path
 
 Class = TypeVar("Class", bound=type)

@@ -18,11 +18,11 @@ class CompileTime(event.Listener):
 
     def begin(self) -> None:
         """Listen from now on."""
-        event.register("numba:compile", self)  # type: ignore[no-untyped-call]
+        event.register("numba:compile", self)
 
     def end(self) -> None:
         """Listen no longer."""
-        event.unregister("numba:compile", self)  # type: ignore[no-untyped-call]
+        event.unregister("numba:compile", self)
 
     def on_start(self, _event: event.Event) -> None:
         """Numba begins to compile something, perhaps inside of something else."""
