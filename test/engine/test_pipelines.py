@@ -9,20 +9,17 @@ import numba
 import numpy as np
 import pytest
 
-from conveyor_sim.engine.compiler.compile import OPTIONS
+from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.compiler.groups import fewer, group
-from conveyor_sim.engine.compiler.numba_internals.call_by_address import address, call
-from conveyor_sim.engine.compiler.numba_internals.dispatcher import KernelDispatcher
-from conveyor_sim.engine.compiler.numba_internals.pipelines import KernelCompiler, PartCompiler
+from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
+from conveyor_sim.engine.compiler.numba_internals.call_by_address import call
+from conveyor_sim.engine.compiler.numba_internals.dispatcher import kernel_dispatcher
+from conveyor_sim.engine.compiler.numba_internals.machine_code import address
 
 
 def kernel(function: Any) -> Any:
-    return KernelDispatcher(function, targetoptions=OPTIONS, pipeline_class=KernelCompiler)
-
-
-def part(function: Any) -> Any:
-    options = {**OPTIONS, "no_cpython_wrapper": True}
-    return KernelDispatcher(function, targetoptions=options, pipeline_class=PartCompiler)
+    """Compile a kernel without a cache."""
+    return kernel_dispatcher(function, KernelFolder(None, ""))
 
 
 @group

@@ -17,7 +17,7 @@ from numba.core.ir_utils import get_definition, guard
 from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import RewriteSemanticConstants
 
-from conveyor_sim.engine.compiler.groups import COPIES_GROUPS, Group
+from conveyor_sim.engine.compiler.numba_internals.group_type import COPIES_GROUPS, GroupType
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
@@ -61,7 +61,7 @@ def _type(state: Any, value: Any) -> Any:
         return _type(state, several.items[definition.index]) if _is(several, "build_tuple") else None
     if _is(definition, "getattr"):
         owner = _type(state, definition.value)
-        if isinstance(owner, Group) and definition.attr in owner.fields:
+        if isinstance(owner, GroupType) and definition.attr in owner.fields:
             return owner.types[owner.fields.index(definition.attr)]
     return None
 
