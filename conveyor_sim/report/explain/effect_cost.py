@@ -71,7 +71,7 @@ class PriceList:
 
 @dataclass(frozen=True)
 class Gain:
-    """Speed-up by a remedy (`physics/model/remedies.py`): time of a tick without it over that with it, from one state."""
+    """Speed-up by a remedy (`physics/model/remedies.py`): time of one tick without it over time with it."""
 
     words: str
     steps: int
