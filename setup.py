@@ -32,9 +32,9 @@ setup(
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
         NAME: ["py.typed"],
-        f"{NAME}.st": ["grammar.lark"],
-        f"{NAME}.view": ["page/*", "page/lib/*"],
-        f"{NAME}.scada.opcua": ["nodesets/*.xml"],
+        f"{NAME}.control.st": ["grammar.lark"],
+        f"{NAME}.page": ["page/*", "page/lib/*"],
+        f"{NAME}.protocols.opcua": ["nodesets/*.xml"],
     },
     # share/ as ROS expects it; conveyor_sim/support/resources.py finds config/ and msg_defs/ there.
     data_files=[

@@ -15,8 +15,8 @@ from bench.measure import Effort, say
 from bench.packed import NO_OUTPUTS
 from bench.packed import table as dense_table
 from bench.rows import Row, Rows
-from conveyor_sim.runs.compilation import compile_kernels
-from conveyor_sim.runs.runner import run_scene
+from conveyor_sim.run.compilation import compile_kernels
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.support.resources import scene_path
 

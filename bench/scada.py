@@ -21,16 +21,16 @@ from pathlib import Path
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
+from conveyor_sim.columns.events import Event
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag, count
-from conveyor_sim.observe.events import Event
-from conveyor_sim.scada.face import Settings
-from conveyor_sim.scada.faces import FACES
-from conveyor_sim.scada.scene_messages import Task
-from conveyor_sim.scada.scene_source import SceneSource
-from conveyor_sim.scada.serving import Serving
-from conveyor_sim.scada.source import About, Control, Listeners, Shown
+from conveyor_sim.protocols.face import Settings
+from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.scene_messages import Task
+from conveyor_sim.protocols.scene_source import SceneSource
+from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.source import About, Control, Listeners, Shown
 from conveyor_sim.scene import load_scene
 
 CASE, TICKS = "faces", "ticks"

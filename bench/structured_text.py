@@ -9,8 +9,8 @@ from itertools import count, islice
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.program import Program
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.program import Program
 
 CASE, COMPILED = "structured text", "compiling"
 SCAN, COMPILE = "us a scan", "s to compile"

@@ -16,12 +16,12 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.observe.columns import BottleColumns, ContactColumns
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
+from conveyor_sim.page.one_file import write_page
+from conveyor_sim.page.server import RecordingServer
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
-from conveyor_sim.view.one_file import write_page
-from conveyor_sim.view.server import RecordingServer
 
 FRAME, LONG = "view", "an hour"
 CPU, RATE, OPEN, SEEK = "ms of CPU a frame", "frames/s", "s to open", "ms to go to a time"

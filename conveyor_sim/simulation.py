@@ -10,30 +10,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.accounts.clogging import clogging_of
-from conveyor_sim.accounts.damage import DamageAccount
-from conveyor_sim.accounts.energy import EnergyAccount
+from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.columns.counts import Counts
+from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.columns.events import Event, GuardEvent
+from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.observers.contact_list import closed_contacts
 from conveyor_sim.line.inputs import ARRIVAL, FAULT, INJECT, OPERATE, SET, WATCHDOG, CommandOutcome, Input, WriterKind
 from conveyor_sim.line.line import Line
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.model import build_model
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.observe.counts import Counts
-from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.observe.events import Event
-from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.physics.accounts.clogging import clogging_of
+from conveyor_sim.physics.accounts.damage import DamageAccount
+from conveyor_sim.physics.accounts.energy import EnergyAccount
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
+from conveyor_sim.physics.state.full_state_hash import full_state_hash
+from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed
+from conveyor_sim.physics.state.state import FIRST_SLOTS, Held, State
+from conveyor_sim.physics.state.state_hash import COLUMNS, state_hash
+from conveyor_sim.physics.state.world_arrays import changing_arrays
+from conveyor_sim.physics.stepping.tick import Integration
 from conveyor_sim.scene.geometry import RailShape, initial_bottles
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.state.checkpoint import Checkpoint, damaged, read_checkpoint, write_checkpoint
-from conveyor_sim.state.full_state_hash import full_state_hash
-from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
-from conveyor_sim.state.state import FIRST_SLOTS, Held, State
-from conveyor_sim.state.state_hash import COLUMNS, state_hash
-from conveyor_sim.state.world_arrays import changing_arrays
-from conveyor_sim.stepping.guard import GuardEvent
-from conveyor_sim.stepping.tick import Integration
 
 LAST_STAMP_NS = 2**31 * 10**9 - 1
 """The seconds of a message header are 32 bits."""
@@ -334,13 +333,13 @@ class Simulation:
         return self._line.signals().values
 
     def state_hash(self) -> int:
-        """Return 64 bits over tick, bottles, stretched springs, belts and moving rails (`state/state_hash.py`)."""
+        """Return a 64-bit hash of tick, bottles, stretched springs, belts and moving rails."""
         bottles, now = self.bottles(), self._line.now
         columns = [*(getattr(bottles, name) for name in COLUMNS), now.setpoints, now.speeds]
         return state_hash(self.tick, columns, self._state)
 
     def full_state_hash(self) -> int:
-        """Return 64 bits over everything that decides how the run continues (`state/full_state_hash.py`)."""
+        """Return 64 bits over everything that decides how the run continues (`physics/state/full_state_hash.py`)."""
         return full_state_hash(self._snapshot(), changing_arrays(self._state.world), self.scene.limits)
 
     def rehearse(self) -> None:

@@ -9,11 +9,14 @@ import pytest
 from ctrl_c import restore_for_children
 
 HERE = Path(__file__).parent
-QUICK = frozenset({"control", "effects", "laws", "model", "scene", "state", "support", "timestep"})
-"""Folders. The others start nodes and processes, take whole lines through minutes, or draw."""
+QUICK = (
+    "control/test_", "physics/effects/", "physics/laws/", "physics/model/", "physics/state/", "physics/timestep/",
+    "scene/", "support/",
+)  # fmt: skip
+"""Starts of paths. Other tests start nodes and processes, simulate minutes of complete lines, or draw."""
 
 COMPILING = (
-    "hard_cases/", "physics/", "state/", "timestep/", "effects/", "stepping/", "engine/test_riding.py",
+    "hard_cases/", "physics/", "engine/test_riding.py",
     "engine/test_dormand_prince.py", "accuracy/test_closed_forms.py", "accuracy/test_resting.py", "bag/test_replay.py",
 )  # fmt: skip
 """Folders and files that spend most of their time compiling kernels. One process takes them all: kernels share parts,
@@ -21,7 +24,7 @@ and each process compiles the parts again.
 """
 
 LONGEST = (
-    "fuzz/test_fuzz.py", "ros/test_floods.py", "view/test_live.py", "test_shipped_scenes.py", "view/test_page.py",
+    "fuzz/test_fuzz.py", "ros/test_floods.py", "page/test_live.py", "test_shipped_scenes.py", "page/test_page.py",
     "test_simulation.py",
 )  # fmt: skip
 """Other files that took more than 35 s where three processes shared two cores, the longest first."""
@@ -45,7 +48,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: _turn(item.path))
     for item in items:
-        if item.path.is_relative_to(HERE) and item.path.relative_to(HERE).parts[0] in QUICK:
+        if item.path.is_relative_to(HERE) and item.path.relative_to(HERE).as_posix().startswith(QUICK):
             item.add_marker(pytest.mark.quick)
 
 

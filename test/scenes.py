@@ -89,7 +89,7 @@ def every_law(
 ) -> dict[str, Any]:
     """Fields of a scene with contacts of glass, and with every law of a contact of two bottles, and what goes with it.
 
-    Three types that nobody puts in have the laws, of which no other bottle feels a bit (test/effects/test_absent.py).
+    Three types without bottles have the laws; no bit of another bottle changes (test/physics/effects/test_absent.py).
     Tests of one law each share their compiled kernels so: it takes 10 s of a core for a set of effects.
     """
     hertz, table = {"hertz_stiffness": 1e5}, {"table": [[1e-3, 1.0], [2e-3, 4.0]]}

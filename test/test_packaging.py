@@ -163,7 +163,7 @@ def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
     assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "conveyor_sim").is_file()
 
     (packages,) = prefix.glob("lib/python3*/site-packages")
-    page, files = Path("conveyor_sim", "view", "page"), {"index.html", "style.css", "main.js", "lib/uplot.js"}
+    page, files = Path("conveyor_sim", "page", "page"), {"index.html", "style.css", "main.js", "lib/uplot.js"}
     assert all((packages / page / file).is_file() for file in files | {"lib/uplot.LICENSE"})
     code = (
         "from conveyor_sim.support.resources import config_dir, msg_defs_dir;"

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from scenes import COMMON, SHIPPED, shipped_name
 
-from conveyor_sim.runs.force_check import HARDER, PeakWatch, achieved
+from conveyor_sim.run.force_check import HARDER, PeakWatch, achieved
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

@@ -10,7 +10,7 @@ import pytest
 
 import conveyor_sim
 
-HASH = "from conveyor_sim.model.sources_hash import sources_hash; print(sources_hash())"
+HASH = "from conveyor_sim.physics.sources_hash import version_hashes; print(*version_hashes())"
 
 
 @pytest.fixture
@@ -43,10 +43,13 @@ def test_what_decides_bits_changes_the_hash_and_nothing_else_does(copied: Path) 
         source.write_text(text)
         return found
 
-    assert len(before) == 8
-    assert edited("stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74") != before
+    assert [len(part) for part in before.split()] == [16, 8]
+    assert edited("engine/integrators/motion.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
+    assert edited("scene/geometry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
+    assert edited("physics/stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74") != before
+    assert edited("line/entry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
     assert edited("simulation.py", "def state_hash(self", "def bits(self") != before
-    assert edited("stepping/guard/guard.py", "\n\n\n", "\n\n\n# A comment.\n") == before
+    assert edited("physics/stepping/guard/guard.py", "\n\n\n", "\n\n\n# A comment.\n") == before
     assert edited("cli/run.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
-    assert edited("plot/style.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
+    assert edited("report/figures/style.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
     assert hash_of(copied) == before

@@ -16,9 +16,9 @@ from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.engine.lists.riding import step_all
 from conveyor_sim.engine.threads.thread_pool import ThreadPool
 from conveyor_sim.engine.threads.workers import BLOCK, workers
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
 from conveyor_sim.scene import Scene
-from conveyor_sim.state import State
 
 F8 = NDArray[np.float64]
 

@@ -19,9 +19,11 @@ DOCS = ROOT / "docs"
 
 def pages() -> Iterator[tuple[Path, str]]:
     """Each page, and its text as it should be."""
-    for name in ("scene", "effects"):
-        yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{name}.reference").reference()
-    sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test")]
+    for name, package in (("scene", "scene"), ("effects", "physics.effects")):
+        yield DOCS / f"{name}.md", importlib.import_module(f"conveyor_sim.{package}.reference").reference()
+    sys.path[:0] = [str(DOCS / "studies"), str(ROOT / "test"), str(ROOT / "tools")]
+    rules = importlib.import_module("import_rules")
+    yield rules.PAGE, rules.page(rules.PAGE.read_text(encoding="utf-8"))
     with_parts = importlib.import_module("page_parts").with_parts
     for package, name in (("bag", "ros"), ("line", "line")):
         tables, page = importlib.import_module(f"conveyor_sim.{package}.reference").tables(), DOCS / f"{name}.md"

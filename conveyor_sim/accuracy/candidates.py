@@ -7,11 +7,11 @@ from conveyor_sim.accuracy.setting import Setting, with_setting
 from conveyor_sim.accuracy.stiffness import scaled_contacts
 from conveyor_sim.engine.integrators import INTEGRATORS
 from conveyor_sim.errors import SceneError
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.accuracy import Preset, explicit
 from conveyor_sim.scene.belts import CurvedBelt
-from conveyor_sim.timestep.presets import PRESETS
 
 STEPS = {
     "leapfrog": (4.0, 2.0, 1.0, 0.5, 0.25, 0.125),

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from conveyor_sim.accounts.elastic import elastic_energy, rail_entries
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.model import Model
-from conveyor_sim.observe.columns import BottleColumns, ContactColumns
+from conveyor_sim.physics.accounts.elastic import elastic_energy, rail_entries
+from conveyor_sim.physics.model import Model
 
 BOTTLE_BOTTLE = 0
 

@@ -23,12 +23,12 @@ from conveyor_sim.accuracy.report.words import setting_name
 from conveyor_sim.accuracy.results import Horizon, Order, Point, Reference, Rest
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.model.remedies import STEP_COST
+from conveyor_sim.physics.model.remedies import STEP_COST
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene
 from conveyor_sim.support.files import FileError
 from conveyor_sim.support.machine import machine
 from conveyor_sim.support.sealed_json import read_sealed, sealed
-from conveyor_sim.timestep.presets import PRESETS
 
 MEASURED = "measured.json"
 MEASURED_OF = "measured_of"

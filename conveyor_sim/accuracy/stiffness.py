@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from conveyor_sim.laws.damping import damping_law, elastic_law
+from conveyor_sim.physics.laws.damping import damping_law, elastic_law
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.contacts import Contact
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from conveyor_sim.accuracy.energy import energies
 from conveyor_sim.accuracy.setting import Setting, with_setting
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

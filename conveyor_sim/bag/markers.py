@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.cdr import CdrWriter, xyz_rows
 from conveyor_sim.bag.messages import Header
-from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.columns.bottles import BottleColumns
 
 if TYPE_CHECKING:
     from conveyor_sim.scene.geometry import BeltShape, RailShape

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.packing import packer
+from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.line.inputs import CommandOutcome, Input, recorded_input
 from conveyor_sim.line.run_state import RunState
-from conveyor_sim.observe.columns import BottleColumns
-from conveyor_sim.observe.image import NOTHING_FORCED, Image
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation

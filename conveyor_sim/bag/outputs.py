@@ -9,13 +9,13 @@ import numpy as np
 
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
-from conveyor_sim.observe.variables import VariableColumns
+from conveyor_sim.columns.variables import VariableColumns
 
 if TYPE_CHECKING:
+    from conveyor_sim.columns.events import GuardEvent
     from conveyor_sim.line.inputs import CommandOutcome
     from conveyor_sim.line.run_state import RunState
     from conveyor_sim.simulation import Simulation
-    from conveyor_sim.stepping.guard import GuardEvent
 
 
 _EVENTS = [(name, topic, topic.events) for name, topic in OUTPUTS.items() if topic.events is not None]

@@ -44,7 +44,7 @@ LATCHED = Qos(depth=1, durability="transient_local")
 EVENTS = Qos(depth=100)
 """Commands, what the guard reports, limits that are passed: each one counts."""
 OUTCOMES = Qos(depth=1000)
-"""As many as one tick may bring (live/inbox.py)."""
+"""As many as one tick may bring (run/inbox.py)."""
 ALARMS = Qos(depth=100, durability="transient_local")
 """A controller's alarms: who joins late still gets what came and went before."""
 ANSWERS = Qos(depth=1000)

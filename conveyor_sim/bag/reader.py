@@ -26,8 +26,8 @@ from conveyor_sim.bag.records import mapped
 from conveyor_sim.bag.source import Source
 from conveyor_sim.bag.storage import other_storage, packed_message
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.support.printable import SENTENCE, printable
 
 T = TypeVar("T")

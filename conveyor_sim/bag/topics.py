@@ -12,15 +12,15 @@ from conveyor_sim.bag.entries import bin_name, bottle_name, command_name, contac
 from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header, Outcome
 from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
+from conveyor_sim.columns.alarms import AlarmColumns
+from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
+from conveyor_sim.columns.counters import CounterColumns
+from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.columns.events import EventColumns, event_columns
+from conveyor_sim.columns.ledger import Ledger
+from conveyor_sim.columns.read_back import ReadBackColumns
+from conveyor_sim.columns.variables import VariableColumns
 from conveyor_sim.line.run_state import RunState
-from conveyor_sim.observe.alarms import AlarmColumns
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns, ContactColumns
-from conveyor_sim.observe.counters import CounterColumns
-from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.observe.events import EventColumns, event_columns
-from conveyor_sim.observe.ledger import Ledger
-from conveyor_sim.observe.read_back import ReadBackColumns
-from conveyor_sim.observe.variables import VariableColumns
 from conveyor_sim.scene.marks import marks_of
 
 if TYPE_CHECKING:

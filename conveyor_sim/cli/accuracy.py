@@ -45,7 +45,7 @@ def accuracy(
         from conveyor_sim.accuracy.report.tables import terminal
         from conveyor_sim.accuracy.session import Session
         from conveyor_sim.accuracy.study import study_folder
-        from conveyor_sim.runs.report import can_draw
+        from conveyor_sim.report.report import can_draw
         from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path
 
@@ -59,7 +59,7 @@ def accuracy(
         if details:
             show(terminal(study))
         if can_draw():
-            from conveyor_sim.plot import plot_accuracy
+            from conveyor_sim.accuracy.figures.draw import plot_accuracy
 
             for picture in plot_accuracy(study, folder):
                 click.echo(f"picture: {picture}")

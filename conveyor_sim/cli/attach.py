@@ -35,9 +35,9 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     reads what the PLC commands. The PLC is not waited for: the lag is told. Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.scada.attach.free_running import of_plc
-        from conveyor_sim.scada.face import Settings
-        from conveyor_sim.scada.serving import Serving
+        from conveyor_sim.protocols.attach.free_running import of_plc
+        from conveyor_sim.protocols.face import Settings
+        from conveyor_sim.protocols.serving import Serving
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     password = click.prompt("password", hide_input=True, err=True) if user else ""

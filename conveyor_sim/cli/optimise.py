@@ -25,7 +25,7 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
     kept: the same command goes on after a Ctrl-C, a crash or a full disk, and with more trials.
     """
     with collected_later():
-        from conveyor_sim.runs.report import can_draw
+        from conveyor_sim.report.report import can_draw
         from conveyor_sim.studies.check import check_study
         from conveyor_sim.studies.load import load_study
         from conveyor_sim.studies.optimisation.answer import answer, trials_data
@@ -46,7 +46,7 @@ def optimise(study: Path, out: Path | None, processes: int | None, dask: str | N
     for line in answer(optimum, units):
         click.echo(line)
     if not no_pictures and can_draw():
-        from conveyor_sim.plot import plot_trials
+        from conveyor_sim.studies.figures.draw import plot_trials
 
         for picture in plot_trials(trials_data(setup.study.name, optimum, units), folder / "pictures"):
             click.echo(f"picture: {picture}")

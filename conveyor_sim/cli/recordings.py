@@ -22,7 +22,7 @@ def recover(bag: Path) -> None:
     If BAG is damaged, or its recording was interrupted, a repaired copy takes its place; the original is kept.
     BAG may be the folder of inputs that a killed test has left: its run is simulated again, and recorded.
     """
-    from conveyor_sim.runs.recovery import recover_bag, recover_runs
+    from conveyor_sim.run.recovery import recover_bag, recover_runs
 
     if not recover_runs(bag):
         recover_bag(bag)
@@ -94,7 +94,7 @@ def _publish(bag: Path, rate: float, start: float | None, paused: bool, ros_argu
 @click.option("--csv", "file", type=click.Path(path_type=Path), help="Write them to this file and print none.")
 def events(bag: Path, file: Path | None, **chosen: Any) -> None:
     """Print what happened on the line in BAG: bottles, alarms, states of machines, faults, refusals, limits passed."""
-    from conveyor_sim.runs.events import chosen_events, event_table, write_csv
+    from conveyor_sim.report.events import chosen_events, event_table, write_csv
 
     rows = chosen_events(bag, **chosen)
     if file is None:
@@ -110,7 +110,7 @@ def events(bag: Path, file: Path | None, **chosen: Any) -> None:
 @click.option("--no-pictures", is_flag=True, help="Print only.")
 def report(bag: Path, **chosen: Any) -> None:
     """Report how the line in BAG produced: bottles, times, OEE, MTBF, MTTR, stop reasons and longest stops."""
-    from conveyor_sim.runs.production_report import report_production
+    from conveyor_sim.report.production_report import report_production
 
     report_production(bag, **chosen)
 
@@ -125,8 +125,8 @@ def plot(bag: Path, out: Path | None, times: tuple[float, ...], bottles: tuple[i
 
     Draws BAG as PNG and SVG: the plant at some times, velocities of bottles, flow and forces.
     """
-    from conveyor_sim.runs.drawing import Drawing
-    from conveyor_sim.runs.report import can_draw
+    from conveyor_sim.report.drawing import Drawing
+    from conveyor_sim.report.report import can_draw
 
     if not can_draw():
         sys.exit(1)

@@ -50,12 +50,12 @@ def run(
     with collected_later():
         from conveyor_sim.bag.folder import require_recordable
         from conveyor_sim.bag.recorder import run_folder
-        from conveyor_sim.explain.choices import setting_line
-        from conveyor_sim.model import build_model
-        from conveyor_sim.runs.compilation import Compilation
-        from conveyor_sim.runs.drawing import Drawing
-        from conveyor_sim.runs.report import report, report_unrecorded
-        from conveyor_sim.runs.runner import run_scene
+        from conveyor_sim.physics.model import build_model
+        from conveyor_sim.report.drawing import Drawing
+        from conveyor_sim.report.explain.choices import setting_line
+        from conveyor_sim.report.report import report, report_unrecorded
+        from conveyor_sim.run.compilation import Compilation
+        from conveyor_sim.run.runner import run_scene
         from conveyor_sim.scene import load_scene
         from conveyor_sim.support.resources import scene_path
 
@@ -86,8 +86,8 @@ def run(
 
 def _controller(reference: str, parameters: str) -> Controller:
     from conveyor_sim.control.scan import ControlError
-    from conveyor_sim.runs.controller_parameters import controller_parameters
-    from conveyor_sim.st.load import load
+    from conveyor_sim.control.st.load import load
+    from conveyor_sim.run.controller_parameters import controller_parameters
 
     try:
         return load(reference, controller_parameters(parameters, "--parameters"))

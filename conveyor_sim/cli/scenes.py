@@ -24,12 +24,12 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
 
     SCENE is a file, or the name of a shipped scene. Its effects and its time step are listed with their reasons.
     """
-    from conveyor_sim.explain.account import account
-    from conveyor_sim.model import build_model
-    from conveyor_sim.model.remedies import step_limit
-    from conveyor_sim.runs.report import can_draw
-    from conveyor_sim.runs.speed import expected
-    from conveyor_sim.runs.tags import tag_rows
+    from conveyor_sim.physics.model import build_model
+    from conveyor_sim.physics.model.remedies import step_limit
+    from conveyor_sim.report.explain.account import account
+    from conveyor_sim.report.report import can_draw
+    from conveyor_sim.report.tags import tag_rows
+    from conveyor_sim.run.speed import expected
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
@@ -41,7 +41,7 @@ def check(scene: str, out: Path, outside_tables: bool) -> None:
     for line in expected(step_limit(checked)):
         click.echo(line)
     if can_draw():
-        from conveyor_sim.plot import plot_scene
+        from conveyor_sim.report.figures.draw import plot_scene
 
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -61,17 +61,16 @@ def tags(
     scene: str, as_csv: bool, modbus: bool, kept: Path | None, word_order: WordOrder, outside_tables: bool
 ) -> None:
     """List the tags of SCENE: all that can be read, commanded and injected, with units, ranges and meaning."""
-    from conveyor_sim.line.line import image_of
-    from conveyor_sim.runs.tags import tag_csv, tag_table
-    from conveyor_sim.scada.modbus_map import keep_map, modbus_map
+    from conveyor_sim.protocols.modbus.address_map import keep_map, modbus_map
+    from conveyor_sim.report.tags import line_tags, tag_csv, tag_table
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.modbus_rows import to_csv
     from conveyor_sim.support.resources import scene_path
 
     loaded = load_scene(scene_path(scene), outside_tables=outside_tables)
     if modbus:
-        found = image_of(loaded).tags
-        rows = modbus_map(found, word_order=word_order) if kept is None else keep_map(kept, found, word_order)
+        tags = line_tags(loaded)
+        rows = modbus_map(tags, word_order=word_order) if kept is None else keep_map(kept, tags, word_order)
         click.echo(to_csv(rows), nl=False)
     elif as_csv:
         click.echo(tag_csv(loaded), nl=False)
@@ -93,8 +92,8 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
 
     Lists why each effect is on or off, and what bounds the time step; with --price, what each effect costs.
     """
-    from conveyor_sim.explain.choices import explanation, price_table
-    from conveyor_sim.model import build_model
+    from conveyor_sim.physics.model import build_model
+    from conveyor_sim.report.explain.choices import explanation, price_table
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
 
@@ -108,8 +107,8 @@ def explain(scene: str, price: bool, at: float | None, outside_tables: bool) -> 
     show(explanation(loaded, build_model(loaded)))
     if not price:
         return
-    from conveyor_sim.explain.effect_cost import Pricing
-    from conveyor_sim.runs.compilation import Compilation
+    from conveyor_sim.report.explain.effect_cost import Pricing
+    from conveyor_sim.run.compilation import Compilation
 
     Compilation(loaded, say).run()
     pricing = Pricing(loaded, at)

@@ -147,7 +147,7 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
     RESULTS is its folder, finished or not, or its Parquet file.
     """
     with collected_later():
-        from conveyor_sim.runs.report import can_draw
+        from conveyor_sim.report.report import can_draw
         from conveyor_sim.studies.effects import indices, interactions, main_effects, maps
         from conveyor_sim.studies.results import read_results
         from conveyor_sim.studies.table import points_table
@@ -165,7 +165,7 @@ def study_(results: Path, out: Path | None, sobol: bool, no_pictures: bool) -> N
         click.echo(sentence)
     shares = indices(found) if sobol else []
     if not no_pictures and can_draw():
-        from conveyor_sim.plot import plot_study
+        from conveyor_sim.studies.figures.draw import plot_study
 
         pairs = {metric: panels for metric in found.units if (panels := interactions(found, metric))}
         place = out or (results if results.is_dir() else results.parent) / "pictures"

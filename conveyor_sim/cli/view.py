@@ -29,14 +29,14 @@ def view(bag: Path, other: Path | None, html: Path | None, last: float | None, p
             raise ConveyorError("--port: given with --html, expected one of them")
         if last is not None and not 0.0 < last < float("inf"):
             raise ConveyorError(f"--last: {last:g} given, expected a number above 0")
-        from conveyor_sim.view.one_file import write_page
+        from conveyor_sim.page.one_file import write_page
 
         click.echo(write_page(bag, html, last, other=other))
         return
     if last is not None:
         raise ConveyorError("--last: given without --html, expected both or neither")
+    from conveyor_sim.page.server import RecordingServer
     from conveyor_sim.support.stop_request import StopRequest
-    from conveyor_sim.view.server import RecordingServer
 
     with StopRequest() as stop, RecordingServer(bag, port or 0, other) as server:
         click.echo(f"{bag}: {server.url} (Ctrl-C ends it)")

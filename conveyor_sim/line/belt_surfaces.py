@@ -6,7 +6,7 @@ import numpy as np
 
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.support.footing import refresh_footing
-from conveyor_sim.state import State
+from conveyor_sim.physics.state import State
 
 
 class BeltSurfaces:

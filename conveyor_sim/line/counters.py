@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from conveyor_sim.columns.counters import LINE, CounterColumns
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.efficiency import efficiency
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.machine import MachineDevice
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.line.time_account import CATEGORIES, Category, TimeAccount
-from conveyor_sim.observe.counters import LINE, CounterColumns
 from conveyor_sim.support.printable import printable
 
 RESET_COUNTERS = "reset_counters"

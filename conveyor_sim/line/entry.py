@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from conveyor_sim.line.device import ScanContext
+from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.bad import BadBottles
-from conveyor_sim.state import State
 
 CLEAR = 1e-9
 """m; bottles one gap of 0 apart touch, and rounding must not block them."""

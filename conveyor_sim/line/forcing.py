@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.line.authority import who
 from conveyor_sim.line.commands import refusal
@@ -14,7 +15,6 @@ from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.inputs import FORCE, UNFORCE, Input
 from conveyor_sim.line.operation import Operation
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.observe.image import NOTHING_FORCED, Image
 from conveyor_sim.support.printable import SENTENCE, printable
 
 

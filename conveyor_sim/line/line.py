@@ -7,6 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.columns.counters import CounterColumns
+from conveyor_sim.columns.damage import DamageEvent
+from conveyor_sim.columns.events import Event
+from conveyor_sim.columns.image import Image
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.line.alarms.system import AlarmSystem
 from conveyor_sim.line.authority import MAY, PEOPLE, unauthorized
@@ -26,15 +30,11 @@ from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.read_back import ReadBack
 from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import Adds
-from conveyor_sim.model import build_model
-from conveyor_sim.observe.counters import CounterColumns
-from conveyor_sim.observe.damage import DamageEvent
-from conveyor_sim.observe.events import Event
-from conveyor_sim.observe.image import Image
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.state.snapshot import entries, restore, snapshot, typed
+from conveyor_sim.physics.state.state import FIRST_SLOTS
 from conveyor_sim.scene.schema import Scene
-from conveyor_sim.state import State
-from conveyor_sim.state.snapshot import entries, restore, snapshot, typed
-from conveyor_sim.state.state import FIRST_SLOTS
 
 _Outcome = tuple[int, Input, bool, str, bool, bool, bool]
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.observe.read_back import ReadBackColumns
 
 SCENE = ("scene", "line")
 """Whose the values are that a run begins with."""

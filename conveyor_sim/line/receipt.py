@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
+from conveyor_sim.columns.counters import LINE
 from conveyor_sim.line.alarms.operations import OPERATIONS as ALARM_OPERATIONS
 from conveyor_sim.line.alarms.operations import argument_problem
 from conveyor_sim.line.authority import MAY, hand_over_problem, pattern_problem, reserved, reserved_mode, unauthorized
 from conveyor_sim.line.commands import ALARMS, refusal
 from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, Input
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
-from conveyor_sim.observe.counters import LINE
 from conveyor_sim.support.printable import printable
 
 Cause = Literal["operation", "role", "name", "value", "form"]

@@ -8,7 +8,7 @@ import numpy as np
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.entry import Entry
 from conveyor_sim.line.streams import random_stream
-from conveyor_sim.model import Model
+from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
 JITTER, BAD, CHATTER = "jitter", "bad", "chatter"

@@ -30,13 +30,13 @@ from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.errors import CommandError
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome
-from conveyor_sim.live.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.ros.context import new_node, start_ros
 from conveyor_sim.ros.domain import in_environment, own_domain
 from conveyor_sim.ros.intake import Intake
 from conveyor_sim.ros.lockstep_service import LockstepService
 from conveyor_sim.ros.publishers import check_type, ros_qos
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.run.lockstep import Lockstep, LockstepAnswer, LockstepRequest, Refused
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process

@@ -16,10 +16,10 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.errors import CheckpointError, ConveyorError
-from conveyor_sim.live.lockstep import Refused
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.services import settled
+from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import SENTENCE, printable
 

@@ -7,8 +7,8 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.live.pacing import RateCap
 from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.run.pacing import RateCap
 
 NS = 1_000_000_000
 

@@ -17,12 +17,12 @@ from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.topics import CMD_SPEED, TOPICS
 from conveyor_sim.line.inputs import SET, Input
 from conveyor_sim.line.process_image import speed_command
-from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE
-from conveyor_sim.live.lockstep import inputs_of, is_empty
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.direct import Aside, take_message
 from conveyor_sim.ros.gaps import Gaps
 from conveyor_sim.ros.publishers import ros_qos
+from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE
+from conveyor_sim.run.lockstep import inputs_of, is_empty
+from conveyor_sim.run.stepper import Stepper
 
 UNREADABLE = "not readable as {type}, expected its serialized form"
 

@@ -10,12 +10,12 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.live.run_state import State
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.clock import to_time
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.observer import TICK, WALL
 from conveyor_sim.ros.publishers import RosSink, ros_qos
+from conveyor_sim.run.run_state import State
+from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.support.printable import printable
 
 PERIOD = 1.0  # s of wall time

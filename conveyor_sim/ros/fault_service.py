@@ -10,10 +10,10 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from conveyor_sim.line.inputs import FAULT, INJECT, Input
-from conveyor_sim.live.inbox import size_of
-from conveyor_sim.live.lockstep import Refused
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.services import settled
+from conveyor_sim.run.inbox import size_of
+from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.stepper import Stepper
 
 
 class FaultService:

@@ -18,10 +18,10 @@ with while_importing():
 
     from conveyor_sim.bag.recorder import run_folder
     from conveyor_sim.errors import ConveyorError, Interrupted
+    from conveyor_sim.report.drawing import Drawing
     from conveyor_sim.ros.child import Child
     from conveyor_sim.ros.domain import private_domain
     from conveyor_sim.ros.observer import Observer
-    from conveyor_sim.runs.drawing import Drawing
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.support.garbage import collected_later
     from conveyor_sim.support.printable import printable_lines
@@ -107,11 +107,10 @@ def _compiling(scene: Scene) -> str:
     """What is said if the run does not begin soon."""
     # Imported not before: the processes that have been started need as much, and all three would wait for one.
     with collected_later():
-        import conveyor_sim.runs.report  # noqa: F401  # for the end
-        from conveyor_sim.model import build_model
-        from conveyor_sim.runs.compilation import compiling, seconds_to_compile
+        import conveyor_sim.report.report  # noqa: F401  # for the end
+        from conveyor_sim.run.compilation import time_to_compile
 
-    return compiling(seconds_to_compile(build_model(scene)))
+    return time_to_compile(scene)
 
 
 def _keep_logs(logs: Path, bag: Path) -> None:
@@ -134,7 +133,7 @@ def main(scene: str, out: Path | None, duration: float | None, outside_tables: b
         with run_folder(out) as bag, Drawing() as drawing:
             # Ready not before the start: the processes that start keep all cores busy.
             wall = run_in_lockstep(scene, bag, duration, outside_tables, drawing.get_ready)
-            from conveyor_sim.runs.report import report
+            from conveyor_sim.report.report import report
 
             report(bag, wall, drawing)
     except ConveyorError as error:

@@ -15,10 +15,7 @@ from rclpy.parameter import Parameter
 from conveyor_sim.bag.folder import bag_folder, require_recordable
 from conveyor_sim.bag.topics import OUTPUTS, photo_eye_topics
 from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.explain.choices import setting_line
-from conveyor_sim.live.pacing import RateCap
-from conveyor_sim.live.session import Session
-from conveyor_sim.live.stepper import Stepper
+from conveyor_sim.report.explain.choices import setting_line
 from conveyor_sim.ros import parameters
 from conveyor_sim.ros.checkpoint_services import CheckpointServices
 from conveyor_sim.ros.clock import ClockPublisher
@@ -33,7 +30,10 @@ from conveyor_sim.ros.operate_service import OperateService
 from conveyor_sim.ros.publishers import RosSink
 from conveyor_sim.ros.services import Services
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.runs.compilation import Cancelled, Compilation
+from conveyor_sim.run.compilation import Cancelled, Compilation
+from conveyor_sim.run.pacing import RateCap
+from conveyor_sim.run.session import Session
+from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path

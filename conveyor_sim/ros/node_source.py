@@ -16,15 +16,15 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.observe.events import Event
+from conveyor_sim.protocols.source import MOST_WAITING, Control
+from conveyor_sim.protocols.view import DRAWN, HEARD, View, ViewError, decoded
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros
 from conveyor_sim.ros.direct import Aside, WaitSet, take_message
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.spinner import Spinner
-from conveyor_sim.scada.source import MOST_WAITING, Control
-from conveyor_sim.scada.view import DRAWN, HEARD, View, ViewError, decoded
 from conveyor_sim.support.printable import SENTENCE, printable
 
 LOOK = 1.0

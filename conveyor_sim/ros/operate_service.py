@@ -11,10 +11,10 @@ from rclpy.node import Node
 
 from conveyor_sim.line.authority import PEOPLE
 from conveyor_sim.line.inputs import OPERATE, Input
-from conveyor_sim.live.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
-from conveyor_sim.live.lockstep import Refused
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.services import settled
+from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
+from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.support.printable import MOST, printable
 
 WRITERS = (*PEOPLE, "controller")

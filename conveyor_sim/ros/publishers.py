@@ -17,7 +17,7 @@ from conveyor_sim.bag.qos import Qos
 from conveyor_sim.bag.topics import Topic
 from conveyor_sim.bag.typestore import type_hash
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.live.pacing import RateCap
+from conveyor_sim.run.pacing import RateCap
 
 NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """An executor asks about each event of each publisher whenever it waits: a third of a lockstep scan. The subscriber,

@@ -20,15 +20,15 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.live.lockstep import Refused
-from conveyor_sim.live.playback import Message, Playback, Topic
-from conveyor_sim.live.player import Player
 from conveyor_sim.ros.clock import ClockPublisher
 from conveyor_sim.ros.context import new_node
 from conveyor_sim.ros.graph_watch import GraphWatch
 from conveyor_sim.ros.publishers import message_class, published_hashes, ros_qos
 from conveyor_sim.ros.services import settled
 from conveyor_sim.ros.spinner import Spinner
+from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.playback import Message, Playback, Topic
+from conveyor_sim.run.player import Player
 from conveyor_sim.support.printable import printable
 
 T = TypeVar("T")

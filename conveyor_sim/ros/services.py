@@ -22,9 +22,9 @@ from std_srvs.srv import Trigger
 
 from conveyor_sim import __version__
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.live.lockstep import Refused
-from conveyor_sim.live.run_state import State
-from conveyor_sim.live.stepper import Stepper
+from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.run_state import State
+from conveyor_sim.run.stepper import Stepper
 
 T = TypeVar("T")
 

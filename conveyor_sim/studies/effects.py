@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.plot.response_data import Indices, Map, Response, level_text
 from conveyor_sim.scene import parse_overrides
 from conveyor_sim.statistics.intervals import mean_interval
 from conveyor_sim.studies.design import salib_problem
+from conveyor_sim.studies.figures.response_data import Indices, Map, Response, level_text
 from conveyor_sim.studies.results import Results
 from conveyor_sim.studies.row import Row
 from conveyor_sim.studies.table import with_unit

@@ -9,8 +9,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from conveyor_sim.columns.counters import LINE, CounterColumns
 from conveyor_sim.errors import StudyError
-from conveyor_sim.observe.counters import LINE, CounterColumns
 from conveyor_sim.scene.words import shown
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.statistics.batch_means import batch_means

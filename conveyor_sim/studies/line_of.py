@@ -10,12 +10,12 @@ from functools import lru_cache
 from typing import Any
 
 from conveyor_sim.control.scan import ControlError, Controller
+from conveyor_sim.control.st.load import load
 from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.scene.load import merged
 from conveyor_sim.scene.problems import Path
 from conveyor_sim.scene.words import listed
-from conveyor_sim.st.load import load
 from conveyor_sim.studies.code import function
 from conveyor_sim.studies.setup import Setup
 

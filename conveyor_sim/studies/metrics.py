@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from conveyor_sim.columns.counters import LINE
 from conveyor_sim.errors import StudyError
-from conveyor_sim.observe.counters import LINE
 from conveyor_sim.scene.words import shown
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies import gauges

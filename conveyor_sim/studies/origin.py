@@ -55,8 +55,8 @@ def origin_of(setup: Setup) -> dict[str, str]:
         "study": _hash(json.dumps(deciding(setup.study), sort_keys=True)),
         "scene": _hash(setup.text, setup.overrides),
         "code": _hash(*(f"{Path(file).name} {setup.code[file]}" for file in setup.made_by)),
-        "engine": setup.engine,
-        VERSION: setup.sources,
+        "engine": setup.versions[0],
+        VERSION: setup.versions[1],
     }
 
 

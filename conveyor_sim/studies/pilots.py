@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from conveyor_sim.errors import StudyError
-from conveyor_sim.runs.controlled import Controlled
+from conveyor_sim.run.controlled import Controlled
 from conveyor_sim.statistics.warm_up import warm_up
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal

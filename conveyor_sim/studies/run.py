@@ -16,9 +16,9 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, ConveyorError, StudyError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.model import Model
-from conveyor_sim.runs.compilation import compile_kernels
-from conveyor_sim.runs.controlled import Controlled
+from conveyor_sim.physics.model import Model
+from conveyor_sim.run.compilation import compile_kernels
+from conveyor_sim.run.controlled import Controlled
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.gauges import Averaged, Gauge, half_width

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.model import build_model
-from conveyor_sim.runs.compilation import Compilation
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.studies.check import parameter_units, units_of
 from conveyor_sim.studies.engine import Engine
 from conveyor_sim.studies.journal import Journal

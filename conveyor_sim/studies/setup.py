@@ -8,9 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import StudyError
-from conveyor_sim.model.sources_hash import sources_hash
+from conveyor_sim.physics.sources_hash import version_hashes
 from conveyor_sim.scene.load import merged
 from conveyor_sim.studies.code import digest_of
 from conveyor_sim.studies.metrics import Metric, metric_of
@@ -41,8 +40,8 @@ class Setup:
     """Those of `code` that make the line and its controller."""
     asked: Mapping[str, str] = field(default_factory=dict)
     """By metric, what it is: as the study says it, with the hashes of its files if it is a function."""
-    engine: str = ENGINE_HASH
-    sources: str = field(default_factory=sources_hash)
+    versions: tuple[str, str] = field(default_factory=version_hashes)
+    """Hashes of the engine and of the other sources that decide bits."""
 
     @cached_property
     def kept(self) -> dict[str, Metric]:
@@ -62,10 +61,12 @@ class Setup:
 
     def require_same_versions(self) -> None:
         """Raises StudyError in a process whose package or code is another: no other gives the same bits."""
-        if (self.engine, self.sources) != (ENGINE_HASH, sources_hash()):
+        here = version_hashes()
+        if self.versions != here:
+            engine, sources = self.versions
             raise StudyError(
-                f"conveyor_sim here has engine {ENGINE_HASH} and sources {sources_hash()}, expected {self.engine} and "
-                f"{self.sources}, as where the study runs"
+                f"conveyor_sim here has engine {here[0]} and sources {here[1]}, expected {engine} and {sources}, as "
+                "where the study runs"
             )
         for file, before in self.code.items():
             if (now := digest_of(Path(file))) != before:

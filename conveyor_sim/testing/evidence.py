@@ -9,14 +9,14 @@ import numpy as np
 
 from conveyor_sim.bag.rerun import rerun
 from conveyor_sim.control.scan import ALARMS
-from conveyor_sim.plot import style
-from conveyor_sim.plot.data import Frame, Plant
-from conveyor_sim.plot.moment import Event, Trace, moment_figure
-from conveyor_sim.plot.recording import contact_lines
+from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.page.watch import Watch
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.data import Frame, Plant
+from conveyor_sim.report.figures.moment import Event, Trace, moment_figure
+from conveyor_sim.report.figures.recording import contact_lines
 from conveyor_sim.testing.history import History, Mark
 from conveyor_sim.testing.scenario import Scenario
-from conveyor_sim.view.one_file import Failure, write_page
-from conveyor_sim.view.watch import Watch
 
 PICTURE = "line.png"
 PAGE = "line.html"

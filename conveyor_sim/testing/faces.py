@@ -9,15 +9,15 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.scada.face import Face, Stamps
-from conveyor_sim.scada.modbus_map import modbus_map
-from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.protocols.face import Face, Stamps
+from conveyor_sim.protocols.modbus.address_map import modbus_map
+from conveyor_sim.protocols.server_thread import ServerThread
 from conveyor_sim.support.modbus_rows import Row
 
 if TYPE_CHECKING:
-    from conveyor_sim.scada.modbus_server import ModbusServer
-    from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.users import Role
+    from conveyor_sim.protocols.modbus.server import ModbusServer
+    from conveyor_sim.protocols.opcua.server import OpcUaServer
+    from conveyor_sim.protocols.users import Role
     from conveyor_sim.testing.scenario import Scenario
 
 MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
@@ -57,7 +57,7 @@ class ModbusFaces(_Faces, AbstractContextManager["ModbusFaces"]):
         None: that of `conveyor-sim tags --modbus`. What clients write acts at the next tick that the test lets pass.
         Raises FaceError if there is no port, ImportError without pymodbus.
         """
-        from conveyor_sim.scada.modbus_server import ModbusServer
+        from conveyor_sim.protocols.modbus.server import ModbusServer
 
         source = line.source()
         server = ModbusServer(source, modbus_map(source.about.tags) if rows is None else rows, role)
@@ -84,8 +84,8 @@ class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
         What clients write acts at the next tick that the test lets pass. The certificate is one for the test. Raises
         FaceError if there is no port, ImportError without asyncua.
         """
-        from conveyor_sim.scada.opcua.server import OpcUaServer
-        from conveyor_sim.scada.users import new_user
+        from conveyor_sim.protocols.opcua.server import OpcUaServer
+        from conveyor_sim.protocols.users import new_user
 
         known = {name: new_user(role, password) for name, (role, password) in (users or {}).items()}
         server = OpcUaServer(line.source(), known, stamps=stamps, certificates=Path(self._folder.name) / "own")

@@ -8,13 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from conveyor_sim.control.scan import ALARMS
-from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import FORCE, INJECT, MODE, SET, UNFORCE, CommandOutcome
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import Kind
+
+F8 = NDArray[np.float64]
 
 _FIRST_ROWS = 1024
 

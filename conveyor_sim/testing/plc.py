@@ -1,6 +1,6 @@
 """`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
 
-It goes in lockstep by two tags (scada/handshake.py), so the test has the same bits however fast the PLC is.
+It goes in lockstep by two tags (protocols/handshake.py), so the test has the same bits however fast the PLC is.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.inputs import SET
-from conveyor_sim.scada.face import Face
-from conveyor_sim.scada.handshake import TARGET, HandshakeSource
-from conveyor_sim.scada.modbus_map import modbus_map
-from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import TagSource
+from conveyor_sim.protocols.face import Face
+from conveyor_sim.protocols.handshake import TARGET, HandshakeSource
+from conveyor_sim.protocols.modbus.address_map import modbus_map
+from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.source import TagSource
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 from conveyor_sim.support.modbus_rows import Row
@@ -115,7 +115,7 @@ class AttachedPlc(AbstractContextManager["AttachedPlc"]):
 
 def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path], Face]:
     """What makes the server of a Modbus client. Raises ImportError without pymodbus."""
-    from conveyor_sim.scada.modbus_server import ModbusServer
+    from conveyor_sim.protocols.modbus.server import ModbusServer
 
     return lambda source, _: ModbusServer(
         source, modbus_map(source.about.tags) if rows is None else rows, "controller", port=port
@@ -124,8 +124,8 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path],
 
 def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
     """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
-    from conveyor_sim.scada.opcua.server import OpcUaServer
-    from conveyor_sim.scada.users import new_user
+    from conveyor_sim.protocols.opcua.server import OpcUaServer
+    from conveyor_sim.protocols.users import new_user
 
     users = {USER: new_user("controller", password)}
     return lambda source, folder: OpcUaServer(source, users, port=port, certificates=folder / "certificates")

@@ -14,12 +14,12 @@ from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.scada.attach.link import LinkError
-from conveyor_sim.scada.attach.links import all_of, link
-from conveyor_sim.scada.attach.tag_map import TagMapError, read_tag_map
-from conveyor_sim.scada.handshake import TARGET, TICK
-from conveyor_sim.scada.server_thread import ServerThread
-from conveyor_sim.scada.source import PLC
+from conveyor_sim.protocols.attach.link import LinkError
+from conveyor_sim.protocols.attach.links import all_of, link
+from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
+from conveyor_sim.protocols.handshake import TARGET, TICK
+from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.source import PLC
 
 
 class ServedPlc(AbstractContextManager["ServedPlc"]):

@@ -75,8 +75,8 @@ class Lines:
         Inputs of which no bag could be made stay where they are.
         """
         from conveyor_sim.errors import ConveyorError
+        from conveyor_sim.page.watch import Watch
         from conveyor_sim.testing.evidence import PAGE, PICTURE, SHOWN, draw_moment, keep_bag, keep_page
-        from conveyor_sim.view.watch import Watch
 
         lines = []
         for number, (scenario, inputs) in enumerate(self.made):

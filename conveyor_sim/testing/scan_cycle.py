@@ -19,14 +19,14 @@ from conveyor_sim.control.scan import (
     declared_alarms,
 )
 from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.checkpoint import read_checkpoint
 from conveyor_sim.testing.conditions import Present
 
 if TYPE_CHECKING:
+    from conveyor_sim.protocols.face import Face
+    from conveyor_sim.protocols.source import TagSource
     from conveyor_sim.ros.attached import AttachedNode
-    from conveyor_sim.scada.face import Face
-    from conveyor_sim.scada.source import TagSource
     from conveyor_sim.testing.plc import AttachedPlc
     from conveyor_sim.testing.plc_server import ServedPlc
 

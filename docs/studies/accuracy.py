@@ -21,6 +21,7 @@ with while_importing():
     import click
     from page_parts import with_parts
 
+    from conveyor_sim.accuracy.figures.draw import plot_accuracy
     from conveyor_sim.accuracy.report.answer import find_answer
     from conveyor_sim.accuracy.report.apply import line
     from conveyor_sim.accuracy.report.files import STUDY, read_study
@@ -28,9 +29,8 @@ with while_importing():
     from conveyor_sim.accuracy.report.lines import three_lines
     from conveyor_sim.accuracy.report.tables import markdown
     from conveyor_sim.accuracy.results import Study
-    from conveyor_sim.plot import plot_accuracy
+    from conveyor_sim.physics.timestep.presets import table
     from conveyor_sim.scene import load_scene
-    from conveyor_sim.timestep.presets import table
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy.md"

@@ -30,11 +30,11 @@ with while_importing():
     from conveyor_sim.accuracy.results import Point
     from conveyor_sim.accuracy.setting import Setting
     from conveyor_sim.errors import ConveyorError
-    from conveyor_sim.model.step_choice import choose_steps
+    from conveyor_sim.physics.model.step_choice import choose_steps
+    from conveyor_sim.physics.timestep.presets import PRESETS
     from conveyor_sim.scene import Scene, load_scene
     from conveyor_sim.scene.accuracy import Preset, explicit
     from conveyor_sim.support.progress import ProgressBar
-    from conveyor_sim.timestep.presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "accuracy" / "promises.md"

@@ -16,12 +16,12 @@ from conveyor_sim.support.interrupt import one_line, while_importing
 with while_importing():
     from rich.console import Console
 
-    from conveyor_sim.observe.periods import stop_reasons
-    from conveyor_sim.plot import plot_production
-    from conveyor_sim.runs.compilation import Compilation
-    from conveyor_sim.runs.production import read_production
-    from conveyor_sim.runs.production_table import render
-    from conveyor_sim.runs.runner import run_scene
+    from conveyor_sim.report.figures.draw import plot_production
+    from conveyor_sim.report.periods import stop_reasons
+    from conveyor_sim.report.production import read_production
+    from conveyor_sim.report.production_table import render
+    from conveyor_sim.run.compilation import Compilation
+    from conveyor_sim.run.runner import run_scene
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.progress import ProgressBar
 

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from conveyor_sim.physics.stepping.guard import Guard
+from conveyor_sim.physics.stepping.tick import Integration
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard import Guard
-from conveyor_sim.stepping.tick import Integration
 from conveyor_sim.support.resources import scene_path
 
 COLUMNS = ("scene", "bottles", "steps a tick", "tick (ms)", "guard (us)", "share (%)")

@@ -23,7 +23,7 @@ from conveyor_sim.bag.reader import open_bag  # noqa: E402
 from conveyor_sim.bag.recover import recover  # noqa: E402
 from conveyor_sim.bag.replay import replay  # noqa: E402
 from conveyor_sim.errors import BagError  # noqa: E402
-from conveyor_sim.runs.runner import run_scene  # noqa: E402
+from conveyor_sim.run.runner import run_scene  # noqa: E402
 from conveyor_sim.scene import load_scene  # noqa: E402
 from conveyor_sim.support.resources import scene_path  # noqa: E402
 

@@ -18,14 +18,14 @@ import numpy as np
 from hard_cases.case import with_annex
 
 from conveyor_sim.accuracy.displacement import displace
+from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.model import build_model
-from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.bounds import Bound
 from conveyor_sim.scene import Scene, parse_scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.progress import ProgressBar
-from conveyor_sim.timestep.bounds import Bound
 
 STEPS = 4000
 """That a run must get through."""

@@ -22,13 +22,13 @@ from hard_cases.measures import Outcome, run
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.model import Model, build_model
-from conveyor_sim.model.remedies import STEP_COST
-from conveyor_sim.model.sources_hash import sources_hash
+from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.physics.model.remedies import STEP_COST
+from conveyor_sim.physics.sources_hash import sources_hash
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.support.progress import ProgressBar
-from conveyor_sim.timestep.presets import PRESETS
 
 WORK = 1.5e7
 """Of one run, about a second: ticks times TICK, and steps times (bottles + BESIDE) times STEP_COST."""

@@ -19,9 +19,9 @@ from matplotlib.patches import Circle
 from page_parts import with_parts
 from stability_limits import LEAST, MOST
 
-from conveyor_sim.model import Model, build_model
-from conveyor_sim.observe.columns import BottleColumns
-from conveyor_sim.plot import style
+from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.report.figures import style
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
 

@@ -19,13 +19,13 @@ from typing import Any
 from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
-from conveyor_sim.runs.runner import run_scene
-from conveyor_sim.scada.scene_messages import Task
-from conveyor_sim.scada.scene_source import SceneSource
-from conveyor_sim.scada.users import keep_user, new_user
+from conveyor_sim.page.one_file import Failure, write_page
+from conveyor_sim.protocols.scene_messages import Task
+from conveyor_sim.protocols.scene_source import SceneSource
+from conveyor_sim.protocols.users import keep_user, new_user
+from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path
-from conveyor_sim.view.one_file import Failure, write_page
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
@@ -42,10 +42,10 @@ def test_a_wedged_pair_is_alarmed_within_5_s(line):
 """A test with a controller that raises its alarm too late."""
 
 sys.path.insert(0, str(ROOT / "test"))
-from view.conftest import BROWSERS  # noqa: E402
-from view.line import LINE, record  # noqa: E402
-from view.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
-from view.states import STATES, State, at  # noqa: E402
+from page.conftest import BROWSERS  # noqa: E402
+from page.line import LINE, record  # noqa: E402
+from page.live_line import PASSWORD, Live, clock, put_into_mode, set_speed, signed_in, soon  # noqa: E402
+from page.states import STATES, State, at  # noqa: E402
 
 
 class Studio:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from conveyor_sim.runs.force_check import HARDER
+from conveyor_sim.run.force_check import HARDER
 from conveyor_sim.testing.plugin import Lines
 
 BEYOND = {"buffer_lane", "two_stations", "zoned_line"}

@@ -11,10 +11,10 @@ from conveyor_sim.accuracy.cases.closed_forms import cases_of, orders
 from conveyor_sim.accuracy.cases.collision import Collision, collision_of, duration, terms_of
 from conveyor_sim.accuracy.cases.head_on import HeadOn
 from conveyor_sim.accuracy.results import Order
-from conveyor_sim.effects.terms import meetings
 from conveyor_sim.engine.contact.laws.hertz import hertz_contact_time
 from conveyor_sim.engine.contact.laws.onset import onset_damping, onset_restitution
 from conveyor_sim.engine.integrators import INTEGRATORS
+from conveyor_sim.physics.effects.terms import meetings
 from conveyor_sim.scene import Scene
 
 MASS, SPEED = 0.2, 0.7

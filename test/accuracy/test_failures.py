@@ -12,8 +12,8 @@ from conveyor_sim.accuracy.measure.chatter import ChatterProbe
 from conveyor_sim.accuracy.measure.failures import failure_of
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import follow, variant
+from conveyor_sim.physics.stepping.guard.chatter import chatter_of
 from conveyor_sim.scene import Scene
-from conveyor_sim.stepping.guard.chatter import chatter_of
 
 G, MU, LIMIT = 9.81, 0.4, 0.01
 LEAST_STABLE = LIMIT / (MU * G)

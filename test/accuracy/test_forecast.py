@@ -12,7 +12,7 @@ from conveyor_sim.accuracy.report.forecast import TICK, TRUSTED, forecast, foret
 from conveyor_sim.accuracy.report.interim import PREDICTED, predicted
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting
-from conveyor_sim.model.remedies import BESIDE, BOTTLE_STEP
+from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP
 from conveyor_sim.scene import Scene
 
 

@@ -10,9 +10,9 @@ from scenes import base, belt, line, polyline, scene
 
 from conveyor_sim.accuracy.candidates import preset_setting
 from conveyor_sim.accuracy.measure.precision import WorkPrecision
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene
-from conveyor_sim.timestep.presets import PRESETS
 
 
 def silent(_done: float, _whole: float) -> None:

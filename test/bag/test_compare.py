@@ -13,8 +13,8 @@ from conveyor_sim.bag.compare import Difference, first_difference, outcome_diffe
 from conveyor_sim.bag.messages import Outcome
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.observe.columns import BottleColumns, ContactColumns
 
 
 class Line:

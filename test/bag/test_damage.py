@@ -17,12 +17,12 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.plot import style
-from conveyor_sim.plot.damage import bottles_figure, rails_figure
-from conveyor_sim.plot.data import Damage
-from conveyor_sim.plot.recording import Recording
-from conveyor_sim.runs.summarize import summarize
-from conveyor_sim.runs.summary_table import render
+from conveyor_sim.report.figures import style
+from conveyor_sim.report.figures.damage import bottles_figure, rails_figure
+from conveyor_sim.report.figures.data import Damage
+from conveyor_sim.report.figures.recording import Recording
+from conveyor_sim.report.summarize import summarize
+from conveyor_sim.report.summary_table import render
 from conveyor_sim.simulation import Simulation
 
 

@@ -16,7 +16,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.observe.events import Event, event_columns
+from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

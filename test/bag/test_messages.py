@@ -12,12 +12,12 @@ from bag.ros_decode import assert_same, deserialize
 from conveyor_sim.bag import messages
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.columns.bottles import BeltColumns, BottleColumns
+from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColumns
+from conveyor_sim.columns.events import Event, event_columns
+from conveyor_sim.columns.image import NOTHING_FORCED, Image
+from conveyor_sim.columns.ledger import balance
 from conveyor_sim.line.inputs import CommandOutcome, Input
-from conveyor_sim.observe.columns import BeltColumns, BottleColumns
-from conveyor_sim.observe.damage import DamageColumns, DamageEvent, RailWearColumns
-from conveyor_sim.observe.events import Event, event_columns
-from conveyor_sim.observe.image import NOTHING_FORCED, Image
-from conveyor_sim.observe.ledger import balance
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

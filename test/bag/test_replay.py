@@ -23,7 +23,7 @@ from conveyor_sim.errors import BagError, SceneError
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.run_state import STOPPED, RunState
 from conveyor_sim.line.tag import count
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import load_scene, parse_scene
 
 

@@ -28,7 +28,7 @@ from conveyor_sim.bag.topics import OUTPUTS
 from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
-from conveyor_sim.plot.recording import Recording
+from conveyor_sim.report.figures.recording import Recording
 from conveyor_sim.scene import Scene
 
 Make = Callable[[str, int], Path]

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from st.test_twins import PROGRAMS, TWINS
+from control.st.test_twins import PROGRAMS, TWINS
 
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.scan import Constant, ControlError, Inputs, together
-from conveyor_sim.st import StructuredText
+from conveyor_sim.control.st import StructuredText
 from conveyor_sim.testing import Scenario
 
 

@@ -10,9 +10,9 @@ from worlds import FAR, callable_part, state_of
 
 from conveyor_sim.engine.support.belts import surface_velocity as surface_velocity_part
 from conveyor_sim.engine.support.footing import find_carriers
+from conveyor_sim.physics.state import State
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state import State
 
 surface_velocity = callable_part(surface_velocity_part)
 

@@ -26,7 +26,7 @@ RUN = """
 import importlib, pkgutil
 from numba.core.dispatcher import Dispatcher
 import conveyor_sim.engine
-from conveyor_sim.runs.compilation import Compilation
+from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.simulation import Simulation
 scene = parse_scene('''

@@ -32,9 +32,9 @@ from worlds import FAR, advance, evaluate, state_of
 
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.physics.state import State
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state import State
 
 F8 = NDArray[np.float64]
 Gap = Callable[[F8], float]

@@ -9,7 +9,7 @@ from worlds import FAR, advance, state_of
 
 from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.state import State
+from conveyor_sim.physics.state import State
 
 K, C = 5000.0, 8.0
 DEPTH = 0.01

@@ -11,8 +11,8 @@ from worlds import FAR, callable_part, nearest_on_arc, nearest_on_segment, rail_
 from conveyor_sim.engine.lists.rebuild import moved_too_far as moved_too_far_part
 from conveyor_sim.engine.lists.rebuild import rebuild
 from conveyor_sim.engine.world_views import lists_of
-from conveyor_sim.state import State
-from conveyor_sim.state.empty_world import empty_pairs
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.state.empty_world import empty_pairs
 
 moved_too_far = callable_part(moved_too_far_part)
 

@@ -21,7 +21,7 @@ from worlds import (
 
 from conveyor_sim.engine.rails.deepest_contacts import keep_deepest as keep_deepest_part
 from conveyor_sim.engine.threads.workers import MOST_CONTACTS
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 
 keep_deepest = callable_part(keep_deepest_part)
 

@@ -7,7 +7,7 @@ from scenes import bottle, contact, kind, scene
 from worlds import FAR, evaluate, state_of
 
 from conveyor_sim.engine.contact.slots import WIDTH
-from conveyor_sim.state import State
+from conveyor_sim.physics.state import State
 
 STIFFNESS = 5000.0
 BIG, SMALL = 0.2, 0.01

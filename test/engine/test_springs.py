@@ -8,8 +8,8 @@ import numpy as np
 from scenes import arc, bottle, contact, polyline, scene
 from worlds import FAR, advance
 
-from conveyor_sim.model import build_model
-from conveyor_sim.state import State
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
 
 SPRING: dict[str, Any] = {"friction": 0.5, "tangential": {"stiffness": 3000.0, "damping": 0.2}}
 DT = 2e-5

@@ -9,7 +9,7 @@ from scenes import NO_FLOOR, RADIUS, bottle, contact, kind, polyline, scene
 from worlds import ALONE, FAR, rail_forces, rail_scene, state_of
 
 from conveyor_sim.engine.observers.stored_energy import ELASTIC, KINETIC, SPRINGS, stored_energy
-from conveyor_sim.state import State
+from conveyor_sim.physics.state import State
 
 DEEP = 0.004
 """m"""

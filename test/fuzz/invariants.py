@@ -13,8 +13,8 @@ from fuzz.drive_invariants import ExpectedBelts
 from fuzz.violation import Violation
 from numpy.typing import NDArray
 
+from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.line.inputs import CommandOutcome
-from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.simulation import Simulation
 

@@ -15,7 +15,7 @@ from fuzz.violation import Violation
 from hypothesis import strategies as st
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import parse_scene
 from conveyor_sim.scene.accuracy import MOST_STEPS
 from conveyor_sim.scene.effect_names import EFFECT_NAMES

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene, load_scene, parse_scene
 from conveyor_sim.scene.yaml_lines import Document
-from conveyor_sim.timestep.presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_name("table.yaml")

@@ -18,12 +18,12 @@ from conveyor_sim.accuracy.displacement import displace
 from conveyor_sim.accuracy.measure.chatter import STEPS
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
+from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.engine.lists.riding import left_out
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.physics.stepping.guard.chatter import ChatterMeter
 from conveyor_sim.scene import Scene, parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard.chatter import ChatterMeter
 
 SAMPLES = 1000
 """Ticks that are looked at, at the most, evenly spread; all of them in runs of fewer."""

@@ -28,7 +28,7 @@ RECORDED: dict[str, Any] = json.loads(RECORD.read_text())
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_a_shipped_scene_does_what_it_did(name: str) -> None:
-    """In the steps of the record; which this version would choose: test/timestep/test_presets.py."""
+    """In the steps of the record; which this version would choose: test/physics/timestep/test_presets.py."""
     path, dt = scene_path(name), RECORDED[name]["dt"]
     steps = round(load_scene(path).tick / dt)
     accuracy = explicit("semi_implicit_euler", steps)

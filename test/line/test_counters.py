@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scenes import base, belt, contact, segment, simulation
 
+from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.line.counters import RESET_COUNTERS
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.time_account import CATEGORIES
-from conveyor_sim.observe.counters import CounterColumns
 from conveyor_sim.simulation import Simulation
 
 END = [[1.75, -0.2], [2.0, -0.2], [2.0, 0.2], [1.75, 0.2]]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from conveyor_sim.line.devices import DEVICES, build_devices
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.scene.marks import marks_of
 from conveyor_sim.scene.parts.device_part import DevicePart, Entry, Exit

@@ -9,8 +9,8 @@ from pydantic import TypeAdapter
 
 from conveyor_sim.line.failures import LONGEST, Draws, FailureClock, PlannedTimes, weibull_scale
 from conveyor_sim.line.streams import random_stream
+from conveyor_sim.physics.state.snapshot import restore, snapshot
 from conveyor_sim.scene.failures import Failure, PlannedStop, Times, Weibull
-from conveyor_sim.state.snapshot import restore, snapshot
 
 TICK = 0.01
 MANY = 20_000

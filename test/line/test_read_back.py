@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from scenes import base, belt, bottle, simulation
 
+from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, Input
-from conveyor_sim.observe.read_back import ReadBackColumns
 from conveyor_sim.simulation import Simulation
 
 ONE, TWO = "belts/one/cmd_speed", "belts/two/cmd_speed"

@@ -12,8 +12,8 @@ from line.machine_line import END, line, signals, sink, source, station
 from scenes import belt, contact, segment
 
 from conveyor_sim.errors import CheckpointError
+from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.checkpoint import read_checkpoint
 
 BEFORE = [[0.85, -0.2], [1.0, -0.2], [1.0, 0.2], [0.85, 0.2]]
 BEHIND = [1.1, 0.0]

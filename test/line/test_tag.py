@@ -11,7 +11,7 @@ from conveyor_sim.line.devices import DEVICES, build_devices
 from conveyor_sim.line.process_image import ProcessImage
 from conveyor_sim.line.tag import MOST_COUNT, Tag, choice, count, number, seconds, switch
 from conveyor_sim.line.units import UNITS
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import load_scene
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conveyor_sim.line.time_account import CATEGORIES, TimeAccount
-from conveyor_sim.state.snapshot import restore, snapshot
+from conveyor_sim.physics.state.snapshot import restore, snapshot
 
 
 def test_every_tick_is_in_one_category() -> None:

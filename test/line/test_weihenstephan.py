@@ -11,7 +11,7 @@ from conveyor_sim.line.inputs import MODE, Input
 from conveyor_sim.line.packml import Command, State
 from conveyor_sim.line.stop_reason import BLOCKED, COMMANDED, FAULT, FIRST_FAILURE, FIRST_PLANNED, NONE, STARVED
 from conveyor_sim.line.weihenstephan import DATA_POINTS, STATE_TEXTS, data_points, names_of, program, state_of
-from conveyor_sim.runs.tags import tag_rows
+from conveyor_sim.report.tags import tag_rows
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

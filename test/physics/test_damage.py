@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scenes import MASS, NO_OUTPUTS, RADIUS, arc, belt, bottle, kind, line, scene, segment, simulation
 
-from conveyor_sim.model import build_model
-from conveyor_sim.observe.damage import DamageColumns, RailWearColumns
+from conveyor_sim.columns.damage import DamageColumns, RailWearColumns
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state import State
 
 WEIGHT = MASS * 9.81
 PRESS = 0.4 * WEIGHT

@@ -13,9 +13,9 @@ import pytest
 from scenes import MASS, RADIUS, base, belt, bottle, contact, order, scene, segment
 from worlds import FAR, advance, state_of
 
-from conveyor_sim.model import build_model
-from conveyor_sim.state import State
-from conveyor_sim.timestep.methods import METHODS
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.timestep.methods import METHODS
 
 LIMIT, MU, G = 1e-5, 0.5, 9.81
 """v_lim (m/s) is so low that steps in question are far too short for the springs to matter."""
@@ -121,7 +121,7 @@ def test_bounds_keep_the_same_share_of_the_limit(integrator: str) -> None:
         "spin on the base": 0.25 * 2.0 * MU * G / LIMIT,
         "normal damping": 2.0 * 3.0 / (MASS / 2.0),
         "tangential damping": 2.0 * 2.0 / (MASS / 2.0),
-        # At the load of a few bottles in a zigzag, three times the pull of all (test/effects/test_load.py).
+        # At the load of a few bottles in a zigzag, three times the pull of all (test/physics/effects/test_load.py).
         "contact friction": 2.0 * MU * (2.0 / MASS) * (3.0 * 2.0 * MU * MASS * G) / LIMIT,
     }
     shares = {b.name: gammas[b.name] * b.dt / LIMITS[integrator] for b in model.bounds if b.name in gammas}

@@ -24,10 +24,10 @@ from scenes import (
 )
 
 from conveyor_sim.accuracy.displacement import displace
-from conveyor_sim.model import build_model
-from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.columns.ledger import Ledger
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.state import State
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state import State
 
 ON: dict[str, Any] = {"effects": {"energy_ledger": "on"}}
 ORDERS = {

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scenes import COMMON, MASS, RADIUS, base, belt, bottle, contact, scene, segment
 
-from conveyor_sim.observe.ledger import Ledger
+from conveyor_sim.columns.ledger import Ledger
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.timestep.presets import PRESETS
 
 INTEGRATORS = ("semi_implicit_euler", "velocity_verlet")
 SPEED = 0.5

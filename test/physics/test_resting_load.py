@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scenes import COMMON, base, belt, bottle, contact, kind, scene, segment, with_bends
 
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.timestep.presets import PRESETS
 from conveyor_sim.scene import Scene
 from conveyor_sim.scene.accuracy import INTEGRATOR_NAMES
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.timestep.presets import PRESETS
 
 MASS, RADIUS, MU, G = 0.36, 0.033, 0.3, 9.81
 TABLES = ((0.5, 0.25), (0.5, 0.6), (0.9, 0.5))

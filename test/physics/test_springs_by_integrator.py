@@ -16,8 +16,8 @@ import pytest
 from scenes import MASS, RADIUS, arc, base, belt, bottle, contact, kind, order, rms, scene, segment
 from worlds import advance
 
+from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
 INTEGRATORS = ["semi_implicit_euler", "velocity_verlet", "rk4"]
 MOVING = INTEGRATORS[:2]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from physics.state.test_checkpoint import END, SAVED, everything, queue, run
 from scenes import (
     COMMON,
     MASS,
@@ -24,12 +25,11 @@ from scenes import (
     segment,
     simulation,
 )
-from state.test_checkpoint import END, SAVED, everything, queue, run
 
+from conveyor_sim.physics.state.world_arrays import changing_arrays
+from conveyor_sim.physics.state.world_checks import indices, ranges
+from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.world_arrays import changing_arrays
-from conveyor_sim.state.world_checks import indices, ranges
-from conveyor_sim.stepping.guard.world_snapshot import WorldSnapshot
 
 MU, G = 0.4, 9.81
 MOST = MU * MASS * G

@@ -17,10 +17,10 @@ from ros.warm_child import WarmChild
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.live.session import Session
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import private_domain
+from conveyor_sim.run.session import Session
+from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

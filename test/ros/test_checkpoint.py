@@ -20,10 +20,10 @@ from std_srvs.srv import Trigger
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import BagError
+from conveyor_sim.physics.state.checkpoint import sealed
 from conveyor_sim.ros.child import Child
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.checkpoint import sealed
 
 FEEDER = "belts/feeder/cmd_speed"
 PLAYING, PAUSED = 1, 2

@@ -16,8 +16,8 @@ from std_msgs.msg import Float64
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.live.inbox import MESSAGE_BYTES, MOST_WAITING
 from conveyor_sim.ros.child import Child
+from conveyor_sim.run.inbox import MESSAGE_BYTES, MOST_WAITING
 
 FEEDER = "belts/feeder/cmd_speed"
 GOOD = Commands(names=[FEEDER], values=[0.25])

@@ -14,8 +14,8 @@ from ros.line_client import LineClient, until
 
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.line.inputs import MODE, OWN, SET, Input
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.child import Child
+from conveyor_sim.run.stepper import Stepper
 
 FEEDER, TABLE = "belts/feeder/cmd_speed", "belts/table/cmd_speed"
 EYE = "photo_eyes/entry/blocked"

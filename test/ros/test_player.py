@@ -17,9 +17,9 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import definition, typestore
 from conveyor_sim.errors import BagError
-from conveyor_sim.live.lockstep import Refused
-from conveyor_sim.live.playback import Message, Playback
-from conveyor_sim.live.player import Player
+from conveyor_sim.run.lockstep import Refused
+from conveyor_sim.run.playback import Message, Playback
+from conveyor_sim.run.player import Player
 
 
 @pytest.fixture(scope="module")

@@ -26,9 +26,9 @@ from conveyor_sim.bag.qos import EVENTS
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import definition
-from conveyor_sim.live.playback import Message, Playback
 from conveyor_sim.ros.publishers import message_class, ros_qos
 from conveyor_sim.ros.replay_node import ReplayNode
+from conveyor_sim.run.playback import Message, Playback
 
 
 @pytest.fixture(scope="module")

@@ -17,11 +17,11 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro, typestore
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.line.inputs import CommandOutcome
-from conveyor_sim.live.calls import MOST_CALLS
-from conveyor_sim.live.lockstep import LockstepRequest, Refused
-from conveyor_sim.live.session import Session
-from conveyor_sim.live.stepper import Stepper
 from conveyor_sim.ros.child import Child
+from conveyor_sim.run.calls import MOST_CALLS
+from conveyor_sim.run.lockstep import LockstepRequest, Refused
+from conveyor_sim.run.session import Session
+from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

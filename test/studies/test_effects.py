@@ -142,7 +142,7 @@ def test_sobol_indices_of_a_function_whose_indices_are_known() -> None:
 
 def test_all_of_it_is_drawn(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    from conveyor_sim.plot import plot_study
+    from conveyor_sim.studies.figures.draw import plot_study
 
     found = results_of(GRID, 3, noisy)
     gaps = Results(found.study, found.path, found.units, found.parameters, {}, found.rows[:-3])  # a point without runs

@@ -49,7 +49,7 @@ while True:
     time.sleep(1.0)
 """
 IN_A_NODE = "from conveyor_sim.support.stop_request import StopRequest\nstop = StopRequest()\n"
-IN_A_RUN = "from conveyor_sim.runs.runner import _stop_request\nstop = _stop_request()\nstop.__enter__()\n"
+IN_A_RUN = "from conveyor_sim.run.runner import _stop_request\nstop = _stop_request()\nstop.__enter__()\n"
 
 
 @contextmanager

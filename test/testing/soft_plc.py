@@ -26,7 +26,7 @@ def by_modbus(host: str, port: int, scans: int | None) -> None:
     from pymodbus.client import ModbusTcpClient
 
     from conveyor_sim.line.line import image_of
-    from conveyor_sim.scada.modbus_map import HANDSHAKE, modbus_map
+    from conveyor_sim.protocols.modbus.address_map import HANDSHAKE, modbus_map
     from conveyor_sim.scene import load_scene
 
     rows = {row.name: row for row in modbus_map(image_of(load_scene("config/scenarios/zoned_line.yaml")).tags)}

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from physics.stepping.guard.test_recording import bouncing
 from scenes import MASS, RADIUS
-from stepping.guard.test_recording import bouncing
 from testing.conftest import FEEDER, ON_TABLE, STOP, TABLE
 from testing.test_scenario import Hold
 

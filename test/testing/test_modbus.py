@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.scada.modbus_map import modbus_map
+from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.support.modbus_rows import Row
 from conveyor_sim.testing.scenario import Scenario
 

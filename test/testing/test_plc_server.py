@@ -22,11 +22,11 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.scada.attach.free_running import PlcFace
-from conveyor_sim.scada.attach.link import LinkError
-from conveyor_sim.scada.attach.links import all_of, link
-from conveyor_sim.scada.attach.tag_map import TagMapError, read_tag_map
-from conveyor_sim.scada.server_thread import ServerThread
+from conveyor_sim.protocols.attach.free_running import PlcFace
+from conveyor_sim.protocols.attach.link import LinkError
+from conveyor_sim.protocols.attach.links import all_of, link
+from conveyor_sim.protocols.attach.tag_map import TagMapError, read_tag_map
+from conveyor_sim.protocols.server_thread import ServerThread
 from conveyor_sim.testing.scenario import Scenario
 
 SECONDS = 4.0

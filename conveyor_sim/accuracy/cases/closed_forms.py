@@ -9,7 +9,7 @@ from conveyor_sim.accuracy.cases.collision import collision_of, rail_materials, 
 from conveyor_sim.accuracy.cases.head_on import HeadOn, restitution_of, slip_for_sliding
 from conveyor_sim.accuracy.cases.set_down import SetDown
 from conveyor_sim.accuracy.results import Order
-from conveyor_sim.effects.terms import Meeting, Terms, impact_speed, meetings
+from conveyor_sim.physics.effects.terms import Meeting, Terms, impact_speed, meetings
 from conveyor_sim.scene import Scene
 
 SMOOTH_ORDERS = {

@@ -8,13 +8,13 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from conveyor_sim.effects import choose_effects
-from conveyor_sim.effects.terms import Meeting, Terms, deepest
 from conveyor_sim.engine.contact.laws import DampingLaw, ElasticLaw
 from conveyor_sim.engine.contact.laws.linear import LINEAR
-from conveyor_sim.laws.coefficients import build_laws
+from conveyor_sim.physics.effects import choose_effects
+from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest
+from conveyor_sim.physics.laws.coefficients import build_laws
+from conveyor_sim.physics.timestep.presets import DEFAULT, PRESETS
 from conveyor_sim.scene import Scene, rail_shapes
-from conveyor_sim.timestep.presets import DEFAULT, PRESETS
 
 SAMPLES = 2000
 """Steps of an undamped contact's order of duration by which an impact is integrated: its duration to 1e-3 of one."""

@@ -4,9 +4,9 @@ from conveyor_sim.accuracy.measure.failures import place
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.physics.stepping.guard.chatter import ChatterMeter
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.stepping.guard.chatter import ChatterMeter
 
 STEPS = 48
 """Steps that are watched: chatter must fill half of them, no contact at its five steps or more rings so long."""

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conveyor_sim.accuracy.trajectory import Frame, Trajectory
+from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.model import Model
-from conveyor_sim.observe.columns import BottleColumns
+from conveyor_sim.physics.model import Model
 
 BLOWN_UP = 10.0
 """Kinetic and elastic energy over the most that the reference has: beyond it a run is unstable, not inexact."""

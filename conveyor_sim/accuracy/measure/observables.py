@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.observe.columns import BottleColumns
-from conveyor_sim.observe.itinerary import Itinerary
+from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

@@ -6,7 +6,7 @@ from conveyor_sim.accuracy.candidates import forbidden, standard_steps
 from conveyor_sim.accuracy.cases.collision import collision_of, duration, terms_of
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.effects.terms import impact_speed, meetings
+from conveyor_sim.physics.effects.terms import impact_speed, meetings
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

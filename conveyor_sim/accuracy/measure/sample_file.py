@@ -14,10 +14,10 @@ from conveyor_sim.accuracy.measure import jitter, observables
 from conveyor_sim.accuracy.measure.observables import OBSERVABLES
 from conveyor_sim.accuracy.results import Sample
 from conveyor_sim.accuracy.setting import Setting
+from conveyor_sim.columns import itinerary
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.model.sources_hash import sources_hash
-from conveyor_sim.observe import itinerary
+from conveyor_sim.physics.sources_hash import sources_hash
 from conveyor_sim.scene import Scene
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import read_sealed, sealed

@@ -11,9 +11,9 @@ from conveyor_sim.accuracy.cases.collision import collision_of, duration, terms_
 from conveyor_sim.accuracy.measure.exercise import Exercise
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
-from conveyor_sim.effects.terms import impact_speed, meetings
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
+from conveyor_sim.physics.effects.terms import impact_speed, meetings
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from conveyor_sim.accuracy.candidates import candidates
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.effects import most_bottles
-from conveyor_sim.model import build_model
-from conveyor_sim.model.remedies import BESIDE, BOTTLE_STEP, STEP_COST
+from conveyor_sim.physics.effects import most_bottles
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP, STEP_COST
 from conveyor_sim.scene import Scene
 
 TRUSTED = ("leapfrog", "velocity_verlet")

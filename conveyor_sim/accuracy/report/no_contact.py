@@ -7,7 +7,7 @@ from conveyor_sim.accuracy.report.apply import line
 from conveyor_sim.accuracy.report.forecast import Forecast, seconds
 from conveyor_sim.accuracy.report.words import digits, percent
 from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import Scene
 
 

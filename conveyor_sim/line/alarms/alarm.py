@@ -4,7 +4,7 @@ import math
 from enum import IntEnum
 from typing import Literal
 
-from conveyor_sim.observe.events import Kind
+from conveyor_sim.columns.events import Kind
 from conveyor_sim.scene.parts.alarm import AlarmFields
 
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from conveyor_sim.columns.alarms import AlarmColumns
+from conveyor_sim.columns.events import Kind
 from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, Alarm, AlarmState
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS, Declared, ranks
-from conveyor_sim.observe.alarms import AlarmColumns
-from conveyor_sim.observe.events import Kind
 from conveyor_sim.scene.parts.alarm import CLASSES, PREFIX, AlarmFields
 from conveyor_sim.support.printable import printable
 

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 from conveyor_sim.line.alarms.alarm import NEVER, Alarm, AlarmState, Shelving, ticks
 from conveyor_sim.line.alarms.alarms import UNDECLARED, Alarms
 from conveyor_sim.line.alarms.declaration import MOST_ALARMS, as_text, fields_of
+from conveyor_sim.physics.state.snapshot import entries, typed
 from conveyor_sim.scene.parts.alarm import LONGEST_DELAY
-from conveyor_sim.state.snapshot import entries, typed
 from conveyor_sim.support.printable import printable
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from conveyor_sim.columns.events import Kind
 from conveyor_sim.line.alarms.alarm import ACKNOWLEDGED, NEVER, RESET, Alarm, ticks
 from conveyor_sim.line.alarms.alarms import Alarms
-from conveyor_sim.observe.events import Kind
 from conveyor_sim.scene.parts.alarm import LONGEST_DELAY, PREFIX
 from conveyor_sim.support.printable import printable
 

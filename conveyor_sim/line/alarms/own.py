@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
+from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.line.alarms.alarms import Alarms
 from conveyor_sim.line.alarms.declaration import LINE_GROUP, Declared, error
-from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.scene.parts.alarm import AlarmFields
 from conveyor_sim.scene.schema import Scene
 

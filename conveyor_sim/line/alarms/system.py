@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.errors import SceneError
 from conveyor_sim.line.alarms import memory, operations
 from conveyor_sim.line.alarms.alarms import Alarms, Note
@@ -14,7 +15,6 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.alarms import AlarmsDevice
 from conveyor_sim.line.inputs import DECLARE, Input
 from conveyor_sim.line.operation import Operation
-from conveyor_sim.observe.damage import DamageEvent
 from conveyor_sim.scene.parts.alarm import PREFIX
 from conveyor_sim.scene.places import Places
 from conveyor_sim.scene.schema import Scene

@@ -19,7 +19,7 @@ from conveyor_sim.line.devices.spill import SpillDevice
 from conveyor_sim.line.devices.station import StationDevice
 from conveyor_sim.line.devices.zone import ZoneDevice
 from conveyor_sim.line.setup import Setup
-from conveyor_sim.model import Model
+from conveyor_sim.physics.model import Model
 from conveyor_sim.scene.schema import Scene
 
 DEVICES: Mapping[str, Callable[[str, Any, Setup], Device]] = {

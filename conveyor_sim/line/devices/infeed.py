@@ -10,8 +10,8 @@ from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.entry import CLEAR, Quality
 from conveyor_sim.line.setup import BAD, JITTER, Setup
 from conveyor_sim.line.tag import MOST_COUNT, count, switch
+from conveyor_sim.physics.state import State
 from conveyor_sim.scene.parts.infeed import Infeed
-from conveyor_sim.state import State
 
 ROUNDING = 1e-9
 """s; sums of 1 / rate must not miss the tick they fall on."""

@@ -16,7 +16,7 @@ with while_importing():
     import numpy as np
     from line import MACHINE, closed_form
 
-    from conveyor_sim.plot import style
+    from conveyor_sim.report.figures import style
     from conveyor_sim.statistics.intervals import mean_interval
     from conveyor_sim.statistics.paired import paired_difference, pairing_gain
     from conveyor_sim.statistics.words import plus_minus, told

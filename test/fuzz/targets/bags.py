@@ -28,8 +28,8 @@ from conveyor_sim.bag.recover import RecoverReport, recover
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.errors import BagError, ConveyorError, SceneError
-from conveyor_sim.live.playback import Playback
-from conveyor_sim.plot.recording import Recording
+from conveyor_sim.report.figures.recording import Recording
+from conveyor_sim.run.playback import Playback
 from conveyor_sim.scene import load_scene
 
 TICKS = 100

@@ -24,9 +24,9 @@ from fuzz.invariants import Violation
 from fuzz.play import check_sentence
 
 from conveyor_sim.errors import CheckpointError, SimulationError
+from conveyor_sim.physics.state.checkpoint import sealed
 from conveyor_sim.scene import Scene, load_scene
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.state.checkpoint import sealed
 
 SMALL_LINE = Path(__file__).resolve().parents[2] / "bag" / "small_line.yaml"
 TICKS = 3

@@ -17,7 +17,7 @@ from fuzz.play import check_sentence
 from scene.yaml_trees import outcome
 
 from conveyor_sim.errors import SceneError
-from conveyor_sim.model import build_model
+from conveyor_sim.physics.model import build_model
 from conveyor_sim.scene import load_scene
 from conveyor_sim.scene.yaml_nodes import compose, compose_in_full
 

@@ -8,12 +8,12 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from control.st.conformance import cases
 from fuzz.invariants import Violation
-from st.conformance import cases
 
-from conveyor_sim.st.compile import compile_text
-from conveyor_sim.st.errors import StructuredTextError
-from conveyor_sim.st.program import Program
+from conveyor_sim.control.st.compile import compile_text
+from conveyor_sim.control.st.errors import StructuredTextError
+from conveyor_sim.control.st.program import Program
 
 LONGEST = 20.0
 """s of CPU time, of a case."""

@@ -1,73 +1,25 @@
-"""What numba does to a kernel, and to a part of one, beside what it does to any function.
+"""Numba's compiler for kernels and for parts.
 
-- A member of a group that is `None` is `None` to numba before it compiles, so that `if world.spin is None` prunes.
-- A part is lowered to LLVM's language and no further. Numba would make machine code of every function; a part is
-  inlined wherever it is called, so that is done once, in the kernels.
+A part is lowered to LLVM's intermediate language and no further. Numba would make machine code of every function; here
+it is made once, for a kernel with all parts that it calls, after they are inlined.
 """
 
 from typing import Any
 
 from llvmlite.binding import Linkage
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core import ir, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, DefaultPassBuilder, _LowerResult
-from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
-from numba.core.ir_utils import get_definition, guard
+from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import RewriteSemanticConstants
 
-from conveyor_sim.engine.compiler.numba_internals.group_type import COPIES_GROUPS, GroupType
-
-
-@register_pass(mutates_CFG=False, analysis_only=False)
-class AbsentMembers(FunctionPass):
-    """Put `None` wherever a member is taken out of a group, given as an argument, that lacks it."""
-
-    _name = "absent_members"
-
-    def __init__(self) -> None:
-        FunctionPass.__init__(self)
-
-    def run_pass(self, state: Any) -> bool:
-        """Whether anything was changed."""
-        changed = False
-        for block in state.func_ir.blocks.values():
-            for taken in block.find_insts(ir.Assign):
-                if _is(taken.value, "getattr", "static_getitem") and _type(state, taken.value) == types.none:
-                    absent = ir.Const(None, taken.loc)
-                    definitions = state.func_ir._definitions[taken.target.name]
-                    definitions[definitions.index(taken.value)] = absent
-                    taken.value = absent
-                    changed = True
-        return changed
-
-
-def _is(value: Any, *ops: str) -> bool:
-    return isinstance(value, ir.Expr) and value.op in ops
-
-
-def _type(state: Any, value: Any) -> Any:
-    """Of a group that is an argument, or a member of one; None if it is anything else."""
-    definition = guard(get_definition, state.func_ir, value) if isinstance(value, ir.Var) else value
-    if isinstance(definition, ir.Arg):
-        return state.args[definition.index]
-    if isinstance(definition, ir.Const) and definition.value is None:
-        return types.none
-    if _is(definition, "static_getitem"):
-        # One of several that are taken at once: a, b = group.a, group.b
-        several = guard(get_definition, state.func_ir, definition.value)
-        several = guard(get_definition, state.func_ir, several.value) if _is(several, "exhaust_iter") else several
-        return _type(state, several.items[definition.index]) if _is(several, "build_tuple") else None
-    if _is(definition, "getattr"):
-        owner = _type(state, definition.value)
-        if isinstance(owner, GroupType) and definition.attr in owner.fields:
-            return owner.types[owner.fields.index(definition.attr)]
-    return None
+from conveyor_sim.engine.compiler.numba_internals.absent_members import AbsentMembers
+from conveyor_sim.engine.compiler.numba_internals.group_type import COPIES_GROUPS
 
 
 class _PartLibrary(JITCodeLibrary):
-    """The code of a part alone; what it calls stays in libraries of its own."""
+    """Code of a part alone. Parts that it calls remain in their own libraries."""
 
     def finalize(self) -> None:
         for function in self._final_module.functions:
@@ -78,7 +30,7 @@ class _PartLibrary(JITCodeLibrary):
 
 
 class _KernelLibrary(JITCodeLibrary):
-    """The code of a kernel, with all that it calls."""
+    """Code of a kernel and of all parts that it calls."""
 
     def create_ir_module(self, name: str) -> Any:
         module = super().create_ir_module(name)
@@ -90,7 +42,7 @@ class _KernelLibrary(JITCodeLibrary):
         super().finalize()
 
     def _verify_declare_only_symbols(self) -> None:
-        # What is missing would be called at address 0.
+        # A function that is missing would be called at address 0.
         missing = [
             one.name for one in self._final_module.functions if one.is_declaration and one.name.startswith("_ZN")
         ]
@@ -98,9 +50,9 @@ class _KernelLibrary(JITCodeLibrary):
             raise AssertionError(f"{self.name} calls {missing[0]}, which is not linked")
 
     def _callees_first(self, library: Any, order: dict[Any, None]) -> dict[Any, None]:
-        """What a library calls, parts of parts included, and last itself.
+        """Add to `order` the libraries that a library calls, directly and through parts, then the library itself.
 
-        LLVM links only what it has seen a call of: whatever calls a part must be linked before it.
+        LLVM links only functions that it has seen a call of, so callers of a part must be linked before it.
         """
         if library is self or isinstance(library, _PartLibrary):
             for called in library._linking_libraries:
@@ -112,7 +64,7 @@ class _KernelLibrary(JITCodeLibrary):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class PartEntry(LoweringPass):
-    """Let others call a part that has no machine code."""
+    """Ends the compilation of a part, so that kernels can call it although it has no machine code."""
 
     _name = "part_entry"
 
@@ -120,10 +72,10 @@ class PartEntry(LoweringPass):
         LoweringPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        """Always changes something."""
+        """Register the part with numba. Return True."""
         lowered = state.cr
         module, name = lowered.fndesc.lookup_module(), lowered.fndesc.qualname
-        # Numba finds the library of what is called by this object; nobody calls it.
+        # Numba finds the library of a callee by this object. It is never called.
         entry = _dynfunc.make_function(module, name, "", 0, lowered.env, (state.library,))
         state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
         state.cr = _LowerResult(lowered.fndesc, lowered.call_helper, cfunc=entry, env=lowered.env)
@@ -131,6 +83,8 @@ class PartEntry(LoweringPass):
 
 
 class _InLibrary(Compiler):
+    """Numba's compiler with a library of ours and the pass `AbsentMembers`."""
+
     library: type[JITCodeLibrary]
 
     def define_pipelines(self) -> list[Any]:
@@ -144,21 +98,21 @@ class _InLibrary(Compiler):
         return [passes]
 
     def change(self, passes: Any) -> None:
-        """More changes to the passes."""
+        """Change the passes further."""
 
 
 class KernelCompiler(_InLibrary):
-    """For kernels: numba's own passes, and the code of all that is called."""
+    """Compiler of kernels: machine code with all callees."""
 
     library = _KernelLibrary
 
 
 class PartCompiler(_InLibrary):
-    """For parts: no machine code."""
+    """Compiler of parts: no machine code."""
 
     library = _PartLibrary
 
     def change(self, passes: Any) -> None:
-        """Stop where machine code would be made."""
+        """End where machine code would be made."""
         self.state.flags.no_compile = True
         passes.add_pass_after(PartEntry, NativeLowering)

@@ -1,0 +1,1 @@
+"""Observations as columns of numbers: one array per quantity."""

@@ -1,0 +1,251 @@
+"""The standard function blocks (IEC 61131-3:2013, tables 43 to 46); times are whole ns of simulated time.
+
+Each is a class with a slot for every variable, and `run(now)`, one call.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from conveyor_sim.control.st.types import BOOL, DINT, INT, LINT, TIME, UDINT, ULINT, BlockType, Member, Type
+
+
+class _Timer:
+    __slots__ = ("since", "v_et", "v_in", "v_pt", "v_q")
+
+    def __init__(self) -> None:
+        self.v_in = self.v_q = False
+        self.v_pt = self.v_et = 0
+        self.since = -1
+        """ns, from when it counts; -1: it does not."""
+
+
+class TON(_Timer):
+    """On-delay: Q once IN has been on for PT; ET goes up to PT, and is 0 as soon as IN is off."""
+
+    __slots__ = ()
+
+    def run(self, now: int) -> None:
+        """One call."""
+        if not self.v_in:
+            self.v_q, self.v_et, self.since = False, 0, -1
+            return
+        if self.since < 0:
+            self.since = now
+        elapsed = now - self.since
+        self.v_q = elapsed >= self.v_pt
+        self.v_et = max(0, min(elapsed, self.v_pt))
+
+
+class TOF(_Timer):
+    """Off-delay: Q as soon as IN is on, and until IN has been off for PT; then ET stays at PT until IN is on."""
+
+    __slots__ = ()
+
+    def run(self, now: int) -> None:
+        """One call."""
+        if self.v_in:
+            self.v_q, self.v_et, self.since = True, 0, -1
+        elif self.v_q:
+            if self.since < 0:
+                self.since = now
+            elapsed = now - self.since
+            self.v_q = elapsed < self.v_pt
+            self.v_et = max(0, min(elapsed, self.v_pt))
+
+
+class TP(_Timer):
+    """Pulse: Q for PT from where IN goes on, whatever IN does meanwhile; ET stays at PT until IN is off."""
+
+    __slots__ = ("before",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.before = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        rose = self.v_in and not self.before
+        self.before = self.v_in
+        if self.since >= 0 and now - self.since >= self.v_pt and (rose or not self.v_in):
+            self.since = -1
+        if self.since < 0 and rose:
+            self.since = now
+        elapsed = now - self.since if self.since >= 0 else self.v_pt
+        self.v_q = elapsed < self.v_pt
+        self.v_et = 0 if self.since < 0 else max(0, min(elapsed, self.v_pt))
+
+
+class R_TRIG:
+    """Rising edge: Q for the one call in which CLK goes on; it was off before the first."""
+
+    __slots__ = ("before", "v_clk", "v_q")
+
+    def __init__(self) -> None:
+        self.v_clk = self.v_q = self.before = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self.v_q = self.v_clk and not self.before
+        self.before = self.v_clk
+
+
+class F_TRIG:
+    """Falling edge: Q for the one call in which CLK goes off.
+
+    The standard's body, Q := NOT CLK AND NOT M; M := NOT CLK, gives an edge in the first call if CLK is off then; as
+    its text speaks of a transition, and compilers have it so, there is none here.
+    """
+
+    __slots__ = ("before", "v_clk", "v_q")
+
+    def __init__(self) -> None:
+        self.v_clk = self.v_q = self.before = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self.v_q = self.before and not self.v_clk
+        self.before = self.v_clk
+
+
+class SR:
+    """Set-dominant flip-flop: Q1 := S1 OR (NOT R AND Q1)."""
+
+    __slots__ = ("v_q1", "v_r", "v_s1")
+
+    def __init__(self) -> None:
+        self.v_s1 = self.v_r = self.v_q1 = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self.v_q1 = self.v_s1 or (self.v_q1 and not self.v_r)
+
+
+class RS:
+    """Reset-dominant flip-flop: Q1 := NOT R1 AND (S OR Q1)."""
+
+    __slots__ = ("v_q1", "v_r1", "v_s")
+
+    def __init__(self) -> None:
+        self.v_s = self.v_r1 = self.v_q1 = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self.v_q1 = not self.v_r1 and (self.v_s or self.v_q1)
+
+
+class _Counter:
+    __slots__ = ("down", "high", "low", "up", "v_cv", "v_pv")
+
+    def __init__(self, low: int, high: int) -> None:
+        self.v_pv = self.v_cv = 0
+        self.up = self.down = False
+        self.low, self.high = low, high
+        """PVmin and PVmax: at these it counts no further."""
+
+    def _count(self, up: bool, down: bool) -> None:
+        """Edges up and down; both in one call cancel each other."""
+        rose, fell = up and not self.up, down and not self.down
+        self.up, self.down = up, down
+        if rose and not fell and self.v_cv < self.high:
+            self.v_cv += 1
+        elif fell and not rose and self.v_cv > self.low:
+            self.v_cv -= 1
+
+
+class CTU(_Counter):
+    """Up-counter: Q from PV rising edges of CU on; R resets, and wins."""
+
+    __slots__ = ("v_cu", "v_q", "v_r")
+
+    def __init__(self, low: int, high: int) -> None:
+        super().__init__(low, high)
+        self.v_cu = self.v_r = self.v_q = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self._count(self.v_cu, False)
+        if self.v_r:
+            self.v_cv = 0
+        self.v_q = self.v_cv >= self.v_pv
+
+
+class CTD(_Counter):
+    """Down-counter: LD loads PV, and wins; Q at 0 and below."""
+
+    __slots__ = ("v_cd", "v_ld", "v_q")
+
+    def __init__(self, low: int, high: int) -> None:
+        super().__init__(low, high)
+        self.v_cd = self.v_ld = self.v_q = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self._count(False, self.v_cd)
+        if self.v_ld:
+            self.v_cv = self.v_pv
+        self.v_q = self.v_cv <= 0
+
+
+class CTUD(_Counter):
+    """Up-down-counter: R resets, else LD loads, else edges count; both edges at once cancel each other."""
+
+    __slots__ = ("v_cd", "v_cu", "v_ld", "v_qd", "v_qu", "v_r")
+
+    def __init__(self, low: int, high: int) -> None:
+        super().__init__(low, high)
+        self.v_cu = self.v_cd = self.v_r = self.v_ld = self.v_qu = self.v_qd = False
+
+    def run(self, now: int) -> None:
+        """One call."""
+        self._count(self.v_cu, self.v_cd)
+        if self.v_r:
+            self.v_cv = 0
+        elif self.v_ld:
+            self.v_cv = self.v_pv
+        self.v_qu, self.v_qd = self.v_cv >= self.v_pv, self.v_cv <= 0
+
+
+def _block(name: str, python: str, inputs: dict[str, Type], outputs: dict[str, Type]) -> BlockType:
+    members = {n.lower(): Member(n, t, t.initial, "VAR_INPUT") for n, t in inputs.items()}
+    members |= {n.lower(): Member(n, t, t.initial, "VAR_OUTPUT") for n, t in outputs.items()}
+    return BlockType(name, "block", members=members, python=python, standard=True)
+
+
+_TIMER: tuple[dict[str, Type], dict[str, Type]] = {"IN": BOOL, "PT": TIME}, {"Q": BOOL, "ET": TIME}
+
+STANDARD: dict[str, BlockType] = {
+    **{name: _block(name, f"_{name}", *_TIMER) for name in ("TON", "TOF", "TP")},
+    **{name: _block(name, f"_{name}", {"CLK": BOOL}, {"Q": BOOL}) for name in ("R_TRIG", "F_TRIG")},
+    "SR": _block("SR", "_SR", {"S1": BOOL, "R": BOOL}, {"Q1": BOOL}),
+    "RS": _block("RS", "_RS", {"S": BOOL, "R1": BOOL}, {"Q1": BOOL}),
+}
+"""By name."""
+
+CLASSES: dict[str, Any] = {f"_{one.__name__}": one for one in (TON, TOF, TP, R_TRIG, F_TRIG, SR, RS)}
+"""By the name that code uses."""
+
+
+class _Typed:
+    """Makes a counter of a type of CV."""
+
+    def __init__(self, counter: Any, low: int, high: int) -> None:
+        self._counter, self._low, self._high = counter, low, high
+
+    def __call__(self) -> Any:
+        return self._counter(self._low, self._high)
+
+
+for _suffix, _type in (("", INT), ("_DINT", DINT), ("_LINT", LINT), ("_UDINT", UDINT), ("_ULINT", ULINT)):
+    for _counter, _in, _out in (
+        (CTU, {"CU": BOOL, "R": BOOL, "PV": _type}, {"Q": BOOL, "CV": _type}),
+        (CTD, {"CD": BOOL, "LD": BOOL, "PV": _type}, {"Q": BOOL, "CV": _type}),
+        (
+            CTUD,
+            {"CU": BOOL, "CD": BOOL, "R": BOOL, "LD": BOOL, "PV": _type},
+            {"QU": BOOL, "QD": BOOL, "CV": _type},
+        ),
+    ):
+        _name = f"{_counter.__name__}{_suffix}"
+        STANDARD[_name] = _block(_name, f"_{_name}", _in, _out)
+        CLASSES[f"_{_name}"] = _Typed(_counter, _type.low, _type.high)

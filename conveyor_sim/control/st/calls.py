@@ -1,0 +1,185 @@
+"""Calls of functions and of blocks: arguments by position, by name, and what comes back by =>."""
+
+from __future__ import annotations
+
+from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.declarations import Declarations
+from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.functions import apply, is_standard
+from conveyor_sim.control.st.types import BOOL, VOID, BlockType, Member, Type
+from conveyor_sim.control.st.values import Place, Value, assignment, converted, described
+from conveyor_sim.control.st.work import CALL
+
+PASSED = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
+"""Sections of what a call passes."""
+
+MOST_CALLS = 100
+"""Calls one within the other: far from the limit of Python, which depends on who calls the program."""
+
+
+class Calls:
+    """Of one file: notes who calls whom, for recursion is not allowed (IEC 61131-3:2003, 2.5)."""
+
+    def __init__(self, trace: bool) -> None:
+        """trace: whether what a call writes is noted."""
+        self.trace = trace
+        self.declarations: Declarations
+        """Set before the first call."""
+        self.edges: dict[str, dict[str, tree.Call]] = {}
+        """By the Python name of who calls: whom, and where first."""
+
+    def __call__(self, expressions: Expressions, node: tree.Call, hint: Type | None) -> Value:
+        """A call of a function. Raises SourceError."""
+        target = node.target
+        if not isinstance(target, tree.Name):
+            block = expressions.place(target)
+            raise SourceError(node.at, f"found a call of {described(block)} as a value, expected a function")
+        scope = expressions.scope
+        own = scope.unit.members.get(target.name.lower()) if scope.unit is not None else None
+        if own is not None and own.section != "RESULT":
+            raise SourceError(node.at, f"found a call of {target.name}, a variable, as a value, expected a function")
+        function = self.declarations.function(target.name)
+        if function is None:
+            if is_standard(target.name):
+                return self._standard(expressions, node, target.name, hint)
+            if target.name.lower() in scope.names.types:
+                raise SourceError(node.at, f"found a call of {target.name}, a type, expected a variable of it")
+            raise SourceError(node.at, f"found {target.name}(...), expected a function that is declared")
+        self._note(expressions, function, node)
+        expressions.work += CALL
+        codes = []
+        given = self._bound(expressions, node, function)
+        for member in function.of(*PASSED):
+            argument = given.get(member.slot)
+            if argument is None:
+                codes.append(self._missing(node, function, member))
+            elif member.section == "VAR_INPUT":
+                value = expressions.value(argument.value, member.type)
+                codes.append(converted(value, member.type, f"{member.name} of {function.name}"))
+            else:
+                codes.append(self.reference(expressions, argument, member, node.at))
+        code = f"_f_{function.name.lower()}({', '.join(codes)})"
+        return Value(node.at, function.result or VOID, code)
+
+    def block(self, expressions: Expressions, node: tree.Call) -> tuple[Place, list[str]]:
+        """The block of a call statement, and the lines of the call."""
+        place = expressions.place(node.target)
+        kind = place.type
+        if not isinstance(kind, BlockType):
+            raise SourceError(node.at, f"found a call of {described(place)}, expected a function or a block")
+        self._note(expressions, kind, node)
+        lines, after = [f"_o = {place.code}"], []
+        written = [one.slot for one in kind.of("VAR_OUTPUT") if kind.standard]
+        given = self._bound(expressions, node, kind)
+        for member in kind.of(*PASSED):
+            argument = given.get(member.slot)
+            if argument is None:
+                if member.section == "VAR_IN_OUT":
+                    raise SourceError(node.at, f"found no {member.name}, expected {member.name} := and a variable")
+            elif member.section == "VAR_INPUT":
+                value = expressions.value(argument.value, member.type)
+                lines.append(f"_o.{member.slot} = {converted(value, member.type, f'{member.name} of {kind.name}')}")
+                written.append(member.slot)
+            elif member.section == "VAR_IN_OUT":
+                lines.append(f"_o.{member.slot} = {self.reference(expressions, argument, member, node.at)}")
+            else:
+                after += self._output(expressions, argument, member, node.at)
+        noted = [line for slot in written for line in self.noted(expressions, f"(_o, {slot!r})", node.at)]
+        return place, [*lines, "_o.run(_rt.now)", *noted, *after]
+
+    def noted(self, expressions: Expressions, root: str, at: Position) -> list[str]:
+        """The line that notes who was the last to write a variable, if that is traced.
+
+        What is of a function's own lives as long as the call: nobody asks for it.
+        """
+        unit = expressions.scope.unit
+        passing = unit is not None and unit.function and root.startswith("(self,")
+        return [f"_noted({root}, {at.line}, {at.column})"] if self.trace and not passing else []
+
+    def require_finite(self) -> None:
+        """Raise SourceError for recursion, and for a chain of more than MOST_CALLS calls."""
+        done: dict[str, int] = {}  # calls below each
+        for start in self.edges:
+            path = [(start, iter(self.edges[start].items()))]
+            while path:
+                name, calls = path[-1]
+                called, node = next(calls, (None, None))
+                if called is None or node is None:
+                    done[name] = 1 + max((done[one] for one in self.edges.get(name, ())), default=-1)
+                    path.pop()
+                    if done[name] > MOST_CALLS:
+                        at = next(iter(self.edges[name].values())).at
+                        raise SourceError(at, f"found calls more than {MOST_CALLS} deep, expected fewer levels")
+                elif any(called == other for other, _ in path):
+                    raise SourceError(node.at, f"found a call that leads back to {called[3:]}, expected no recursion")
+                elif called not in done:
+                    path.append((called, iter(self.edges.get(called, {}).items())))
+
+    def _note(self, expressions: Expressions, kind: BlockType, node: tree.Call) -> None:
+        if expressions.scope.unit is not None and not kind.standard:
+            self.edges.setdefault(expressions.scope.unit.python, {}).setdefault(kind.python, node)
+
+    def _standard(self, expressions: Expressions, node: tree.Call, name: str, hint: Type | None) -> Value:
+        named = [one.name is not None for one in node.arguments]
+        if any(one.output for one in node.arguments) or (any(named) and not all(named)):
+            raise SourceError(node.at, f"found arguments of {name} of two kinds, expected all by position or by :=")
+        given = [(one.name, expressions.value(one.value, hint)) for one in node.arguments]
+        return apply(node.at, name, given, expressions, hint)
+
+    def _bound(self, expressions: Expressions, node: tree.Call, kind: BlockType) -> dict[str, tree.Argument]:
+        """Arguments by the slot of what they are for."""
+        members = kind.of(*PASSED)
+        listed = ", ".join(one.name for one in members) or "none"
+        found: dict[str, tree.Argument] = {}
+        positional = [one for one in node.arguments if one.name is None]
+        if positional and len(positional) != len(node.arguments):
+            raise SourceError(
+                node.at, f"found arguments of {kind.name} of two kinds, expected all by position or by name"
+            )
+        if len(positional) > len(members):
+            raise SourceError(node.at, f"found {len(positional)} arguments of {kind.name}, expected {listed}")
+        for member, argument in zip(members, positional, strict=False):
+            found[member.slot] = argument
+        for argument in node.arguments:
+            if argument.name is None:
+                continue
+            wanted = [one for one in members if one.name.lower() == str(argument.name).lower()]
+            if not wanted:
+                raise SourceError(argument.at, f"found {argument.name} of {kind.name}, expected one of {listed}")
+            member = wanted[0]
+            if member.slot in found:
+                raise SourceError(argument.at, f"found {argument.name} twice, expected it once")
+            if argument.output != (member.section == "VAR_OUTPUT"):
+                sign = "=>" if member.section == "VAR_OUTPUT" else ":="
+                raise SourceError(argument.at, f"found {argument.name} of {kind.name}, expected it with {sign}")
+            found[member.slot] = argument
+        return found
+
+    def _missing(self, node: tree.Call, function: BlockType, member: Member) -> str:
+        """Code of an argument that is left out."""
+        if member.section == "VAR_IN_OUT" or (
+            member.section == "VAR_INPUT" and any(a.name is None for a in node.arguments)
+        ):
+            raise SourceError(node.at, f"found no {member.name} of {function.name}, expected all of its arguments")
+        return member.initial if member.section == "VAR_INPUT" else "None"
+
+    def reference(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> str:
+        """Code that passes a variable itself. at: of the call."""
+        place = expressions.target(argument.value)
+        if place.type != member.type or not place.reference or argument.negated:
+            expected = f"a variable of type {member.type.name}"
+            raise SourceError(argument.at, f"found {described(place)} for {member.name}, expected {expected}")
+        if member.section == "VAR_OUTPUT" and self.noted(expressions, place.root, at):
+            return f"_Traced({place.reference}, _noted, {at.line}, {at.column})"
+        return place.reference
+
+    def _output(self, expressions: Expressions, argument: tree.Argument, member: Member, at: Position) -> list[str]:
+        place = expressions.target(argument.value)
+        code = f"_o.{member.slot}"
+        if argument.negated:
+            if member.type != BOOL:
+                raise SourceError(argument.at, f"found NOT of {member.type.name}, expected a BOOL")
+            code = f"(not {code})"
+        written = assignment(place, Value(argument.at, member.type, code))
+        return [written, *self.noted(expressions, place.root, at)]

@@ -1,0 +1,261 @@
+"""A program's text to Python: checked as a whole, compiled once, and run as often as there are instances."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import CodeType
+
+from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.calls import PASSED, Calls
+from conveyor_sim.control.st.declarations import Declarations, require_small
+from conveyor_sim.control.st.errors import Position, SourceError, StructuredTextError
+from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.located import NOTHING_SHARED, Layout, laid_out
+from conveyor_sim.control.st.parse import parse
+from conveyor_sim.control.st.statements import Lines, Statements
+from conveyor_sim.control.st.types import TIME, BlockType, Member, Structure, Type
+from conveyor_sim.control.st.work import statements
+from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.printable import SENTENCE, printable
+
+LOWEST = 2**31
+"""The priority of a program without a task: it comes after all others."""
+
+MOST_BYTES = 2 * MB
+"""Of a file."""
+
+MOST_UNITS = 5000
+"""Programs, functions and blocks of a file."""
+
+
+@dataclass(frozen=True)
+class Scheduled:
+    """An instance of a program, and when it runs."""
+
+    name: str
+    type: BlockType
+    task: str = ""
+    """"" in every scan."""
+    interval: int = 0
+    """ns; 0: every scan."""
+    priority: int = LOWEST
+    """0 comes first."""
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A whole file."""
+
+    file: str
+    code: CodeType
+    source: str
+    """In Python."""
+    positions: tuple[Position | None, ...]
+    """Where line n + 1 of it comes from."""
+    programs: tuple[Scheduled, ...]
+    """In the order in which they run."""
+    globals: BlockType
+    digest: str
+    """Of the text: a snapshot fits the same program only."""
+    trace: bool
+    """Whether assignments note that they were the last to write."""
+    shared: Mapping[tuple[str, str], int]
+    """Number of the memory that a located variable shares with others, by Python class and slot."""
+
+
+def compile_file(path: Path, trace: bool = False) -> Compiled:
+    """The program of a file. Raises StructuredTextError for one that can't be read, or can't be."""
+    try:
+        text = read_file(path, MOST_BYTES).decode("utf-8-sig")
+    except FileError as error:
+        raise StructuredTextError(f"{path}: {error}, expected a program in Structured Text") from error
+    except UnicodeDecodeError as error:
+        raise StructuredTextError(f"{path}: is not UTF-8 ({error.reason} at byte {error.start})") from error
+    return compile_text(text, str(path), trace)
+
+
+def compile_text(text: str, file: str = "program.st", trace: bool = False) -> Compiled:
+    """The same of a text. trace: whether assignments note that they were the last to write. Raises as that does."""
+    try:
+        return _compile(text, file, trace)
+    except SourceError as error:
+        place = f"{file}:{error.at.line}:{error.at.column}"
+        raise StructuredTextError(f"{place}: {printable(error, SENTENCE)}") from None
+    except (RecursionError, MemoryError, SyntaxError):  # Python's compiler has limits of its own
+        raise StructuredTextError(f"{file}: found a program nested too deeply, expected a flatter one") from None
+
+
+def _compile(text: str, file: str, trace: bool) -> Compiled:
+    source = parse(text)
+    if len(source.units) > MOST_UNITS:
+        at, count = source.units[MOST_UNITS].at, len(source.units)
+        raise SourceError(at, f"found {count} programs, functions and blocks, expected at most {MOST_UNITS}")
+    calls = Calls(trace)
+    declared = calls.declarations = Declarations(source, calls)
+    declared.resolve()
+    lines = Lines()
+    for one in source.types:
+        declared.named(one.at, one.name)
+    units = [(unit, _type_of(unit, declared)) for unit in source.units]
+    _require_few(declared, units)
+    layout = _layout(source, declared)
+    if layout.size:
+        lines.add(f"_memory = _Memory({layout.size})")
+    for unit, kind in units:
+        _unit(unit, kind, Expressions(declared.scope(kind), calls), lines, calls, layout)
+    calls.require_finite()
+    for structure in declared.structures:
+        _class(lines, structure.python, "_Record", list(structure.members.values()))
+    _class(lines, "_Globals", "", list(declared.names.globals.members.values()), layout)
+    lines.add("_g = _Globals()")
+    python = "\n".join(lines.lines) + "\n"
+    programs = {unit.name.lower(): kind for unit, kind in units if unit.kind == "PROGRAM"}
+    scheduled = _schedule(source, programs, declared, calls)
+    for key in (program.name.lower() for program in scheduled):
+        shared = declared.names.globals.members.get(key)
+        if shared is not None and isinstance(shared.type, Structure):
+            said = f"found {shared.name}, which has the name of a program"
+            raise SourceError(Position(*shared.at), f"{said}, expected another: {key}/x would be two variables")
+    return Compiled(
+        file,
+        compile(python, f"<{file}>", "exec"),
+        python,
+        tuple(lines.positions),
+        tuple(sorted(scheduled, key=lambda one: one.priority)),
+        declared.names.globals,
+        hashlib.sha256(text.encode()).hexdigest(),
+        trace,
+        {place: one.group for place, one in layout.places.items()},
+    )
+
+
+def _layout(source: tree.Source, declared: Declarations) -> Layout:
+    """Return the memory that located variables share."""
+    programs = [f"_P_{one.type.lower()}" for configured in source.configurations for one in configured.instances]
+    return laid_out(declared.located, Counter(programs))
+
+
+def _require_few(declared: Declarations, units: list[tuple[tree.Unit, BlockType]]) -> None:
+    """Raise SourceError for more elements or text than a file may declare in all."""
+    shared: list[Type] = [declared.names.globals, *declared.structures]
+    elements, characters = sum(one.size for one in shared), sum(one.characters for one in shared)
+    for unit, kind in units:
+        elements, characters = elements + kind.size, characters + kind.characters
+        require_small(elements, characters, unit.at, f" with those of {unit.name}")
+
+
+def _type_of(unit: tree.Unit, declared: Declarations) -> BlockType:
+    kind = declared.function(unit.name) if unit.kind == "FUNCTION" else declared.named(unit.at, unit.name)
+    assert isinstance(kind, BlockType)
+    return kind
+
+
+def _unit(
+    unit: tree.Unit, kind: BlockType, expressions: Expressions, lines: Lines, calls: Calls, layout: Layout
+) -> None:
+    """The class of a unit, whose `run` is its body."""
+    members = [one for one in kind.members.values() if one.section != "VAR_EXTERNAL"]
+    _class(lines, kind.python, "", members, layout)
+    with lines.inner():
+        lines.add("def run(self, now=0):", unit.at)
+        made = kind.work if kind.function else sum(one.type.work for one in kind.of("VAR_TEMP"))
+        with lines.inner():
+            for member in kind.of("VAR_TEMP"):
+                lines.add(f"self.{member.slot} = {member.initial}")
+        Statements(lines, expressions, calls).block(unit.body, unit.at, statements(made))
+    if kind.function:
+        _function(kind, lines)
+
+
+def _function(kind: BlockType, lines: Lines) -> None:
+    """What a call calls: a new frame, its arguments in, its body, its result out."""
+    passed = kind.of(*PASSED)
+    lines.add(f"def _f_{kind.name.lower()}({', '.join(one.slot for one in passed)}):")
+    with lines.inner():
+        lines.add(f"self = {kind.python}()")
+        for one in passed:
+            if one.section != "VAR_OUTPUT":
+                lines.add(f"self.{one.slot} = {one.slot}")
+        lines.add("self.run()")
+        for one in passed:
+            if one.section == "VAR_OUTPUT":
+                lines.add(f"if {one.slot} is not None: {one.slot}.set(self.{one.slot})")
+        if kind.result is not None:
+            lines.add(f"return self.v_{kind.name.lower()}")
+
+
+def _class(lines: Lines, name: str, base: str, members: list[Member], layout: Layout = NOTHING_SHARED) -> None:
+    """Write a class with a slot for each variable, and a descriptor for each one that shares memory."""
+    places = {one.slot: place for one in members if (place := layout.places.get((name, one.slot))) is not None}
+    memory = "located" if name == "_Globals" and layout.size else ""
+    slots = [one.slot for one in members if one.slot not in places] + [memory] * bool(memory)
+    lines.add(f"class {name}({base}):")
+    with lines.inner():
+        lines.add(f"__slots__ = ({''.join(f'{slot!r}, ' for slot in slots)})")
+        for slot, place in places.items():
+            lines.add(f"{slot} = {place.code}")
+        lines.add("def __init__(self):")
+        with lines.inner():
+            if memory:
+                lines.add(f"self.{memory} = _memory")
+            for one in members:
+                if one.slot not in places or places[one.slot].sets:
+                    lines.add(f"self.{one.slot} = {'None' if one.section == 'VAR_IN_OUT' else one.initial}")
+            lines.add("pass")
+
+
+def _schedule(
+    source: tree.Source, programs: dict[str, BlockType], declared: Declarations, calls: Calls
+) -> list[Scheduled]:
+    if len(source.configurations) > 1:
+        raise SourceError(source.configurations[1].at, "found a second CONFIGURATION, expected one")
+    if not source.configurations:
+        if not programs:
+            raise SourceError(Position(1, 1), "found no PROGRAM, expected one or more")
+        return [Scheduled(kind.name, kind) for kind in programs.values()]
+    configuration = source.configurations[0]
+    known = Expressions(declared.scope(None), calls)
+    tasks: dict[tuple[str, str], tuple[int, int]] = {}
+    for task in configuration.tasks:
+        if (key := (task.resource, task.name.lower())) in tasks:
+            raise SourceError(task.at, f"found {task.name} again, expected another name")
+        tasks[key] = _task(task, known)
+    found: dict[str, Scheduled] = {}
+    elements = characters = 0
+    for one in configuration.instances:
+        if one.type.lower() not in programs:
+            raise SourceError(one.at, f"found {one.type}, expected a PROGRAM: {', '.join(programs) or 'there is none'}")
+        own = tasks.get((one.resource, one.task.lower())) or tasks.get(("", one.task.lower()))
+        if one.task and own is None:
+            names = ", ".join(name for resource, name in tasks if resource in (one.resource, ""))
+            raise SourceError(one.at, f"found {one.task}, expected a TASK: {names or 'there is none'}")
+        if one.name.lower() in found:
+            raise SourceError(one.at, f"found {one.name} again, expected each program once")
+        interval, priority = own or (0, LOWEST)
+        kind = programs[one.type.lower()]
+        elements, characters = elements + kind.size, characters + kind.characters
+        require_small(elements, characters, one.at, " in programs")
+        found[one.name.lower()] = Scheduled(one.name, kind, one.task, interval, priority)
+    if not found:
+        raise SourceError(configuration.at, "found no program in the CONFIGURATION, expected PROGRAM name : type")
+    return list(found.values())
+
+
+def _task(task: tree.Task, known: Expressions) -> tuple[int, int]:
+    """Interval (ns) and priority."""
+    interval, priority = 0, LOWEST - 1
+    for at, name, node in task.fields:
+        word = name.upper()
+        if word == "INTERVAL":
+            interval = known.known(node, "INTERVAL", TIME.kind)
+        elif word == "PRIORITY":
+            priority = known.known(node, "PRIORITY")
+        else:
+            raise SourceError(at, f"found {name}, expected INTERVAL or PRIORITY")
+    if interval <= 0 or not 0 <= priority < LOWEST:
+        raise SourceError(task.at, f"found the TASK {task.name}, expected INTERVAL more than 0 and PRIORITY 0 or more")
+    return interval, priority

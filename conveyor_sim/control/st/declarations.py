@@ -1,0 +1,372 @@
+"""Declarations: types, and the variables of units with their initial values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.blocks import STANDARD
+from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.located import Located, address_of, require_fit
+from conveyor_sim.control.st.scope import Names, Scope
+from conveyor_sim.control.st.sections import LOCATED, OUTSIDE, meaning
+from conveyor_sim.control.st.types import (
+    ELEMENTARY,
+    MOST_CHARACTERS,
+    Array,
+    BlockType,
+    Enumeration,
+    Member,
+    String,
+    Structure,
+    Subrange,
+    Type,
+    repeated,
+)
+from conveyor_sim.control.st.values import converted, described
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+MOST_ELEMENTS = 1_000_000
+"""Of an array, a structure or a block, with all that is in it."""
+
+MOST_TEXT = 16_000_000
+"""Sum of the declared lengths of all texts in a file, in characters: at most 64 MB of memory."""
+
+MOST_LEVELS = 100
+"""Structures and blocks one within the other."""
+
+MOST_CONSTANTS = 50
+"""Global variables whose initial values use each other, as a chain."""
+
+
+class Declarations:
+    """Of one file: what is named is resolved when it is first needed, so the order in the file is free."""
+
+    def __init__(self, source: tree.Source, calls: Any) -> None:
+        """calls: as `Expressions` takes it."""
+        self.names = Names(types={name.lower(): block for name, block in STANDARD.items()})
+        self.structures: list[Structure] = []
+        """Those declared, each after what it contains."""
+        self.located: list[Located] = []
+        """Variables with addresses."""
+        self._calls = calls
+        self._pending: dict[str, tree.TypeDeclaration | tree.Unit] = {}
+        self._functions: dict[str, tree.Unit] = {}
+        self._open: list[str] = []
+        self._levels: dict[str, int] = {}
+        everything: list[tree.TypeDeclaration | tree.Unit] = [*source.types, *source.units]
+        for declared in everything:
+            where: dict[str, Any] = self._pending
+            if isinstance(declared, tree.Unit) and declared.kind == "FUNCTION":
+                where = self._functions
+            key = declared.name.lower()
+            taken = key in self._pending or key in self._functions or key in self.names.types
+            if taken or declared.name.upper() in ELEMENTARY:
+                raise SourceError(declared.at, f"found {declared.name} again, expected a name that is not taken")
+            where[key] = declared
+        self._globals = self._by_name(
+            (*source.globals, *(one for config in source.configurations for one in config.globals))
+        )
+        self.names.read = self._read
+        self._enumerations = [one for one in source.types if isinstance(one.type, tree.EnumType)]
+
+    def resolve(self) -> None:
+        """Resolve enumerations and global variables, whose values may call functions. Raise SourceError."""
+        for one in self._enumerations:
+            self.named(one.at, one.name)
+        order = list(self._globals)
+        for key in order:
+            self._read(key)
+        members = self.names.globals.members
+        for key in order:
+            members[key] = members.pop(key)
+
+    def _by_name(self, sections: Iterable[tree.Variables]) -> dict[str, tree.Variables]:
+        """Global variables by name, each as a section of its own."""
+        found: dict[str, tree.Variables] = {}
+        for section in sections:
+            for declared in section.declarations:
+                if declared.name.lower() in found:
+                    raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+                found[declared.name.lower()] = replace(section, declarations=(declared,))
+        return found
+
+    def _read(self, key: str) -> None:
+        """Take up a global variable, if there is one of that name and it is not known yet."""
+        if (section := self._globals.pop(key, None)) is not None:
+            if len(self.names.reading) == MOST_CONSTANTS:
+                at, found = section.declarations[0].at, f"found {MOST_CONSTANTS} initial values that use each other"
+                raise SourceError(at, f"{found}, expected a shorter chain")
+            self.names.reading.add(key)
+            self._members(self.names.globals, (section,), OUTSIDE)
+            self.names.reading.remove(key)
+
+    def scope(self, unit: BlockType | None) -> Scope:
+        """The names of a unit."""
+        return Scope(self.names, unit)
+
+    def named(self, at: Position, name: str) -> Type:
+        """The type of a name. Raises SourceError."""
+        if found := ELEMENTARY.get(name.upper()) or self.names.types.get(name.lower()):
+            return found
+        declared = self._pending.get(name.lower())
+        if declared is None:
+            raise SourceError(at, f"found {name}, expected a type")
+        key = name.lower()
+        if key in self._open:
+            raise SourceError(at, f"found {name} inside of itself, expected another type")
+        self._open.append(key)
+        try:
+            kind = self._unit(declared) if isinstance(declared, tree.Unit) else self._declared(declared)
+        finally:
+            self._open.pop()
+        self.names.types[key] = kind
+        return kind
+
+    def function(self, name: str) -> BlockType | None:
+        """A function of the file; None if it has none of that name."""
+        key = name.lower()
+        if key in self._functions and key not in self.names.functions:
+            if key in self._open:
+                raise SourceError(self._functions[key].at, f"found a call of {name} in its own declaration")
+            self._open.append(key)
+            self.names.functions[key] = self._unit(self._functions[key])
+            self._open.pop()
+        return self.names.functions.get(key)
+
+    def type(self, spec: tree.TypeSpec, name: str = "") -> Type:
+        """The type that is written. name: under which it is declared, if it is."""
+        outside = Expressions(self.scope(None), self._calls)
+        return self._type(spec, outside, name)
+
+    def _type(self, spec: tree.TypeSpec, known: Expressions, name: str = "") -> Type:
+        if isinstance(spec, tree.NamedType):
+            kind = self.named(spec.at, spec.name)
+            if spec.length is None:
+                return kind
+            length = known.known(spec.length, "the length of a text")
+            if not isinstance(kind, String) or not 1 <= length <= MOST_CHARACTERS:
+                found = f"found {spec.name}[{length}]"
+                raise SourceError(spec.at, f"{found}, expected STRING or WSTRING of 1 to {MOST_CHARACTERS}")
+            start = repr(eval(kind.start)[:length]) if kind.start else ""
+            return replace(kind, name=f"{kind.name}[{length}]", high=length, start=start)
+        if isinstance(spec, tree.SubrangeType):
+            return self._subrange(spec, known)
+        if isinstance(spec, tree.ArrayType):
+            return self._array(spec, known)
+        if isinstance(spec, tree.EnumType):
+            return self._enumeration(spec, known, name)
+        assert isinstance(spec, tree.StructureType)
+        written = name or f"structure_{spec.at.line}_{spec.at.column}"
+        kind = Structure(written, "structure", python=f"_S_{written.lower()}")
+        for field in spec.fields:
+            self._add(kind, field, "VAR", (), known)
+        self._bound(kind, spec.at)
+        self.structures.append(kind)
+        return kind
+
+    def _subrange(self, spec: tree.SubrangeType, known: Expressions) -> Type:
+        of = self.named(spec.at, spec.name)
+        if isinstance(of, String):
+            raise SourceError(spec.at, f"found {spec.name}(..), expected {spec.name}[length]")
+        low, high = known.known(spec.low, "a subrange"), known.known(spec.high, "a subrange")
+        if of.kind != "int" or isinstance(of, Subrange) or not of.low <= low <= high <= of.high:
+            raise SourceError(spec.at, f"found {spec.name} ({low}..{high}), expected a rising range of an integer type")
+        return Subrange(f"{of.name} ({low}..{high})", "int", low, high, of=of)
+
+    def _array(self, spec: tree.ArrayType, known: Expressions) -> Type:
+        ranges, elements = [], 1
+        for low_node, high_node in spec.ranges:
+            low, high = known.known(low_node, "an array's bound"), known.known(high_node, "an array's bound")
+            if low > high:
+                raise SourceError(spec.at, f"found the range {low}..{high}, expected a rising one")
+            elements *= high - low + 1
+            require_small(elements, 0, spec.at)
+            ranges.append((low, high))
+        element = self._type(spec.element, known)
+        require_small(elements * element.size, elements * element.characters, spec.at)
+        shown = ", ".join(f"{low}..{high}" for low, high in ranges)
+        return Array(f"ARRAY [{shown}] OF {element.name}", "array", ranges=tuple(ranges), element=element)
+
+    def _bound(self, kind: Structure, at: Position) -> None:
+        """Keep how many levels it has, once its members are known."""
+        own = [one.type for one in kind.members.values() if one.section not in ("VAR_IN_OUT", "VAR_EXTERNAL")]
+        require_small(kind.size, kind.characters, at)
+        self._levels[kind.python] = levels = 1 + max(map(self._levels_of, own), default=0)
+        if levels > MOST_LEVELS:
+            raise SourceError(at, f"found {levels} types one within the other, expected at most {MOST_LEVELS}")
+
+    def _levels_of(self, kind: Type) -> int:
+        """Structures and blocks one within the other."""
+        while isinstance(kind, Array):
+            kind = kind.element
+        return self._levels.get(kind.python, 1) if isinstance(kind, Structure) else 0
+
+    def _enumeration(self, spec: tree.EnumType, known: Expressions, name: str) -> Type:
+        base = self.named(spec.at, spec.base) if spec.base else ELEMENTARY["INT"]
+        if base.kind not in ("int", "bits"):
+            raise SourceError(spec.at, f"found {base.name}, expected an integer type or a bit string")
+        values: list[tuple[str, int]] = []
+        taken: set[str] = set()
+        for at, word, node in spec.values:
+            value = known.known(node, word) if node is not None else values[-1][1] + 1 if values else 0
+            if word.lower() in taken:
+                raise SourceError(at, f"found {word} again, expected each value once")
+            if not base.low <= value <= base.high:
+                raise SourceError(at, f"found {value} for {word}, expected {base.name}, {base.low} to {base.high}")
+            values.append((word, value))
+            taken.add(word.lower())
+        written = name or f"enumeration_{spec.at.line}_{spec.at.column}"
+        kind = Enumeration(written, "enum", base.low, base.high, values=tuple(values))
+        for word, _ in values:
+            self.names.values.setdefault(word.lower(), []).append(kind)
+        return kind
+
+    def _declared(self, declared: tree.TypeDeclaration) -> Type:
+        known = Expressions(self.scope(None), self._calls)
+        kind = self._type(declared.type, known, declared.name)
+        if declared.initial is None:
+            return kind
+        return replace(kind, start=self._initial(declared.initial, kind, known))
+
+    def _unit(self, unit: tree.Unit) -> BlockType:
+        prefix = {"FUNCTION": "_F_", "FUNCTION_BLOCK": "_B_", "PROGRAM": "_P_"}[unit.kind]
+        result = self.type(unit.result) if unit.result is not None else None
+        kind = BlockType(
+            unit.name, "block", python=prefix + unit.name.lower(), function=unit.kind == "FUNCTION", result=result
+        )
+        self._members(kind, unit.sections, unit.kind)
+        if result is not None:
+            name = unit.name.lower()
+            if name in kind.members:
+                raise SourceError(unit.at, f"found a variable {unit.name} in the function of that name")
+            kind.members[name] = Member(unit.name, result, result.initial, "RESULT")
+        for member in kind.members.values():
+            if kind.function and isinstance(member.type, BlockType) and member.section != "VAR_IN_OUT":
+                at = Position(*member.at)
+                raise SourceError(at, f"found {member.name}, a block, in a function, expected it in a block or program")
+        self._bound(kind, unit.at)
+        return kind
+
+    def _members(self, kind: BlockType, sections: Iterable[tree.Variables], unit: str) -> None:
+        """Add the variables of a unit; unit: its kind, as `sections.py` has it."""
+        known = Expressions(self.scope(None if kind is self.names.globals else kind), self._calls)
+        for section in sections:
+            qualifiers = meaning(section, unit)
+            for declared in section.declarations:
+                self._add(kind, declared, section.section, qualifiers, known)
+
+    def _add(
+        self,
+        kind: Structure,
+        declared: tree.VariableDeclaration,
+        section: str,
+        qualifiers: tuple[str, ...],
+        known: Expressions,
+    ) -> None:
+        key = declared.name.lower()
+        if key in kind.members:
+            raise SourceError(declared.at, f"found {declared.name} again, expected another name")
+        unit = OUTSIDE if kind is self.names.globals else "PROGRAM" if kind.python.startswith("_P_") else ""
+        if (declared.tag or declared.address) and section not in LOCATED.get(unit, ()):
+            written = declared.address or f"{{tag: {declared.tag}}}"
+            where = f"{', '.join(LOCATED[unit])} of a PROGRAM" if unit else "a PROGRAM or VAR_GLOBAL only"
+            raise SourceError(declared.at, f"found {written}, expected it in {where}")
+        found = self._type(declared.type, known)
+        if isinstance(found, BlockType) and (found.function or found.python.startswith("_P_")):
+            raise SourceError(declared.at, f"found {found.name}, expected a type or a function block")
+        constant = "CONSTANT" in qualifiers
+        code, value = found.initial, None
+        if declared.initial is not None:
+            if section in ("VAR_IN_OUT", "VAR_EXTERNAL"):
+                raise SourceError(declared.initial.at, f"found an initial value in {section}, expected none")
+            code = self._initial(declared.initial, found, known)
+            if constant and found.kind not in ("array", "structure", "block"):
+                value = eval(code)
+        elif constant and section != "VAR_EXTERNAL":
+            raise SourceError(declared.at, f"found CONSTANT {declared.name} without a value, expected := and one")
+        if section == "VAR_EXTERNAL":
+            shared = self.names.globals.members.get(key)
+            if shared is None or shared.type != found:
+                there = "none of that name" if shared is None else shared.type.name
+                raise SourceError(declared.at, f"found {declared.name} : {found.name}, {there} in VAR_GLOBAL")
+        kind.members[key] = member = Member(
+            declared.name,
+            found,
+            code,
+            section,
+            constant,
+            "RETAIN" in qualifiers,
+            "NON_RETAIN" in qualifiers,
+            value,
+            declared.address,
+            declared.tag,
+            declared.at,
+        )
+        if declared.address:
+            address = address_of(declared.at, declared.address)
+            require_fit(declared.at, declared.name, found, address, constant)
+            initial = declared.initial is not None or bool(found.start)
+            self.located.append(Located(kind.python, member, address, initial))
+
+    def _initial(self, node: tree.Expression, kind: Type, known: Expressions) -> str:
+        """Code of an initial value, made of constants."""
+        if isinstance(node, tree.InitialArray):
+            return self._initial_array(node, kind, known)
+        if isinstance(node, tree.InitialStructure):
+            return self._initial_structure(node, kind, known)
+        value = known.value(node, kind)
+        if value.constant is None:
+            raise SourceError(node.at, f"found {described(value)}, expected a constant as an initial value")
+        code = converted(value, kind)
+        return repr(eval(code)) if isinstance(kind, String) else code
+
+    def _initial_array(self, node: tree.InitialArray, kind: Type, known: Expressions) -> str:
+        if not isinstance(kind, Array):
+            raise SourceError(node.at, f"found a list, expected {kind.name}")
+        (low, high), *rest = kind.ranges
+        # The values of further dimensions follow each other, as in memory.
+        size, inner, nested = high - low + 1, kind.element, isinstance(kind.element, Array)
+        for one, other in rest:
+            size *= other - one + 1
+        codes: list[str] = []
+        values = 0
+        for count, element in node.elements:
+            values += count
+            if values > size:
+                raise SourceError(node.at, f"found more than {size} values, expected at most {size}")
+            deeper = nested or not isinstance(element, tree.InitialArray)
+            if element is not None and not deeper:
+                raise SourceError(element.at, f"found a list, expected {inner.name}")
+            value = inner.initial if element is None else self._initial(element, inner, known)
+            codes.append(repeated(inner, value, count))
+        codes.append(repeated(inner, inner.initial, size - values))
+        code = f"[{', '.join(filter(None, codes))}]"
+        for one, other in reversed(rest):
+            code = f"_rows({code}, {other - one + 1})"
+        return code
+
+    def _initial_structure(self, node: tree.InitialStructure, kind: Type, known: Expressions) -> str:
+        if not isinstance(kind, Structure):
+            raise SourceError(node.at, f"found a list of fields, expected {kind.name}")
+        given = []
+        for at, name, value in node.fields:
+            member = kind.members.get(name.lower())
+            if member is None:
+                raise SourceError(
+                    at, f"found {name}, expected one of {', '.join(m.name for m in kind.members.values())}"
+                )
+            given.append(f"{member.slot}={self._initial(value, member.type, known)}")
+        return f"_with({kind.python}(), {', '.join(given)})"
+
+
+def require_small(elements: int, characters: int, at: Position, of: str = "") -> None:
+    """Raise SourceError for more elements or more text than MOST_ELEMENTS and MOST_TEXT. of: owner, for the message."""
+    if elements > MOST_ELEMENTS:
+        raise SourceError(at, f"found {elements} elements{of}, expected at most {MOST_ELEMENTS}")
+    if characters > MOST_TEXT:
+        raise SourceError(at, f"found texts of {characters} characters in all{of}, expected at most {MOST_TEXT}")

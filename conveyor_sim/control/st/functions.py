@@ -1,0 +1,285 @@
+"""The standard functions (IEC 61131-3:2013, tables 28 to 36): what each takes and gives, and its code."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.conversions import conversion, convert
+from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.expressions import Expressions
+from conveyor_sim.control.st.integers import intermediate, reach
+from conveyor_sim.control.st.types import (
+    BOOL,
+    INT,
+    LREAL,
+    MOST_CHARACTERS,
+    NUMBERS,
+    REAL,
+    STRING,
+    TIME,
+    Array,
+    String,
+    Structure,
+    Type,
+    fits,
+)
+from conveyor_sim.control.st.values import Value, converted, described, folded, operand, unified
+from conveyor_sim.control.st.work import MANY, MANY_SEARCHED
+from conveyor_sim.control.st.work import conversion as conversion_work
+
+Build = Callable[["Application"], Value]
+
+
+@dataclass(frozen=True)
+class Application:
+    """A standard function, called."""
+
+    at: Position
+    name: str
+    """In capitals."""
+    values: Sequence[Value]
+    expressions: Expressions
+    hint: Type | None
+
+    def joined(self, values: Sequence[Value]) -> Type:
+        """The type that values share."""
+        first, *others = values
+        for other in others:
+            kind = unified(first, other, self.hint)
+            if kind is None:
+                found = f"{described(first)} and {described(other)}"
+                raise SourceError(other.at, f"found {found} in {self.name}, expected values of one type")
+            literal = first.literal if first.literal and other.literal else ""
+            known = first.constant if first.literal and not other.literal else other.constant
+            first = Value(first.at, kind, "", known if literal else None, literal)
+        if first.literal and self.hint is not None and self.hint.base in NUMBERS:
+            return self.hint.base if first.literal == "int" or self.hint.base.kind == "real" else LREAL
+        return first.type.base
+
+    def given(self, code: str, kind: Type, values: Sequence[Value] = ()) -> Value:
+        """Return the result. values: candidates of a result that is one of them, which is as wide as they are."""
+        reached = [reach(one, kind) for one in values] if kind.kind == "int" else []
+        span = (min(low for low, _ in reached), max(high for _, high in reached)) if reached else None
+        return folded(Value(self.at, kind, code, span=span), *self.values)
+
+    def refuse(self, value: Value, expected: str) -> SourceError:
+        """What is said where an argument can't be."""
+        return SourceError(value.at, f"found {described(value)} in {self.name}, expected {expected}")
+
+    def whole(self, value: Value) -> str:
+        """Code of a whole number."""
+        if value.type.base.kind != "int" or value.literal == "real":
+            raise self.refuse(value, "a whole number")
+        return value.code
+
+    def text(self, value: Value) -> str:
+        """Code of a text."""
+        if value.type.kind != "string":
+            raise self.refuse(value, "a STRING")
+        return value.code
+
+
+def _real(call: Application) -> Value:
+    kind = REAL if REAL in (call.hint, call.values[0].type) else LREAL
+    if any(one.type == LREAL and not one.literal for one in call.values):
+        kind = LREAL
+    for one in call.values:
+        if not (one.literal or fits(one.type, kind)):
+            raise call.refuse(one, "a REAL or LREAL")
+    code = f"_{call.name.lower()}({', '.join(converted(one, kind) for one in call.values)})"
+    return call.given(f"_single({code})" if kind == REAL else code, kind)
+
+
+def _abs(call: Application) -> Value:
+    (value,) = call.values
+    kind = call.joined([value])
+    if kind.kind not in ("int", "real"):
+        raise call.refuse(value, "a number")
+    code = f"abs({operand(value, kind)})"
+    if kind.kind == "real":
+        return call.given(code, kind)
+    return folded(intermediate(call.at, kind, code, 0, max(map(abs, reach(value, kind)))), value)
+
+
+def _operator(word: str) -> Build:
+    def build(call: Application) -> Value:
+        first, *others = call.values
+        empty = tree.Name(call.at, "")
+        for other in others:
+            first = call.expressions.binary(tree.Binary(call.at, word, empty, empty), first, other, call.hint)
+        return first
+
+    return build
+
+
+def _compare(call: Application) -> Value:
+    kind = call.joined(call.values)
+    if isinstance(kind, (Array, Structure)):
+        raise call.refuse(call.values[0], "an elementary type")
+    codes = [one.code if kind.kind == "string" else operand(one, kind) for one in call.values]
+    call.expressions.work += len(codes)
+    return call.given(f"_chain(_{call.name.lower()}, {', '.join(codes)})", BOOL)
+
+
+def _pick(python: str, ordered: bool, before: int = 0) -> Build:
+    """SEL, MUX: the values behind so many others, of one type; MAX, MIN, LIMIT: of one that has an order."""
+
+    def build(call: Application) -> Value:
+        choice, values = call.values[:before], call.values[before:]
+        kind = call.joined(values)
+        if ordered and (isinstance(kind, (Array, Structure)) or kind == BOOL):
+            raise call.refuse(values[0], "numbers, times or texts")
+        codes = [one.code if kind.kind == "string" else operand(one, kind) for one in values]
+        if kind.kind == "string":
+            kind = STRING if not call.values else max((one.type for one in values), key=lambda one: one.high)
+        if python == "SEL":
+            code = f"_sel({converted(choice[0], BOOL, 'G of SEL')}, {', '.join(codes)})"
+        else:
+            code = f"{python}({', '.join([*(call.whole(one) for one in choice), *codes])})"
+        return call.given(code, kind, values)
+
+    return build
+
+
+def _shift(call: Application) -> Value:
+    value, by = call.values
+    kind = value.type.base
+    if value.literal and call.hint is not None:
+        kind = call.hint.base
+    if kind.kind != "bits":
+        raise call.refuse(value, "BYTE, WORD, DWORD or LWORD")
+    code = converted(value, kind)
+    return call.given(f"_shift({code}, {call.whole(by)}, {kind.width}, {call.name!r})", kind)
+
+
+def _texts(parameters: str, result: str) -> Build:
+    """s for a text, n for a whole number; the result is a text of the first one's length, or a number."""
+
+    def build(call: Application) -> Value:
+        letters = parameters if len(parameters) >= len(call.values) else parameters[0] * len(call.values)
+        codes = [
+            call.text(one) if letter == "s" else call.whole(one)
+            for letter, one in zip(letters, call.values, strict=True)
+        ]
+        python = "len" if call.name == "LEN" else f"_{call.name.lower()}"
+        grows = call.name in ("CONCAT", "INSERT", "REPLACE")
+        texts = [one.type for one in call.values if one.type.kind == "string"]
+        if result != "n" or len(texts) > 1:
+            python += "_counted" if sum(one.high for one in texts) > (MANY_SEARCHED if result == "n" else MANY) else ""
+        most = sum(one.high for one in texts) if grows else texts[0].high
+        longest = min(MOST_CHARACTERS, most)
+        kind = INT if result == "n" else String(texts[0].name.partition("[")[0], "string", 0, longest)
+        return call.given(f"{python}({', '.join(codes)})", kind)
+
+    return build
+
+
+def _convert(call: Application, name: str) -> Value:
+    (value,) = call.values
+    result = convert(call.at, name, value, call.hint)
+    call.expressions.work += conversion_work(value.type, result.type)
+    return result
+
+
+def _move(call: Application) -> Value:
+    return call.values[0]
+
+
+def _now(call: Application) -> Value:
+    return Value(call.at, TIME, "_rt.now")
+
+
+@dataclass(frozen=True)
+class Standard:
+    """Names of its parameters; the last ends in "..." where there may be any number more."""
+
+    parameters: tuple[str, ...]
+    build: Build
+
+
+def _standard(parameters: str, build: Build) -> Standard:
+    return Standard(tuple(parameters.split()), build)
+
+
+FUNCTIONS: dict[str, Standard] = {
+    **{
+        name: _standard("IN", _real)
+        for name in ["SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN"]
+    },
+    "ATAN2": _standard("Y X", _real),
+    "ABS": _standard("IN", _abs),
+    "EXPT": _standard("IN1 IN2", _operator("**")),
+    "ADD": _standard("IN1 IN2...", _operator("+")),
+    "MUL": _standard("IN1 IN2...", _operator("*")),
+    "SUB": _standard("IN1 IN2", _operator("-")),
+    "DIV": _standard("IN1 IN2", _operator("/")),
+    "ADD_TIME": _standard("IN1 IN2", _operator("+")),
+    "SUB_TIME": _standard("IN1 IN2", _operator("-")),
+    "MUL_TIME": _standard("IN1 IN2", _operator("*")),
+    "DIV_TIME": _standard("IN1 IN2", _operator("/")),
+    "MOVE": _standard("IN", _move),
+    "SEL": _standard("G IN0 IN1", _pick("SEL", False, 1)),
+    "MUX": _standard("K IN0 IN1...", _pick("_mux", False, 1)),
+    "MAX": _standard("IN1 IN2...", _pick("max", True)),
+    "MIN": _standard("IN1 IN2...", _pick("min", True)),
+    "LIMIT": _standard("MN IN MX", _pick("_limit", True)),
+    **{name: _standard("IN1 IN2...", _compare) for name in ["GT", "GE", "EQ", "LE", "LT"]},
+    "NE": _standard("IN1 IN2", _operator("<>")),
+    **{name: _standard("IN N", _shift) for name in ["SHL", "SHR", "ROL", "ROR"]},
+    "LEN": _standard("IN", _texts("s", "n")),
+    "LEFT": _standard("IN L", _texts("sn", "s")),
+    "RIGHT": _standard("IN L", _texts("sn", "s")),
+    "MID": _standard("IN L P", _texts("snn", "s")),
+    "CONCAT": _standard("IN1 IN2...", _texts("s", "s")),
+    "INSERT": _standard("IN1 IN2 P", _texts("ssn", "s")),
+    "DELETE": _standard("IN L P", _texts("snn", "s")),
+    "REPLACE": _standard("IN1 IN2 L P", _texts("ssnn", "s")),
+    "FIND": _standard("IN1 IN2", _texts("ss", "n")),
+    "TIME": _standard("", _now),
+}
+"""By name."""
+
+
+def is_standard(name: str) -> bool:
+    """Whether there is a standard function of a name."""
+    return name.upper() in FUNCTIONS or conversion(name, None) is not None
+
+
+def apply(
+    at: Position, name: str, given: Sequence[tuple[str | None, Value]], expressions: Expressions, hint: Type | None
+) -> Value:
+    """A standard function, called with values by position or by name. Raises SourceError."""
+    found = FUNCTIONS.get(name.upper()) or _standard("IN", lambda call: _convert(call, name))
+    plain = tuple(one.removesuffix("...") for one in found.parameters)
+    more = plain != found.parameters
+    if given and given[0][0] is not None:
+        values = _by_name(at, name, given, plain, more)
+    else:
+        values = [value for _, value in given]
+    if len(values) < len(plain) or (len(values) > len(plain) and not more):
+        expected = f"{len(plain)}{' or more' if more else ''}: {', '.join(plain)}" if plain else "none"
+        raise SourceError(at, f"found {len(values)} arguments of {name}, expected {expected}")
+    expressions.work += 1
+    for one in values:
+        if one.type.kind in ("block", "void"):
+            raise SourceError(one.at, f"found {described(one)} in {name}, expected a value")
+    return found.build(Application(at, name.upper(), values, expressions, hint))
+
+
+def _by_name(
+    at: Position, name: str, given: Sequence[tuple[str | None, Value]], plain: tuple[str, ...], more: bool
+) -> list[Value]:
+    by_name = {str(word).upper(): value for word, value in given}
+    names = list(plain)
+    if more:
+        stem, start = re.fullmatch(r"([A-Z]+)(\d+)", plain[-1]).groups()  # type: ignore[union-attr]
+        names += [f"{stem}{number}" for number in range(int(start) + 1, int(start) + len(given))]
+    for word, _ in given:
+        if str(word).upper() not in names:
+            raise SourceError(at, f"found {word} of {name}, expected {', '.join(plain)}")
+    if len(by_name) != len(given):
+        raise SourceError(at, f"found an argument of {name} twice, expected each once")
+    return [by_name[word] for word in names if word in by_name]

@@ -1,0 +1,74 @@
+"""Arithmetic of integers: intermediate results with the width of `register`, and the range that each can have.
+
+The range says where no code for two's complement is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from conveyor_sim.control.st import tree
+from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.operations import divide
+from conveyor_sim.control.st.types import Type, register
+from conveyor_sim.control.st.values import Value, operand, within
+
+_EXACT_IN_LREAL = 1 << 53
+
+
+def reach(value: Value, kind: Type) -> tuple[int, int]:
+    """Return the least and greatest value of `operand`."""
+    wide = register(kind)
+    return value.bounds if within(value, wide) else (wide.low, wide.high)
+
+
+def intermediate(at: Position, kind: Type, code: str, low: int, high: int) -> Value:
+    """Return a result of integers from low to high: wrapped in two's complement where `register` can't hold it.
+
+    code stands by itself.
+    """
+    wide = register(kind)
+    if wide.low <= low and high <= wide.high:
+        return Value(at, kind, code, span=(low, high))
+    return Value(at, kind, wide.wrapped(code), span=(wide.low, wide.high))
+
+
+def negated(at: Position, kind: Type, value: Value) -> Value:
+    """Return -value."""
+    low, high = reach(value, kind)
+    return intermediate(at, kind, f"(-{operand(value, kind)})", -high, -low)
+
+
+def computed(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
+    """Return left operator right of two integers. kind: the type that they share. Raise SourceError."""
+    word, wide = node.operator, register(kind)
+    a, b = operand(left, kind), operand(right, kind)
+    (least, most), (low, high) = reach(left, kind), reach(right, kind)
+    if word == "/":
+        return _divided(node, kind, left, right)
+    if word == "MOD":
+        return Value(node.at, kind, f"_modulo({a}, {b})", span=(min(least, 0), max(most, 0)))
+    if word == "*":
+        ends = [one * other for one in (least, most) for other in (low, high)]
+        return intermediate(node.at, kind, f"({a} * {b})", min(ends), max(ends))
+    # A sum of sums wraps once: two's complement is a ring.
+    chained = left.kind == "sum" and left.type.base.kind == "int" and register(left.type.base).width == wide.width
+    raw = f"{left.raw if chained else a} {word} {b}"
+    if chained and left.code != f"({left.raw})":  # wrapped already
+        found = Value(node.at, kind, wide.wrapped(raw), span=(wide.low, wide.high))
+    else:
+        ends = [least + low, most + high] if word == "+" else [least - high, most - low]
+        found = intermediate(node.at, kind, f"({raw})", *ends)
+    return replace(found, raw=raw, kind="sum")
+
+
+def _divided(node: tree.Binary, kind: Type, left: Value, right: Value) -> Value:
+    a, b = operand(left, kind), operand(right, kind)
+    (least, most), (low, high) = reach(left, kind), reach(right, kind)
+    if low == high == 0:
+        raise SourceError(right.at, "found a division by 0, expected another divisor")
+    greatest = max(abs(least), abs(most))
+    if low == high > 0 and greatest <= _EXACT_IN_LREAL:
+        return Value(node.at, kind, f"int({a} / {b})", span=(divide(least, low), divide(most, low)))
+    lowest = 0 if least >= 0 and low >= 0 else -greatest
+    return intermediate(node.at, kind, f"_divide({a}, {b})", lowest, greatest)

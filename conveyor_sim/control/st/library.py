@@ -1,0 +1,170 @@
+"""`CompiledProgram`: a shared library that any compiler has made of a PLC program, as a controller."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import weakref
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.recorded import PREFIX, patterns
+from conveyor_sim.control.scan import ALARMS, ControlError, Inputs
+from conveyor_sim.control.st.exchange import AnswerError, EndedError, exchange
+from conveyor_sim.support.rounded_limit import at_limit
+
+PATIENCE = 60.0
+"""Wall time of a call from its request to the end of its answer, s; beyond it the watchdog ends the program."""
+
+MOST_BYTES = 65_536
+"""Length of an answer; each output value may add _VALUE_BYTES, a snapshot MOST_STATE_BYTES."""
+
+MOST_STATE_BYTES = 86_000_000
+"""Length of a snapshot's answer: 64 MB of state in base 64."""
+
+_VALUE_BYTES = 32
+
+_MOMENT = 1.0
+"""s of wall time that the end of a program may take."""
+
+_NS = 1e9
+
+
+class CompiledProgram:
+    """A library with the functions of include/conveyor_sim_plc.h, in a process of its own: a crash is an error here.
+
+    Two share nothing, whatever variables the library keeps outside of its instances.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        tags: Mapping[str, str],
+        *,
+        patience: float = PATIENCE,
+        record: str | Iterable[str] = (),
+    ) -> None:
+        """path: of the library. tags: by variable, as the library names it. patience: s of wall time for a scan.
+        record: patterns of variables that are recorded, of those with tags ("*", `control/recorded.py`).
+
+        Raises ControlError for a library that can't be loaded.
+        """
+        self._path, self._tags, self._patience = Path(path), dict(tags), patience
+        self.record = patterns(record)
+        """Of variables that are recorded."""
+        if not self._path.is_file():
+            raise ControlError(f"{path}: no such file, expected a shared library")
+        if not self._tags:
+            raise ControlError(f"{path}: found no tags, expected a tag for each variable that is to have one")
+        self._ins: list[str] = []
+        self._outs: list[str] = []
+        self._limits: Mapping[str, tuple[float, float]] = {}
+        self._shown: dict[str, float] = {}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "conveyor_sim.control.st.library_host", str(self._path.resolve())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+        )
+        self.close = weakref.finalize(self, _end, self._process)
+        """Ends the process; so does the end of this object."""
+        self._call("bind", [])
+
+    def bind(self, tags: LineTags) -> None:
+        """Tie variables to their tags: signals in, commands and alarms out. Raises ControlError."""
+        if self._ins or self._outs:
+            raise ControlError(f"{self._path}: found a second line, expected a new CompiledProgram for each")
+        variables = []
+        for name, tag in self._tags.items():
+            out = tag in tags.commands or tag.startswith(ALARMS)
+            if not (out or tag in tags.signals):
+                raise ControlError(f"{self._path}: {name}: found {tag}, expected a tag of this line")
+            (self._outs if out else self._ins).append(tag)
+            variables.append((name, int(out)))
+        self._call("bind", variables)
+        self._limits = tags.limits
+        self._names = {tag: f"{PREFIX}{name}" for name, tag in self._tags.items()}
+        self._shown = dict.fromkeys(self._names.values(), 0.0)
+
+    def scan(self, inputs: Inputs) -> Mapping[str, float]:
+        """Commands and alarms. Raises ControlError if the program stops, crashes, or does not end its scan."""
+        values = [inputs[tag] for tag in self._ins]
+        found = self._call("scan", round(inputs.time * _NS), values)
+        # A REAL comes as a double, but has no more digits for that.
+        answer = {
+            tag: at_limit(value, *self._limits[tag]) if tag in self._limits else value
+            for tag, value in zip(self._outs, found, strict=True)
+        }
+        self._shown = {
+            self._names[tag]: value for tag, value in (*zip(self._ins, values, strict=True), *answer.items())
+        }
+        return answer
+
+    @property
+    def variables(self) -> Mapping[str, float]:
+        """Those that have tags, as plc/<name>, of the last scan; before the first 0."""
+        return self._shown
+
+    def snapshot(self) -> dict[str, Any]:
+        """The program's state, as plain data."""
+        return {"state": self._call("snapshot")}
+
+    def restore(self, data: Mapping[str, Any]) -> None:
+        """Go on from there. Raises ControlError for what the program does not take."""
+        self._call("restore", data["state"])
+
+    def _call(self, do: str, *given: Any) -> Any:
+        request = json.dumps({"do": do, "with": given}).encode() + b"\n"
+        most = MOST_BYTES + (MOST_STATE_BYTES if do == "snapshot" else _VALUE_BYTES * len(self._outs))
+        try:
+            answer = _answer(exchange(self._process, request, self._patience, most))
+            if do == "scan":
+                _require_numbers(answer.get("answer", [0.0] * len(self._outs)), len(self._outs))
+        except EndedError:
+            raise ControlError(f"{self._path}: {self._ended()} in {do}, expected an answer") from None
+        except AnswerError as error:
+            self._process.kill()
+            self.close()
+            raise ControlError(f"{self._path}: watchdog: {do} {error}, expected one answer in time") from None
+        if "error" in answer:
+            raise ControlError(f"{self._path}: {answer['error']}")
+        return answer["answer"]
+
+    def _ended(self) -> str:
+        code = self._process.wait()
+        return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+
+
+def _answer(line: bytes) -> dict[str, Any]:
+    """Return an answer of `library_host`. Raises AnswerError."""
+    try:
+        answer = json.loads(line)
+    except (ValueError, RecursionError):
+        answer = None
+    if not isinstance(answer, dict) or not (isinstance(answer.get("error"), str) or "answer" in answer):
+        raise AnswerError("sent a line that is no answer")
+    return answer
+
+
+def _require_numbers(values: Any, count: int) -> None:
+    """Raise AnswerError unless these are the values of all outputs."""
+    if not isinstance(values, list) or len(values) != count or not all(type(value) is float for value in values):
+        raise AnswerError(f"sent a line without the values of {count} outputs")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Have it destroy its instance, for which it has a moment."""
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            with suppress(BrokenPipeError):
+                stream.close()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(_MOMENT)
+    process.kill()
+    process.wait()

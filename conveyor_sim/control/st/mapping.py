@@ -1,0 +1,239 @@
+"""Which variable is which tag of a line: by a pragma, by the caller's word, by its address in a map, by its name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from conveyor_sim.control.line_tags import LineTags
+from conveyor_sim.control.scan import ALARMS
+from conveyor_sim.control.st.compile import Compiled
+from conveyor_sim.control.st.errors import Position, StructuredTextError
+from conveyor_sim.control.st.located import address_of, overlapping
+from conveyor_sim.control.st.types import ELEMENTARY, Member, Type
+from conveyor_sim.support.modbus_rows import GONE, WORDS, read_map
+
+_TABLES = {
+    ("I", True): "discrete input",
+    ("Q", True): "coil",
+    ("I", False): "input register",
+    ("Q", False): "holding register",
+}
+
+_LISTED = 20
+"""Names in a sentence."""
+
+Addresses = Mapping[tuple[str, int], tuple[str, object]]
+"""Tag and type in Modbus by table and address."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A variable that is a tag."""
+
+    variable: str
+    """Its whole name: main/speed."""
+    tag: str
+    type: Type
+    is_input: bool
+    how: str
+    """tag, address or name."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """All of a program's; and what is left over on either side."""
+
+    bound: tuple[Bound, ...]
+    variables: tuple[str, ...]
+    """Inputs, outputs and located variables without a tag."""
+    commands: tuple[str, ...]
+    """Commands of the line that the program does not give."""
+
+    def left_over(self) -> tuple[str, ...]:
+        """What is left on either side, in words."""
+        said = (("no tag for", self.variables), ("these commands are not given:", self.commands))
+        return tuple(f"{words} {_listed(names)}" for words, names in said if names)
+
+    def __str__(self) -> str:
+        lines = [f"{one.variable} {'<-' if one.is_input else '->'} {one.tag} (by {one.how})" for one in self.bound]
+        lines += [f"{name}: no tag" for name in self.variables]
+        lines += [f"{name}: a command that the program does not give" for name in self.commands]
+        return "\n".join(lines)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def read_addresses(path: Path) -> Addresses:
+    """Return the tags of a Modbus map (docs/scada.md) by table and address. Raise MapError if it can't be read."""
+    return {
+        (row.table, row.address): (row.name, "bool" if row.type == "bool" else 16 * WORDS[row.type])
+        for row in read_map(path)
+        if row.description != GONE
+    }
+
+
+def mapped(compiled: Compiled, tags: LineTags, given: Mapping[str, str], addresses: Addresses) -> Mapped:
+    """The mapping of a program on a line.
+
+    given: tags by variable. Raises StructuredTextError for a variable or tag that there is not, for a type that does
+    not fit, for a direction that can't be, and for a command that two variables give.
+    """
+    file = compiled.file
+    candidates = list(_candidates(compiled))
+    known = {one.name for one in candidates}
+    groups = {one.name: one.group for one in candidates if one.group is not None}
+    for name in given:
+        if name.lower() not in known:
+            raise StructuredTextError(
+                f"{file}: found {name} among the tags, expected one of {', '.join(known) or 'none'}"
+            )
+    wanted = {name.lower(): tag for name, tag in given.items()}
+    by_identifier = _by_identifier(tags)
+    bound: list[Bound] = []
+    left: list[str] = []
+    for name, member, shared in ((one.name, one.member, one.is_global) for one in candidates):
+        where = f"{file}:{member.at[0]}:{member.at[1]}: {member.name}"
+        tag, how = wanted.get(name) or member.tag, "tag"
+        if not tag and member.address:
+            tag, how = _located(where, member, addresses), "address"
+        if not tag and (member.section in ("VAR_INPUT", "VAR_OUTPUT") or shared) and not member.constant:
+            tag, how = by_identifier.get(member.name.lower(), ""), "name"
+        if tag:
+            bound.append(_checked(where, name, member, tag, how, tags))
+        elif member.address or member.section in ("VAR_INPUT", "VAR_OUTPUT"):
+            left.append(name)
+    given_by: dict[str, str] = {}
+    for one in bound:
+        other = given_by.get(one.tag, one.variable)
+        if not one.is_input and groups.get(other, other) != groups.get(one.variable, one.variable):
+            both = f"{other} and {one.variable}"
+            raise StructuredTextError(f"{file}: {one.tag}: found {both} for it, expected one variable")
+        if not one.is_input:
+            given_by[one.tag] = one.variable
+    _require_one_tag(file, bound, groups)
+    if not addresses:
+        _require_apart(file, candidates, bound)
+    tagged = {groups[one.variable] for one in bound if one.variable in groups}
+    left = [name for name in left if groups.get(name) not in tagged]
+    return Mapped(tuple(bound), tuple(left), tuple(name for name in tags.commands if name not in given_by))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A variable that may be a tag, by its full name. group: number of the memory that it shares; None: not shared."""
+
+    name: str
+    member: Member
+    is_global: bool
+    group: int | None
+
+
+def _candidates(compiled: Compiled) -> Iterator[Candidate]:
+    for member in compiled.globals.members.values():
+        group = compiled.shared.get((compiled.globals.python, member.slot))
+        yield Candidate(member.name.lower(), member, True, group)
+    for program in compiled.programs:
+        for member in program.type.members.values():
+            if member.section != "VAR_EXTERNAL":
+                group = compiled.shared.get((program.type.python, member.slot))
+                yield Candidate(f"{program.name.lower()}/{member.name.lower()}", member, False, group)
+
+
+def _by_identifier(tags: LineTags) -> dict[str, str]:
+    """Tags by what they are called as a variable: belts_zone1_cmd_speed. Those that two would have are left out."""
+    found: dict[str, str] = {}
+    for tag in (*tags.signals, *tags.commands):
+        name = re.sub(r"\W", "_", tag).lower()
+        found[name] = "" if name in found else tag
+    return found
+
+
+def _located(where: str, member: Member, addresses: Addresses) -> str:
+    address = address_of(Position(*member.at), member.address)
+    if address.area == "M":
+        return ""
+    table = _TABLES[address.area, address.size == "X"]
+    if (found := addresses.get((table, address.number))) is None:
+        return ""
+    tag, there = found
+    if there != ("bool" if address.size == "X" else address.bits):
+        expected = "one bit" if there == "bool" else f"{there} bits"
+        raise StructuredTextError(
+            f"{where}: found {member.address} for {tag}, expected {expected} at {table} {address.number}"
+        )
+    return tag
+
+
+def _require_one_tag(file: str, bound: list[Bound], groups: Mapping[str, int]) -> None:
+    """Raise StructuredTextError for two tags of variables that share memory."""
+    tags: dict[int, Bound] = {}
+    for one in bound:
+        if one.variable in groups and (other := tags.setdefault(groups[one.variable], one)).tag != one.tag:
+            found = f"{one.tag} for {one.variable}, and {other.tag} for {other.variable}"
+            raise StructuredTextError(f"{file}: found {found}, expected one tag, because they share memory")
+
+
+def _require_apart(file: str, candidates: Iterable[Candidate], bound: list[Bound]) -> None:
+    """Raise StructuredTextError for variables of %I or %Q that a PLC would overlap. Used without a Modbus map."""
+    tagged = {one.variable for one in bound}
+    spans = []
+    for one in candidates:
+        if one.member.address and not one.member.address.startswith("%M"):
+            address = address_of(Position(*one.member.at), one.member.address)
+            start = address.number * address.bits
+            spans.append((address.area, start, start + address.bits, one))
+    for group in overlapping(spans):
+        own = {one.group if one.group is not None else one.name for one in group}
+        free = [one for one in group if one.name not in tagged]
+        if len(own) > 1 and free:
+            other = next(one for one in group if one is not free[0])
+            found = f"{free[0].name} at {free[0].member.address}, {other.name} at {other.member.address}"
+            expected = "a tag for each or other addresses: bits and registers are two memories"
+            raise StructuredTextError(f"{file}: found {found}, expected {expected}")
+
+
+def _checked(where: str, name: str, member: Member, tag: str, how: str, tags: LineTags) -> Bound:
+    inward = member.section == "VAR_INPUT" or member.address.startswith("%I")
+    outward = member.section == "VAR_OUTPUT" or member.address.startswith("%Q")
+    is_alarm = tag.startswith(ALARMS) and not inward
+    if is_alarm:
+        kind, is_input = "bool", False
+    elif tag in tags.signals:
+        kind, is_input = tags.signals[tag], True
+    elif tag in tags.commands:
+        kind, is_input = tags.commands[tag], False
+    else:
+        first = tag.split("/")[0] + "/"
+        alike = [one for one in (*tags.signals, *tags.commands) if one.startswith(first)]
+        listed = f"one of {', '.join(alike[:_LISTED])}" if alike else f"a tag of this line, which has no {first}"
+        raise StructuredTextError(f"{where}: found {tag}, expected {listed}")
+    if (is_input and outward) or (inward and not is_input):
+        direction = "a command" if outward else "a signal"
+        raise StructuredTextError(f"{where}: found {tag}, expected {direction}")
+    if member.constant:
+        raise StructuredTextError(f"{where}: found a CONSTANT for {tag}, expected a variable")
+    if not _suits(member.type, kind):
+        wanted = {"bool": "BOOL", "number": "REAL or LREAL (TIME for seconds)"}.get(kind, "an integer type")
+        raise StructuredTextError(f"{where}: found {member.type.name} for {tag}, a {kind}, expected {wanted}")
+    return Bound(name, tag, member.type, is_input, how)
+
+
+def _suits(kind: Type, tag: str) -> bool:
+    """Whether a variable can hold a tag's values; the kind of a tag is "" where it is not known."""
+    base = kind.base
+    if base.name not in ELEMENTARY and base.kind != "enum":
+        return False
+    allowed = {
+        "bool": ("bool",),
+        "number": ("real", "time"),
+        "count": ("int", "real"),
+        "enumeration": ("int", "enum", "bits"),
+        "": ("bool", "int", "real", "bits", "enum", "time"),
+    }
+    return base.kind in allowed[tag]

@@ -1,0 +1,127 @@
+"""What is said where a text can't be parsed: what was found, and what was expected, in the words of the language."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from lark import Token
+
+from conveyor_sim.control.st.errors import Position, SourceError
+
+_DATES = "dates and times of day"
+
+REFUSED: Mapping[str, str] = {
+    **dict.fromkeys(("POINTER", "REF_TO"), "pointers and references"),
+    **dict.fromkeys(("CLASS", "INTERFACE", "EXTENDS", "IMPLEMENTS", "NAMESPACE"), "classes, methods and namespaces"),
+    **dict.fromkeys(("INITIAL_STEP", "END_STEP", "END_TRANSITION", "END_ACTION"), "SFC"),
+    **dict.fromkeys(("VAR_ACCESS", "VAR_CONFIG"), "access paths and VAR_CONFIG"),
+    **dict.fromkeys(("VAR_STAT", "VAR_INST"), "VAR_STAT and VAR_INST; VAR of a block keeps its values"),
+    **dict.fromkeys(("DATE", "TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT"), _DATES),
+    **dict.fromkeys(("D#", "DATE#", "TIME_OF_DAY#", "TOD#", "DATE_AND_TIME#", "DT#"), _DATES),
+    **dict.fromkeys(("LDATE", "LTIME_OF_DAY", "LTOD", "LDATE_AND_TIME", "LDT"), _DATES),
+    **dict.fromkeys(("LD#", "LDATE#", "LTIME_OF_DAY#", "LTOD#", "LDATE_AND_TIME#", "LDT#"), _DATES),
+}
+"""Words of the standard, and of dialects, that are not for this interpreter, and what they belong to."""
+
+SUSPECT: Mapping[str, str] = {
+    **dict.fromkeys(("REFERENCE", "REF", "ADR"), "pointers and references"),
+    **dict.fromkeys(("METHOD", "PROPERTY", "THIS", "SUPER", "USING"), "classes, methods and namespaces"),
+    **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"), "access specifiers"),
+    **dict.fromkeys(("STEP", "TRANSITION", "ACTION"), "SFC"),
+    **dict.fromkeys(("JMP", "GOTO"), "jumps"),
+    **dict.fromkeys(("UNION",), "unions"),
+    **dict.fromkeys(("R_EDGE", "F_EDGE"), "R_EDGE and F_EDGE, which R_TRIG and F_TRIG do"),
+}
+"""The same of words that may be names: so they are where the text makes sense with them as names."""
+
+_WORDS = {
+    "NAME": "a name",
+    "PREFIX": "a value with its type",
+    "INTEGER": "a whole number",
+    "SEMICOLON": "';'",
+    "COLON": "':'",
+    "COMMA": "','",
+    "DOT": "'.'",
+    "LPAR": "'('",
+    "RPAR": "')'",
+    "LSQB": "'['",
+    "RSQB": "']'",
+    "ADDRESS": "an address such as %IX0.0",
+    "SECTION": "VAR",
+    "$END": "the end of the file",
+    "__ANON_0": "':='",
+    "__ANON_1": "'..'",
+    "__ANON_2": "'=>'",
+}
+_WORD = re.compile(r"\w+")
+_COMMENT = re.compile(r"\(\*|\*\)")
+_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
+_OPERATORS = {
+    *("OR", "OR_ELSE", "XOR", "AND", "AMPERSAND", "AND_THEN", "MOD", "EQUALS", "DIFFERS", "LESS", "GREATER"),
+    *("AT_MOST", "AT_LEAST", "PLUS", "MINUS", "TIMES", "OVER", "POWER"),
+}
+_VALUES = {
+    *("INTEGER", "BASED", "DECIMAL", "TIME", "TEXT", "WIDE_TEXT", "TRUE", "FALSE", "PREFIX", "NOT", "PLUS", "MINUS"),
+    *("NAME", "LPAR"),
+}
+
+
+def at_of(token: Token) -> Position:
+    """Where a token begins."""
+    return Position(token.line or 1, token.column or 1)
+
+
+def place_of(text: str, index: int) -> Position:
+    """Line and column of a character."""
+    return Position(text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index))
+
+
+def not_refused(token: Token) -> Token:
+    """A name, or what stands before #. Raises SourceError for a word of what is not supported."""
+    if what := REFUSED.get(token.value.upper()):
+        raise SourceError(at_of(token), f"found {token.value}, expected a program without {what}")
+    return token
+
+
+def _ends(text: str, place: int) -> bool:
+    """Whether a comment ends, and those within it."""
+    depth = 0
+    for match in _COMMENT.finditer(text, place):
+        depth += 1 if match.group() == "(*" else -1
+        if depth == 0:
+            return True
+    return False
+
+
+def unexpected(error: Any, text: str) -> SourceError:
+    """What is said of lark's UnexpectedToken in a text."""
+    token = error.token
+    place = len(text) if token.type == "$END" else error.pos_in_stream
+    for match in (*list(_WORD.finditer(text, 0, place))[-1:], *_WORD.finditer(text, place, place + len(token.value))):
+        if what := SUSPECT.get(match.group().upper()):
+            return SourceError(
+                place_of(text, match.start()), f"found {match.group()}, expected a program without {what}"
+            )
+    if text.startswith("(*", place):
+        if _ends(text, place):
+            return SourceError(at_of(token), "found comments three deep, expected at most one within another")
+        return SourceError(at_of(token), "found a comment that does not end, expected *)")
+    if token.type == "ADDRESS":
+        return SourceError(at_of(token), f"found {token}, expected a variable that is declared AT {token}")
+    found = "the end of the file" if token.type == "$END" else f"'{token.value}'"
+    expected = set(error.accepts or error.expected)
+    words = []
+    if expected >= _STATEMENTS:
+        expected -= _STATEMENTS | {"NAME", "PREFIX", "SEMICOLON"}
+        words.append("a statement")
+    if expected >= _VALUES:
+        expected -= _VALUES
+        words.append("a value")
+    if expected >= _OPERATORS:
+        expected -= _OPERATORS
+        words.append("an operator")
+    words += sorted(_WORDS.get(name, name) for name in expected)
+    listed = words[0] if len(words) == 1 else f"one of {', '.join(words)}"
+    return SourceError(at_of(token), f"found {found}, expected {listed}")

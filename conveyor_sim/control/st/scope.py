@@ -1,0 +1,140 @@
+"""What names mean inside a unit: its own variables, global ones, constants, values of enumerations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+
+from conveyor_sim.control.st.errors import Position, SourceError
+from conveyor_sim.control.st.types import BlockType, Enumeration, Member, Type
+from conveyor_sim.control.st.values import Place, Value, constant
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A name that is no variable, in words."""
+
+    what: str
+
+
+@dataclass
+class Names:
+    """What is known in all units of a file, by name in small letters; it grows as the file is read."""
+
+    types: dict[str, Type] = field(default_factory=dict)
+    """Derived types, blocks and programs."""
+    functions: dict[str, BlockType] = field(default_factory=dict)
+    globals: BlockType = field(default_factory=lambda: BlockType("VAR_GLOBAL", "block", python="_Globals"))
+    values: dict[str, list[Enumeration]] = field(default_factory=dict)
+    """Which enumerations have a value of a name."""
+    reading: set[str] = field(default_factory=set)
+    """Global variables that are being taken up."""
+    read: Callable[[str], None] = lambda key: None
+    """Takes up the global variable of a name, if it stands further down in the file."""
+
+    def global_(self, key: str) -> Member | None:
+        """A global variable; None if there is none of that name."""
+        if key not in self.globals.members:
+            self.read(key)
+        return self.globals.members.get(key)
+
+
+class Scope:
+    """The names of one unit; with `unit` None those outside of all units."""
+
+    def __init__(self, names: Names, unit: BlockType | None) -> None:
+        self.names = names
+        self.unit = unit
+
+    def find(self, at: Position, name: str) -> Place | Thing:
+        """A variable, or what else the name is. Raises SourceError for a name that nothing has."""
+        key = name.lower()
+        if self.unit is not None and (member := self.unit.members.get(key)):
+            if member.section == "VAR_EXTERNAL":
+                place = self._global(at, key, name)
+                return replace(place, fixed=place.fixed or f"{name}, a CONSTANT") if member.constant else place
+            return place_of(at, "self", member, inside=True)
+        if self.names.global_(key) is not None:
+            return self._global(at, key, name)
+        for known, what in self._others():
+            if key in known:
+                return Thing(what)
+        if key in self.names.reading:
+            raise SourceError(at, f"found {name} in its own declaration, expected another value")
+        close = get_close_matches(key, [one for known, _ in self._others(True) for one in known], 1)
+        hint = f"; there is {self._written(close[0])}" if close else ""
+        raise SourceError(at, f"found {name}, which is not declared, expected a variable{hint}")
+
+    def value(self, at: Position, name: str) -> Value:
+        """What a name comes to where a value is expected. Raises SourceError."""
+        key = name.lower()
+        own = self.unit is not None and key in self.unit.members
+        if not own and (kinds := self.names.values.get(key)) and self.names.global_(key) is None:
+            if len(kinds) > 1:
+                listed = " or ".join(f"{kind.name}#{name}" for kind in kinds)
+                raise SourceError(at, f"found {name}, which several types have, expected {listed}")
+            return constant(at, kinds[0], kinds[0].value(name))
+        found = self.find(at, name)
+        if isinstance(found, Thing):
+            raise SourceError(at, f"found {name}, {found.what}, expected a value")
+        return found
+
+    def enumeration(self, name: str) -> Enumeration | None:
+        """The enumeration of a name, unless a variable hides it."""
+        kind = self.names.types.get(name.lower())
+        hidden = self.unit is not None and name.lower() in self.unit.members
+        return kind if isinstance(kind, Enumeration) and not hidden else None
+
+    def _global(self, at: Position, key: str, name: str) -> Place:
+        member = self.names.global_(key)
+        if member is None:
+            raise SourceError(at, f"found {name}, expected a variable of VAR_GLOBAL of that name")
+        return place_of(at, "_g", member, inside=True)
+
+    def _others(self, everything: bool = False) -> list[tuple[Mapping[str, object], str]]:
+        own = self.unit.members if self.unit is not None else {}
+        variables: list[tuple[Mapping[str, object], str]] = [(own, ""), (self.names.globals.members, "")]
+        return [
+            *(variables if everything else []),
+            (self.names.values, "a value of an enumeration"),
+            (self.names.functions, "a function"),
+            (self.names.types, "a type"),
+        ]
+
+    def _written(self, key: str) -> str:
+        own = self.unit.members if self.unit is not None else {}
+        member = own.get(key) or self.names.globals.members.get(key)
+        return member.name if member else key
+
+
+def place_of(at: Position, owner: str, member: Member, inside: bool) -> Place:
+    """A variable of an object; inside: of the unit that it belongs to."""
+    slot = member.slot
+    if member.section == "VAR_IN_OUT":
+        reference = f"{owner}.{slot}"
+        return Place(
+            at,
+            member.type,
+            f"{reference}.get()",
+            write=lambda new: f"{reference}.set({new})",
+            reference=reference,
+            root=f"{reference}.root",
+        )
+    code = f"{owner}.{slot}"
+    fixed = f"{member.name}, a CONSTANT" if member.constant else ""
+    if inside and member.section == "VAR_INPUT":
+        fixed = f"{member.name}, an input"
+    elif member.address.startswith("%I"):
+        fixed = f"{member.name}, an input at {member.address}"
+    known = member.value
+    return Place(
+        at,
+        member.type,
+        code if known is None else constant(at, member.type, known).code,
+        known,
+        write=lambda new: f"{code} = {new}",
+        reference=f"_Attribute({owner}, {slot!r})",
+        fixed=fixed,
+        root=f"({owner}, {slot!r})",
+    )

@@ -1,1 +1,0 @@
-"""Why each effect is on, what bounds the time step, and what each costs."""

@@ -1,0 +1,156 @@
+"""Some seconds of a recording as bytes: bottles, contacts, belts and signals as whole numbers, each from those before.
+
+A block is a list of arrays (`varints.packed`), in the order of `pack`. Read by page/block.js; whoever changes one
+changes the other. Positions in mm, speeds in mm/s, forces in steps of a ninth (`levels`), signals in steps of 1e-4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
+from conveyor_sim.page.varints import differences, packed
+
+Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+MM = 1000.0
+SIGNAL_STEPS = 1e4
+"""Of a unit of a signal."""
+LEAST_FORCE = 0.05
+"""N: what is well below it is level 0."""
+LEVELS = 8.0
+"""Steps from a force to twice that."""
+UNKNOWN = -(2**40)
+"""Stands for NaN and what is beyond all measure."""
+FORCE_FRAMES = 5
+"""Frames that share one peak force."""
+SECONDS = 4.0
+"""Of simulated time, that a block is long in one file."""
+
+
+def block_ticks(tick_ns: int, seconds: float = SECONDS) -> int:
+    """Ticks of a block."""
+    return max(1, round(seconds * 1e9 / tick_ns))
+
+
+@dataclass
+class Content:
+    """What a block is made of, in the order of time."""
+
+    bottles: list[tuple[int, BottleColumns]] = field(default_factory=list)
+    """Ticks and bottles; peak forces are since the entry before."""
+    contacts: list[tuple[int, ContactColumns]] = field(default_factory=list)
+    belts: list[tuple[int, Floats]] = field(default_factory=list)
+    """Ticks and actual speeds, m/s."""
+    signals: list[tuple[int, Floats]] = field(default_factory=list)
+    """Ticks and values, of forced ones what is read; then those of a controller's variables, from when there are."""
+
+
+def pack(content: Content, start: int) -> bytes:
+    """A block that begins at a tick."""
+    ids, arrays = _bottles(content.bottles, start)
+    arrays += _contacts(content.contacts, content.bottles, ids, start)
+    arrays += _columns([(tick, np.round(speeds * MM)) for tick, speeds in content.belts], start)
+    arrays += _columns([(tick, np.round(values * SIGNAL_STEPS)) for tick, values in content.signals], start)
+    return packed(arrays)
+
+
+def levels(force: Floats) -> Integers:
+    """Forces (N) as whole numbers, on a scale of logarithms: none is off by more than a twentieth, or LEAST_FORCE."""
+    known = np.nan_to_num(np.maximum(force, 0.0))
+    return np.round(LEVELS * np.log2(1.0 + known / LEAST_FORCE)).astype(np.int64)
+
+
+def _bottles(frames: Sequence[tuple[int, BottleColumns]], start: int) -> tuple[Integers, list[Integers]]:
+    """Ids of all bottles, ascending, and: ticks; of each track id, type, first frame, frames; x, y, forces of each.
+
+    A track is a bottle from one frame to another; one that a machine has held meanwhile has two, one after the other.
+    """
+    ticks = np.array([tick for tick, _ in frames], dtype=np.int64)
+    if not frames:
+        return ticks, [ticks] * 8
+    column = np.concatenate([bottles.id for _, bottles in frames]).astype(np.int64)
+    frame = np.repeat(np.arange(len(frames)), [len(bottles.id) for _, bottles in frames])
+    # By bottle, then by time: what follows each other is alike.
+    order = np.lexsort((frame, column))
+    column, frame = column[order], frame[order]
+    first = np.flatnonzero((np.diff(column, prepend=-1) != 0) | (np.diff(frame, prepend=-1) != 1))
+    count = np.diff(first, append=len(column))
+    kinds = np.concatenate([bottles.type for _, bottles in frames]).astype(np.int64)[order][first]
+    x, y, force = (
+        np.concatenate([getattr(bottles, name) for _, bottles in frames])[order] for name in ("x", "y", "peak_force")
+    )
+    slot = frame // FORCE_FRAMES
+    begins = np.union1d(first, np.flatnonzero(np.diff(slot, prepend=-1) != 0))
+    peaks = np.maximum.reduceat(force, begins) if len(begins) else force
+    moves = [_bends(np.round(axis * MM).astype(np.int64), first) for axis in (x, y)]
+    steps = differences(levels(peaks))
+    ids = column[first]
+    return np.unique(ids), [differences(ticks - start), differences(ids), kinds, frame[first], count, *moves, steps]
+
+
+def _bends(values: Integers, first: Integers) -> Integers:
+    """Each less what follows from the two before it, in pieces that begin at some places."""
+    bends = differences(differences(values))
+    second = first[first + 1 < len(values)] + 1
+    bends[second] = values[second] - values[second - 1]
+    bends[first] = values[first]
+    return bends
+
+
+def _contacts(
+    frames: Sequence[tuple[int, ContactColumns]],
+    bottles: Sequence[tuple[int, BottleColumns]],
+    ids: Integers,
+    start: int,
+) -> list[Integers]:
+    """Ticks; contacts at each; of each: place of bottle a, that of b or -1 for a rail; of rails the point; forces."""
+    ticks = np.array([tick for tick, _ in frames], dtype=np.int64)
+    counts, firsts, others, points, forces = [], [], [], [], []
+    for _, contacts in frames:
+        a, b, pair = contacts.a.astype(np.int64), contacts.b.astype(np.int64), contacts.kind == 0
+        place, other = (np.searchsorted(ids, bottle) for bottle in (a, b))
+        known = (_those(ids, place) == a) & (~pair | (_those(ids, other) == b))
+        place, other, pair = place[known], other[known], pair[known]
+        counts.append(len(place))
+        firsts.append(differences(place))
+        others.append(np.where(pair, other - place, 0))
+        points.append(np.round(np.stack([contacts.x, contacts.y], axis=1)[known][~pair] * MM).astype(np.int64).ravel())
+        forces.append(levels(contacts.normal_force[known]))
+    lists = (firsts, others, points, forces)
+    return [
+        differences(ticks - start),
+        np.array(counts, dtype=np.int64),
+        *(np.concatenate(parts) if parts else np.zeros(0, np.int64) for parts in lists),
+    ]
+
+
+def _those(ids: Integers, places: Integers) -> Integers:
+    """Those at places, of which some may lie behind the last; -1 without any."""
+    return ids[places.clip(max=len(ids) - 1)] if len(ids) else np.full(len(places), -1)
+
+
+def _columns(rows: Sequence[tuple[int, Floats]], start: int) -> list[Integers]:
+    """Ticks; then, of each column, how often it changes, at which rows (each less the one before), by how much."""
+    ticks = np.array([tick for tick, _ in rows], dtype=np.int64)
+    if not rows:
+        return [ticks] * 4
+    table = np.full((len(rows), max(len(values) for _, values in rows)), np.nan)
+    for row, (_, values) in zip(table, rows, strict=True):
+        row[: len(values)] = values
+    strange = ~np.isfinite(table) | (np.abs(table) >= -UNKNOWN)
+    table = np.where(strange, UNKNOWN, table).astype(np.int64)
+    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), np.int64))
+    changed = steps.T != 0
+    row = np.nonzero(changed)[1]
+    counts = changed.sum(axis=1)
+    gaps = differences(row)
+    begins = np.cumsum(counts)[:-1]
+    begins = np.concatenate([[0], begins])[counts > 0]
+    gaps[begins] = row[begins]
+    return [differences(ticks - start), counts.astype(np.int64), gaps, steps.T[changed]]

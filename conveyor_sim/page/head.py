@@ -1,0 +1,118 @@
+"""What stands still of a recording, for the page: the plant's shapes, the tags, and what indices mean. As JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from conveyor_sim.page.block import FORCE_FRAMES, LEAST_FORCE, LEVELS, MM, SIGNAL_STEPS, UNKNOWN
+from conveyor_sim.page.story import fields
+from conveyor_sim.scene import Scene
+from conveyor_sim.scene.geometry import BeltShape, belt_shapes, rail_shapes
+from conveyor_sim.scene.marks import marks_of
+from conveyor_sim.scene.moving import moving_shapes
+
+_ARC_POINTS = 96
+_DIGITS = 5
+"""Of metres."""
+
+
+def head(line: Any, scene: Scene) -> dict[str, Any]:
+    """All that the page needs besides what changes, and how to read that, of a decoded message of topic line."""
+    signals = list(line.signal_names)
+    return {
+        "scene": scene.name,
+        "description": scene.description,
+        "run": line.run_id,
+        "seed": int(line.seed),
+        "where": getattr(line, "where", ""),
+        "tick": float(line.tick_ns * 1e-9),
+        "belts": [_belt(shape) for shape in belt_shapes(scene)],
+        "rails": [_points(shape.outline(_ARC_POINTS)) for shape in rail_shapes(scene)],
+        "movers": [
+            {
+                "name": shape.name,
+                "from": shape.start,
+                "to": shape.end,
+                "along": shape.along,
+                "turning": shape.turning,
+                "stroke": shape.stroke,
+                "first": shape.first,
+            }
+            for shape in moving_shapes(scene)
+        ],
+        "marks": [
+            {
+                "look": mark.look,
+                "kind": mark.kind,
+                "name": mark.name,
+                "points": _points(mark.points),
+                "direction": mark.direction,
+            }
+            for mark in marks_of(scene)
+        ],
+        "types": [
+            {"name": name, "radius": float(radius)}
+            for name, radius in zip(line.bottle_types, line.type_radius, strict=True)
+        ],
+        "signals": signals,
+        "commands": list(line.command_names),
+        "tags": _tags(line),
+        "fields": fields(),
+        "steps": {
+            "mm": MM,
+            "signal": SIGNAL_STEPS,
+            "force": LEAST_FORCE,
+            "levels": LEVELS,
+            "unknown": UNKNOWN,
+            "forceFrames": FORCE_FRAMES,
+        },
+    }
+
+
+def _belt(shape: BeltShape) -> dict[str, Any]:
+    return {
+        "name": shape.name,
+        "kind": shape.kind,
+        "outline": _points(shape.outline(_ARC_POINTS)),
+        "corner": shape.corner,
+        "angle": shape.angle,
+        "length": shape.length,
+        "width": shape.width,
+        "centre": shape.centre,
+        "inner": shape.inner_radius,
+        "start": shape.start_angle,
+        "span": shape.span,
+    }
+
+
+def _points(points: Any) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(np.asarray(points, dtype=np.float64), _DIGITS).tolist()
+    return rounded
+
+
+def _tags(line: Any) -> list[dict[str, Any]]:
+    """All tags; of a recording older than them, its signals and commands."""
+    if not hasattr(line, "tag_names"):
+        signals = zip(line.signal_names, line.signal_units, strict=True)
+        return [{"name": name, "unit": unit, "role": "actual"} for name, unit in signals]
+    columns = {
+        "name": line.tag_names,
+        "kind": line.tag_kinds,
+        "role": line.tag_roles,
+        "unit": line.tag_units,
+        "min": _finite(line.tag_min),
+        "max": _finite(line.tag_max),
+        "initial": _finite(line.tag_initial),
+        "texts": line.tag_texts,
+        "description": line.tag_descriptions,
+        "device": line.tag_devices,
+        "class": line.tag_classes,
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _finite(values: Any) -> Sequence[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,119 @@
+"""A recording as the page sees it: its head, blocks of some seconds, read by the bag's index, and its story."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.page.block import SECONDS, block_ticks, pack
+from conveyor_sim.page.content import DRAWN, VARIABLES, Collector
+from conveyor_sim.page.head import head
+from conveyor_sim.page.stamps import Stamps
+from conveyor_sim.page.story import TOPICS_READ, Story
+from conveyor_sim.scene import parse_overrides, parse_scene
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How much of a recording is shown, at most, in Hz of simulated time."""
+
+    bottles: float = 25.0
+    contacts: float = 12.5
+    belts: float = 25.0
+    signals: float = 25.0
+    counters: float = 0.5
+    block: float = SECONDS
+    """s, not Hz: how long a block is."""
+    story: float = math.inf
+    """s: how much of what happened is read at a time."""
+
+
+class Recording:
+    """What the page is given of an open bag. Raises SceneError if its scene can't be read by this version."""
+
+    def __init__(self, bag: Bag, detail: Detail) -> None:
+        self._bag = bag
+        self._detail = detail
+        self._tick_ns = int(bag.line.tick_ns)
+        self._scene = parse_scene(
+            bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides)
+        )
+        self._stamps = Stamps(bag, (*DRAWN, *TOPICS_READ))
+        is_ours = bag.types.get(VARIABLES) == TOPICS[VARIABLES].type
+        self._variables: list[str] = next((list(one.data.name) for one in bag.read(VARIABLES)), []) if is_ours else []
+        self._began = self.first = int(bag.line.tick)
+        self.last = max(self.first, self._stamps.last)
+        self._block_ticks = block_ticks(self._tick_ns, detail.block)
+
+    def begin_before(self, tick: int, seconds: float) -> None:
+        """Draw it only from so many seconds before a tick on. What happened is still listed from the beginning."""
+        self.first = min(self.last, max(self.first, tick - round(seconds * 1e9 / self._tick_ns)))
+
+    @property
+    def name(self) -> str:
+        """Of the scene."""
+        return self._scene.name
+
+    @property
+    def blocks(self) -> int:
+        """How many there are; the first one begins at the first tick."""
+        return 1 + (self.last - self.first) // self._block_ticks
+
+    @property
+    def stories(self) -> int:
+        """How many stretches what happened is told in."""
+        return 1 + math.floor((self.last - self._began) * self._tick_ns * 1e-9 / self._detail.story)
+
+    def head(self) -> dict[str, Any]:
+        """As `head.head`, and how much there is."""
+        times = {
+            "first": self.first,
+            "last": self.last,
+            "block": self._block_ticks,
+            "blocks": self.blocks,
+            "stories": self.stories,
+        }
+        forced: list[int] = next((to_image(frame.data).forced.tolist() for frame in self._bag.messages("signals")), [])
+        shown = head(self._bag.line, self._scene)
+        shown["signals"] += self._variables
+        return {**shown, "times": times, "forced": forced}
+
+    def block(self, number: int) -> bytes:
+        """A block, from 0 on, as `block.pack` writes it."""
+        start = self.first + number * self._block_ticks
+        gaps = {name: max(1, round(1e9 / getattr(self._detail, name) / self._tick_ns)) for name in DRAWN}
+        collector = Collector(self._bag, start, gaps, self._variables)
+        topics = (*DRAWN, VARIABLES) if self._variables else DRAWN
+        for topic, tick, raw in self._stamps.messages(topics, start, min(start + self._block_ticks, self.last + 1)):
+            collector.add(topic, tick, raw)
+        return pack(collector.content, start)
+
+    def story(self, number: int = 0) -> bytes:
+        """What happened in a stretch of the recording, from 0 on, as JSON (`Story`)."""
+        story = Story(self._bag.time, 1.0 / self._detail.counters)
+        start = stop = None
+        if self.stories > 1:
+            length = round(self._detail.story * 1e9 / self._tick_ns)
+            start = self._began + number * length
+            stop = start + length
+        for topic, tick, raw in self._stamps.messages(TOPICS_READ, start, stop):
+            story.add(topic, self._bag.decode(topic, raw), tick)
+        return text(story.data)
+
+
+def text(value: Any) -> bytes:
+    """As JSON, which has neither NaN nor infinities."""
+    return json.dumps(_clean(value), separators=(",", ":")).encode()
+
+
+def _clean(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _clean(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_clean(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

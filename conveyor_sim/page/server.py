@@ -1,0 +1,171 @@
+"""The page on a recording of any length, from a small server on this machine: what it asks for is read by the index."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import threading
+import zlib
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
+from conveyor_sim.page.difference import Comparison
+from conveyor_sim.page.own_host import is_own
+from conveyor_sim.page.recording import Detail, Recording, text
+from conveyor_sim.support.printable import SENTENCE, printable
+
+ADDRESS = "127.0.0.1"
+MOST_CONNECTIONS = 64
+"""At once; for one more the oldest makes room."""
+SILENT = 20.0
+"""s of wall time in which a browser has to ask, and to take what it is sent."""
+SERVED = Detail(bottles=50.0, contacts=25.0, belts=50.0, signals=50.0, block=2.0, story=60.0)
+
+
+class RecordingServer(AbstractContextManager["RecordingServer"]):
+    """Serves a bag's page until it is closed."""
+
+    def __init__(self, path: Path, port: int = 0, other: Path | None = None) -> None:
+        """port: 0 for any that is free. other: a recording that is shown beside it, at the same times.
+
+        Raises BagError, SceneError, and ConveyorError if it can't listen there, or these can't be compared.
+        """
+        with ExitStack() as stack:
+            bags = [path] if other is None else [path, other]
+            # Whoever reads on through the whole recording does not throw out what somebody looks at.
+            looked, read_on = ([stack.enter_context(open_bag(bag, by_index=True)) for bag in bags] for _ in range(2))
+            self._shown = [Recording(bag, SERVED) for bag in looked]
+            self._read_on = [Recording(bag, SERVED) for bag in read_on]
+            self._comparison = None if other is None else Comparison(read_on[0], read_on[1], SERVED.story)
+            self._reading, self._reading_on = threading.Lock(), threading.Lock()
+            try:
+                self._server = _Server((ADDRESS, port), _Handler)
+            except OSError as error:
+                raise ConveyorError(
+                    f"--port: {port} given, expected one that is free ({error.strerror or error})"
+                ) from error
+            self._server.answer = self.answer
+            stack.callback(self._server.server_close)
+            self._thread = threading.Thread(target=self._server.serve_forever, name="page", daemon=True)
+            self._thread.start()
+            stack.callback(self._server.shutdown)
+            self._stack = stack.pop_all()
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{ADDRESS}:{self._server.server_address[1]}/"
+
+    def answer(self, name: str) -> bytes:
+        """The deflated part of a name. Raises KeyError if there is none, and BagError.
+
+        head, story/<n>, block/<n>, and the same behind other/; difference/<n>.
+        """
+        place = int(name.startswith("other/"))
+        if place >= len(self._shown):
+            raise KeyError(name)
+        kind, _, number = name.removeprefix("other/").partition("/")
+        shown, read_on, comparison = self._shown[place], self._read_on[place], self._comparison
+        if kind == "head" and not number:
+            compared = {"compared": comparison.head()} if comparison is not None and not place else {}
+            return self._deflated(self._reading, lambda: text({**shown.head(), **compared}))
+        counts = {"story": read_on.stories, "block": shown.blocks}
+        if comparison is not None and not place:
+            counts["difference"] = comparison.stretches
+        if kind not in counts or not (number.isdecimal() and len(number) < 10) or int(number) >= counts[kind]:
+            raise KeyError(name)
+        if kind == "block":
+            return self._deflated(self._reading, lambda: shown.block(int(number)))
+        if kind == "difference" and comparison is not None:
+            return self._deflated(self._reading_on, lambda: text(comparison.part(int(number))))
+        return self._deflated(self._reading_on, lambda: read_on.story(int(number)))
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is answered any more."""
+        self._stack.close()
+        self._thread.join()
+
+    def _deflated(self, lock: threading.Lock, make: Callable[[], bytes]) -> bytes:
+        with lock:
+            made = make()
+        return zlib.compress(made, 1)
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    request_queue_size = 128
+    """Connections that wait to be accepted: one that finds no room tries again only after a second."""
+    answer: Callable[[str], bytes]
+
+    def __init__(self, *arguments: Any) -> None:
+        self._connected: dict[Any, None] = {}
+        self._changing = threading.Lock()
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Have it answered in a thread of its own."""
+        with self._changing:
+            if len(self._connected) >= MOST_CONNECTIONS:
+                oldest = next(iter(self._connected))
+                del self._connected[oldest]
+                with suppress(OSError):  # it has just ended
+                    oldest.shutdown(socket.SHUT_RDWR)
+            self._connected[request] = None
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """It has been answered, or left."""
+        with self._changing:
+            self._connected.pop(request, None)
+        super().shutdown_request(request)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that leaves while it is answered is nothing to tell of."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    server_version, sys_version = "conveyor_sim", ""
+    timeout = SILENT
+
+    def do_GET(self) -> None:
+        path = urlsplit(self.path).path.removeprefix("/") or "index.html"
+        if not is_own(self.headers.get_all("Host", []), "http"):
+            self._send(HTTPStatus.FORBIDDEN, b"expected to be asked for as 127.0.0.1", "text/plain")
+        elif path.startswith("data/"):
+            self._send_part(path.removeprefix("data/"))
+        elif (kind := page_files().get(path)) is not None:
+            self._send(HTTPStatus.OK, (PAGE / path).read_bytes(), kind)
+        else:
+            self._send(HTTPStatus.NOT_FOUND, b"there is no such file", "text/plain")
+
+    def _send_part(self, name: str) -> None:
+        try:
+            self._send(HTTPStatus.OK, self.server.answer(name), "application/octet-stream")
+        except KeyError:
+            self._send(HTTPStatus.NOT_FOUND, b"there is no such part of the recording", "text/plain")
+        except ConveyorError as error:
+            said = printable(error, SENTENCE).encode()
+            self._send(HTTPStatus.INTERNAL_SERVER_ERROR, said, "text/plain")
+
+    def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", f"{kind}; charset=utf-8" if kind.startswith("text/") else kind)
+        self.send_header("Content-Length", str(len(content)))
+        for name, value in HEADERS.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: what can't be read is shown on the page."""

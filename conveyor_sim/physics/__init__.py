@@ -1,0 +1,1 @@
+"""Physics of a scene: effects, time step, constant arrays, state and the steps of one tick."""

@@ -1,0 +1,89 @@
+"""Watches outfeeds for clogging: bottles wait on running belts, and none has left for the scene's time limit."""
+
+from collections.abc import Mapping
+from dataclasses import astuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.columns.damage import DamageEvent
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.physics.state import State
+from conveyor_sim.scene import Scene
+from conveyor_sim.scene.types import Unchecked
+
+SLOW = 0.1
+"""Of the speed of the belt under it: what is slower is held up."""
+
+
+def clogging_of(state: State, scene: Scene) -> "Clogging | None":
+    """Return the clogging monitor of a scene; None if the scene has no limit `clogging_time`."""
+    if scene.limits.clogging_time is None:
+        return None
+    exits = {name: np.array(outfeed.region) for name, outfeed in scene.outfeeds.items()}
+    return Clogging(state, scene.limits.clogging_time, exits)
+
+
+class Clogging:
+    """The outfeeds of a scene, looked at after every tick. Public attributes are remembered in checkpoints."""
+
+    passages: dict[str, tuple[int, int, int]]
+    """By outfeed: bottles removed, tick of the last passage or of nobody waiting, whether that was reported."""
+    events: list[tuple[int, str, int, Unchecked, Unchecked, Unchecked, Unchecked, str]]
+    """Those that nobody has taken."""
+
+    def __init__(self, state: State, limit: float, exits: Mapping[str, F8]) -> None:
+        """limit: s without a passage. exits: corners (n, 2) m of each outfeed, by name."""
+        self._state = state
+        self._limit = limit
+        self._exits = exits
+        self.passages = dict.fromkeys(exits, (0, 0, 0))
+        self.events = []
+
+    def end(self, tick: int, removed: Mapping[str, int]) -> list[DamageEvent]:
+        """A tick has ended; the outfeeds that clogged in it. removed: bottles so far, by device."""
+        before = len(self.events)
+        for name, corners in self._exits.items():
+            self._look_at(tick, name, corners, removed[f"outfeeds/{name}"])
+        return [DamageEvent(*event) for event in self.events[before:]]
+
+    def clogged(self) -> dict[str, bool]:
+        """Whether each outfeed is."""
+        return {name: bool(reported) for name, (_, _, reported) in self.passages.items()}
+
+    def take_events(self) -> list[DamageEvent]:
+        """Outfeeds that clogged since the last call, in order."""
+        events, self.events = self.events, []
+        return [DamageEvent(*event) for event in events]
+
+    def _look_at(self, tick: int, name: str, corners: F8, removed: int) -> None:
+        bottles, passage = self._state.world.bottles, self.passages[name]
+        waiting = self._held_up()
+        if removed != passage[0] or not len(waiting):
+            self.passages[name] = (removed, tick, 0)
+            return
+        idle = (tick - passage[1]) * self._state.model.tick_ns * 1e-9
+        if idle < self._limit - 1e-9 or passage[2]:
+            return
+        self.passages[name] = (passage[0], passage[1], 1)
+        centre = corners.mean(axis=0)
+        slot = waiting[np.argmin(np.hypot(bottles.x[waiting] - centre[0], bottles.y[waiting] - centre[1]))]
+        bottle, x, y = int(bottles.id[slot]), float(bottles.x[slot]), float(bottles.y[slot])
+        time = tick * self._state.model.tick_ns * 1e-9
+        text = (
+            f"bottle {bottle} waits, for outfeed {name} has removed nothing for {idle:.3g} s, nearest to it at "
+            f"({x:.4g}, {y:.4g}) m at {time:g} s: limits.clogging_time is {self._limit:g} s"
+        )
+        self.events.append(astuple(DamageEvent(tick, "clogging_time", bottle, x, y, idle, self._limit, text)))
+
+    def _held_up(self) -> NDArray[np.int64]:
+        """Slots of the bottles that a running belt does not take along."""
+        world, bottles = self._state.world, self._state.world.bottles
+        if world.footing is None:
+            return np.zeros(0, np.int64)
+        ux, uy = world.footing.ux, world.footing.uy
+        if world.footing.turn is not None:
+            ux, uy = ux - world.footing.turn * bottles.y, uy + world.footing.turn * bottles.x
+        belt, speed = np.hypot(ux, uy), np.hypot(bottles.vx, bottles.vy)
+        runs = belt > world.settings.slip_limit
+        return np.flatnonzero(runs & (speed < SLOW * belt) & (bottles.id >= 0))

@@ -1,0 +1,45 @@
+"""Energy that contacts have taken up by their elastic laws, and how deep they are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.contact.laws import ELASTIC
+from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, closed_contacts
+from conveyor_sim.physics.model import Model
+
+
+def elastic_energy(model: Model, law: ContactLaw | None, entries: NDArray[np.int64], overlap: F8) -> F8:
+    """Work (J) that the elastic law of each contact has taken up: k d^2 / 2, 2/5 k d^2.5, the area under a table.
+
+    law: one of the Model's tables; entries: (n,), in it; overlap: (n,), m.
+    """
+    stored = np.zeros(overlap.size)
+    if law is None:
+        return stored
+    for elastic in ELASTIC:
+        column = getattr(law, elastic.column)
+        if column is not None:
+            for index in np.flatnonzero(column[entries] > elastic.none):
+                k = column[entries[index]].item()
+                stored[index] += elastic.energy(k, float(overlap[index]), model.curves)
+    return stored
+
+
+def deepest_overlap(world: World, found: RailContacts) -> float:
+    """The deepest overlap of all contacts of the present state over the (smaller) radius. found: scratch."""
+    kind, (a, b), values = closed_contacts(world, found)
+    pairs = kind == BOTTLE_BOTTLE
+    smaller = world.bottles.radius[a]
+    smaller[pairs] = np.minimum(smaller[pairs], world.bottles.radius[b[pairs]])
+    return float((values[4] / smaller).max(initial=0.0))
+
+
+def rail_entries(model: Model, types: NDArray[np.int64], rails: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Entries in `Model.rail_law` of contacts of bottle types with rails, (n,)."""
+    materials = model.rail_materials
+    material_of = np.array([materials.index(rail.material) for rail in model.rail_shapes], dtype=np.int64)
+    return types * len(materials) + material_of[rails]

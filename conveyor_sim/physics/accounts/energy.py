@@ -1,0 +1,85 @@
+"""Keeps the energy ledger of a State: what bottles bring and take beside what the engine books in every step."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from conveyor_sim.columns.ledger import Ledger, balance
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.observers.ledger import BASE_FRICTION, BELTS, CONTACT_FRICTION, DAMPING
+from conveyor_sim.engine.observers.stored_energy import BASE_SPRINGS, SPRINGS, stored_energy
+from conveyor_sim.engine.threads.workers import workers
+from conveyor_sim.physics.state import State
+
+
+class EnergyAccount:
+    """The energy ledger of a State whose world has one."""
+
+    def __init__(self, state: State) -> None:
+        """Open the books with the energy of the bottles that are there; the neighbour lists must hold."""
+        self._state = state
+        self._found = workers(1)[0].found
+        self.fed = self.removed = self.springs = self.base_springs = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Open the books anew with the present state."""
+        stored = self._stored()
+        self._work()[:] = 0.0
+        self.fed, self.removed = float(stored.sum()), 0.0
+        self.springs = float(stored[SPRINGS])
+        """J, in tangential springs that came less those that went with bottles: not dissipated."""
+        self.base_springs = float(stored[BASE_SPRINGS])
+        """J, likewise in springs under the bottles."""
+
+    @contextmanager
+    def feeding(self) -> Iterator[None]:
+        """What the state gains inside was brought."""
+        before = self._stored()
+        yield
+        gained = self._gained(before)
+        self.fed += float(gained.sum())
+
+    @contextmanager
+    def removing(self) -> Iterator[None]:
+        """What the state loses inside was taken along."""
+        before = self._stored()
+        yield
+        gained = self._gained(before)
+        self.removed -= float(gained.sum())
+
+    def ledger(self) -> Ledger:
+        """The ledger now."""
+        stored, work = self._stored(), self._work().sum(axis=0)
+        surfaces = len(self._state.model.belts) + 1
+        # Springs hold a part of what friction took: it is dissipated when they are let go.
+        held = float(stored[SPRINGS]) - self.springs
+        held_by_base = float(stored[BASE_SPRINGS]) - self.base_springs
+        return balance(
+            stored,
+            self.fed,
+            self.removed,
+            work[BELTS : BELTS + surfaces],
+            work[BELTS + surfaces :],
+            float(work[BASE_FRICTION]) - held_by_base,
+            float(work[CONTACT_FRICTION]) - held,
+            float(work[DAMPING]),
+        )
+
+    def _gained(self, before: F8) -> F8:
+        if not self._state.world.neighbourhood.stale[0]:
+            return np.zeros(4)
+        self._state.make_lists()
+        gained = self._stored() - before
+        self.springs += float(gained[SPRINGS])
+        self.base_springs += float(gained[BASE_SPRINGS])
+        return gained
+
+    def _stored(self) -> F8:
+        return stored_energy(self._state.world, self._found)
+
+    def _work(self) -> F8:
+        ledger = self._state.world.ledger
+        assert ledger is not None
+        return ledger.work

@@ -1,0 +1,188 @@
+"""Effects of what bottles stand on: friction, belts, and the ring that a base is."""
+
+from collections.abc import Callable, Collection
+
+from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.terms import Meeting, Terms, drag_bound, tightest
+from conveyor_sim.physics.laws.coefficients import base_friction
+from conveyor_sim.physics.timestep.bounds import Bound, base_friction_bound, slip_time
+from conveyor_sim.physics.timestep.methods import Share
+from conveyor_sim.physics.timestep.prediction import Term
+from conveyor_sim.scene.belts import CurvedBelt
+from conveyor_sim.scene.schema import Scene
+
+MEETING = 0.2
+"""Of the fastest speed in a scene: at which most bottles meet, on the scenes of docs/accuracy.md."""
+
+
+def _friction(scene: Scene, on: Collection[str]) -> Cause | None:
+    table = base_friction(scene)
+    if scene.gravity == 0.0 or not table.any():
+        return None
+    for row, name in enumerate(scene.belts):
+        if table[row].any():
+            return Cause(("belts", name), f"friction {table[row].max():g}")
+    return Cause(("floor",), f"friction {table[-1].max():g}")
+
+
+def _friction_bounds(terms: Terms) -> list[Bound]:
+    if terms.laws.base_friction is None:
+        return []
+    mu, g, limit = float(terms.laws.base_friction.max()), terms.scene.gravity, terms.scene.slip_limit
+    implicit, bounds = _implicit_point(terms), []
+    if terms.method.explicit and not implicit:
+        reason = f"half of v_lim / (mu g) at mu = {mu:g}"
+        bounds.append(
+            Bound("base friction", *drag_bound(terms, base_friction_bound(mu, g, limit), reason), stability=True)
+        )
+    # On a belt that turns, what rests is off by one part in these steps, implicit or not: at most by the tolerance.
+    turning = terms.method.slip_steps(terms.tolerance) if "curved_belts" in terms.on else 0.0
+    if (steps := max(0.0 if implicit else _slip_steps(terms), turning)) > 0.0:
+        reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
+        bounds.append(Bound("base slip", slip_time(mu, g, limit) / steps, reason))
+    return bounds
+
+
+def _slip_steps(terms: Terms) -> float:
+    """Steps in v_lim / (mu g) by which a method of first order is off by one part in `least_steps`."""
+    return terms.method.slip_steps(1.0 / terms.steps) if terms.method.second_order else terms.steps
+
+
+def _lag(quantity: str, part: Callable[[float], float], terms: Terms, dt: float) -> list[Term]:
+    """Of a bottle held on its circle by friction, part(steps) at so many steps in v_lim / (mu g).
+
+    The velocity of semi-implicit Euler is half a step older than the position at which it asks the belt for its own;
+    leapfrog asks where the bottle was at mid-step (test/physics/test_turntable.py).
+    """
+    if terms.laws.base_friction is None or "curved_belts" not in terms.on:
+        return []
+    mu = float(terms.laws.base_friction.max())
+    steps = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit) / dt
+    off = part(steps)
+    reason = f"{steps:.3g} steps in v_lim / (mu g) at mu = {mu:g}"
+    return [Term(quantity, off, reason)] if off > 0.0 else []
+
+
+def _creep(terms: Terms, dt: float) -> list[Term]:
+    method = terms.method
+    part = method.implicit_creep_off if _implicit_point(terms) else method.creep_off
+    return _lag("creep on curved belts", part, terms, dt)
+
+
+def _resting(terms: Terms, dt: float) -> list[Term]:
+    """What presses against the rim of a turn-table is what friction does not hold, m Omega^2 r: off by the same part.
+
+    The lag is a slip of Omega^2 r dt / 2 outward, which friction answers with m mu g Omega^2 r dt / v_lim.
+    """
+    turns = terms.laws.base_friction is not None and "curved_belts" in terms.on
+    behind = terms.method.turned * _turning(terms.scene) * dt if turns else 0.0
+    late = [Term("load on turning belts", behind, "half a step's turn of the belt")] if behind > 0.0 else []
+    return [*_lag("load on turning belts", terms.method.creep_off, terms, dt), *late]
+
+
+def _turning(scene: Scene) -> float:
+    """rad/s, of the belt that turns fastest as the scene begins; 0 without any."""
+    curved = (belt for belt in scene.belts.values() if isinstance(belt, CurvedBelt))
+    return max((abs(belt.speed) / (belt.inner_radius + 0.5 * belt.width) for belt in curved), default=0.0)
+
+
+def _braked(meeting: Meeting, terms: Terms) -> list[Share]:
+    """First order: the base brakes by half a step too much or too little; speeds of impact are off by mu g dt / 2."""
+    if terms.laws.base_friction is None or terms.method.second_order:
+        return []
+    braking = float(terms.laws.base_friction.max()) * terms.scene.gravity
+    return [Share("braking by the base", 1.0, 2.0 * MEETING * terms.impact_speed / braking, 1.0)]
+
+
+def _implicit_point(terms: Terms) -> bool:
+    """Whether friction under bottles is solved implicitly: that of a point is, that of a ring has no closed form."""
+    return "implicit_friction" in terms.on and "ring_base" not in terms.on
+
+
+def _ring(scene: Scene, on: Collection[str]) -> Cause | None:
+    # Rotation is decided later, for a ring calls for it; where it is forced off, the ring has nothing to turn.
+    if "base_friction" in on and scene.effects.get("rotation") != "off":
+        for name, kind in scene.bottle_types.items():
+            if kind.base_radius is not None:
+                return Cause(("bottle_types", name, "base_radius"), f"{kind.base_radius:g} m")
+    return None
+
+
+def _ring_bounds(terms: Terms) -> list[Bound]:
+    """The slope of the spinning ring's moment at rest is that of the sliding point's force, for J / (m R_b^2)."""
+    if terms.laws.base_friction is None:
+        return []
+    mu = float(terms.laws.base_friction.max())
+    time, steps = slip_time(mu, terms.scene.gravity, terms.scene.slip_limit), _slip_steps(terms)
+    stable, exact = [], []
+    for kind in terms.types:
+        if kind.base_radius is not None:
+            spin = time * kind.moment_of_inertia / (kind.mass * kind.base_radius**2)
+            reason = f"v_lim J / (mu g m R_b^2) at mu = {mu:g}, R_b = {kind.base_radius:g} m"
+            if terms.method.explicit:
+                stable.append(drag_bound(terms, 0.5 * spin, f"half of {reason}"))
+            if steps > 0.0:
+                exact.append((spin / steps, f"{steps:.3g} steps in {reason}"))
+    return [*tightest("spin on the base", stable, stability=True), *tightest("base spin", exact)]
+
+
+def _belts(scene: Scene, on: Collection[str]) -> Cause | None:
+    return Cause(("belts", next(iter(scene.belts)))) if scene.belts and "base_friction" in on else None
+
+
+def _curved_belts(scene: Scene, on: Collection[str]) -> Cause | None:
+    for name, belt in scene.belts.items():
+        if isinstance(belt, CurvedBelt) and "belts" in on:
+            return Cause(("belts", name))
+    return None
+
+
+BASE_FRICTION = Effect(
+    name="base_friction",
+    law="mu m g p(s), at the axis",
+    source="(7)-(10), (15)",
+    called_for=_friction,
+    absent="no friction under the bottles",
+    needs="mu by belt and bottle type, velocity of each surface",
+    bounds=_friction_bounds,
+    bound="half of v_lim / (mu g); with leapfrog and semi-implicit Euler 2 / sqrt(tolerance) steps in it, 20 at 1 %, "
+    "and with the latter 1 / tolerance where a belt turns, 100 at 1 %; with the linearly implicit method 4 steps in "
+    "it, as it is stable in any",
+    shares=_braked,
+    share="with leapfrog and semi-implicit Euler mu g dt / (2 v), v a fifth of the speed of impact, as most are slower",
+    resting=_resting,
+    rest="on belts that turn, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
+    "Omega dt / 2",
+    side=_creep,
+    beside="of creep on curved belts, with semi-implicit Euler one part in the steps in v_lim / (mu g), with leapfrog "
+    "and implicit friction two",
+)
+RING_BASE = Effect(
+    name="ring_base",
+    law="the base is a ring: sliding and spinning share its friction, and it may straddle two belts; v / sqrt(v^2 + "
+    "(v_lim / 2)^2) of each part of it drags in place of p(s); always explicit, whatever the friction_solver; types "
+    "without base_radius beside it stand on points",
+    source="added",
+    called_for=_ring,
+    absent="no bottle type with base_radius, no friction under the bottles, or rotation forced off",
+    needs="base_radius by bottle type",
+    bounds=_ring_bounds,
+    bound="for the spin, those of base_friction with v_lim J / (mu g m R_b^2)",
+)
+BELTS = Effect(
+    name="belts",
+    law="the last listed belt under the axis carries",
+    source="(11)-(15)",
+    called_for=_belts,
+    absent="no belt with friction",
+    needs="outlines of the belts, a grid over them, belts near each bottle",
+)
+CURVED_BELTS = Effect(
+    name="curved_belts",
+    law="surface velocity Omega x (r - C)",
+    source="Table 1",
+    called_for=_curved_belts,
+    absent="no curved belt with friction",
+    needs="sectors of the belts, angular velocity and centre of each surface",
+    can_force_off=False,
+)

@@ -1,0 +1,168 @@
+"""Effects of contact: that bottles touch bottles, and the elastic laws."""
+
+from collections.abc import Callable, Collection, Iterator
+
+from conveyor_sim.engine.contact.laws import hertz, linear, table
+from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.load import contact_load
+from conveyor_sim.physics.effects.movers import mover_bounds
+from conveyor_sim.physics.effects.terms import (
+    Meeting,
+    Terms,
+    deepest,
+    frequency,
+    meetings,
+    most_bottles,
+    overlap_at,
+    tightest,
+)
+from conveyor_sim.physics.timestep.bounds import Bound, lattice_bound, wedge_bound
+from conveyor_sim.physics.timestep.methods import Share
+from conveyor_sim.scene.contacts import Contact
+from conveyor_sim.scene.geometry import rail_shapes
+from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.schema import Scene
+
+
+def contacts_in_use(scene: Scene, on: Collection[str]) -> Iterator[tuple[int, Contact]]:
+    """The contacts between materials that can meet here: bottles if there are several, bottles and rails."""
+    bottles = {kind.material for kind in scene.bottle_types.values()}
+    with_rails = "segment_rails" in on or "arc_rails" in on
+    rails = {rail.material for rail in rail_shapes(scene)} if with_rails else set()
+    if "moving_rails" in on:
+        rails |= {shape.material for shape in moving_shapes(scene)}
+    for index, contact in enumerate(scene.contacts):
+        a, b = contact.between
+        of_bottles = {a, b} <= bottles and "bottle_contact" in on
+        if of_bottles or (a in bottles and b in rails) or (b in bottles and a in rails):
+            yield index, contact
+
+
+def _pairs(scene: Scene, on: Collection[str]) -> Cause | None:
+    for path, entry in scene.entries():
+        if entry.most is None:
+            return Cause(path, "without end")
+    most = most_bottles(scene) or 0
+    return Cause(("bottles" if scene.bottles else "infeeds",), f"{most} bottles in all") if most > 1 else None
+
+
+def _elastic(field: str, unit: str) -> Callable[[Scene, Collection[str]], Cause | None]:
+    def called_for(scene: Scene, on: Collection[str]) -> Cause | None:
+        for index, contact in contacts_in_use(scene, on):
+            value = getattr(contact, field)
+            if value is not None:
+                what = f"{len(value)} points" if isinstance(value, tuple) else f"{value:g} {unit}"
+                return Cause(("contacts", index, field), what)
+        return None
+
+    return called_for
+
+
+def _stable(name: str, stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Terms], list[Bound]]:
+    """Bounds from a function that gives a meeting's largest stiffness, in N/m (0: none), and how it is said."""
+
+    def bounds(terms: Terms) -> list[Bound]:
+        if not terms.method.explicit:
+            return []
+        lattices, wedges, movers = [], [], []
+        for meeting in meetings(terms):
+            k, said = stiffness(meeting, terms)
+            if k > 0.0 and meeting.second is not None:
+                lattices.append((lattice_bound(k, 2.0 * meeting.reduced_mass), f"a hexagonal packing at {said}"))
+            elif k > 0.0:
+                wedges.append((wedge_bound(k, meeting.reduced_mass), f"a bottle between two rails at {said}"))
+                movers += mover_bounds(meeting, k, terms)
+        return [
+            *tightest(f"{name}lattice stability", lattices, stability=True),
+            *tightest(f"{name}rail stability", wedges, stability=True),
+            *tightest(f"{name}mover stability", movers, stability=True),
+        ]
+
+    return bounds
+
+
+def _linear(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    law, k = meeting.elastic
+    return (k, f"k = {k:g} N/m") if law is linear.LINEAR else (0.0, "")
+
+
+def _hertz(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    """The stiffer the harder it is pressed, by an impact or by a queue."""
+    law, k = meeting.elastic
+    if law is not hertz.HERTZ:
+        return 0.0, ""
+    pressed = overlap_at(meeting, terms, contact_load(terms).force)
+    tangent = law.stiffest(k, max(deepest(meeting, terms, terms.impact_speed)[0], pressed), None)
+    return tangent, f"dN/d delta = {tangent:.3g} N/m"
+
+
+def _table(meeting: Meeting, terms: Terms) -> tuple[float, str]:
+    law, c = meeting.elastic
+    if law is not table.TABLE:
+        return 0.0, ""
+    steepest = law.stiffest(c, 0.0, terms.laws.curves)
+    return steepest, f"the table's steepest, {steepest:.3g} N/m"
+
+
+def _peak(stiffness: Callable[[Meeting, Terms], tuple[float, str]]) -> Callable[[Meeting, Terms], list[Share]]:
+    """The share of an elastic law, where a meeting has it: its peak falls between two steps."""
+
+    def shares(meeting: Meeting, terms: Terms) -> list[Share]:
+        if stiffness(meeting, terms)[0] == 0.0:
+            return []
+        return [terms.method.between_steps(frequency(meeting, terms, terms.impact_speed))]
+
+    return shares
+
+
+BOTTLE_CONTACT = Effect(
+    name="bottle_contact",
+    law="contact between bottles",
+    source="(22)-(23)",
+    called_for=_pairs,
+    absent="a single bottle",
+    needs="a list of the pairs that are near, with coefficients and forces by pair; a contact for each pair of "
+    "materials",
+)
+LINEAR = Effect(
+    name="linear",
+    law="N = k delta",
+    source="(22)-(23)",
+    called_for=_elastic("stiffness", "N/m"),
+    absent="no contact with stiffness",
+    needs="k by pair of materials",
+    bounds=_stable("", _linear),
+    bound="1 / sqrt(6 k / m), half of that at which a hexagonal packing is unstable; 1 / sqrt(2 k / m), half of that "
+    "at which a bottle between two rails is; 1 / sqrt(k (2 / m + n / M)) with n bottles at a moving rail of mass M",
+    shares=_peak(_linear),
+    share="(w dt)^2 / 8, with w = sqrt(k / m_r): a peak between two steps",
+    can_force_off=False,
+)
+HERTZ = Effect(
+    name="hertz",
+    law="N = k delta^1.5",
+    source="Hertz 1882, allowed for at (23)",
+    called_for=_elastic("hertz_stiffness", "N/m^1.5"),
+    absent="no contact with hertz_stiffness",
+    needs="k by pair of materials",
+    bounds=_stable("Hertz ", _hertz),
+    bound="those of linear at the tangent stiffness, pressed by an impact at v or by belts as in contact_friction; v "
+    "is the speed of the fastest belt or infeed, or that by which bottles differ at the start, 1 m/s if all rest",
+    shares=_peak(_hertz),
+    share="(w dt)^2 / 8, with w = sqrt(1.5 k delta^0.5 / m_r) at the deepest of an impact at v: a peak between two "
+    "steps",
+    can_force_off=False,
+)
+TABLE = Effect(
+    name="table",
+    law="N from points (delta, N), straight between them and on beyond the last",
+    source="allowed for at (23)",
+    called_for=_elastic("table", ""),
+    absent="no contact with table",
+    needs="points by pair of materials",
+    bounds=_stable("table ", _table),
+    bound="those of linear, at the steepest slope of the table",
+    shares=_peak(_table),
+    share="that of linear, at the steepest slope of the table",
+    can_force_off=False,
+)

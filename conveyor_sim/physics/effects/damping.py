@@ -1,0 +1,95 @@
+"""Effects of damping in contacts: one for each law in `engine/contact/laws/`, made from its declaration."""
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+from conveyor_sim.engine.contact.laws import DAMPING, DampingLaw
+from conveyor_sim.physics.effects.contacts import contacts_in_use
+from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest, drag_bound, frequency, meetings, tightest
+from conveyor_sim.physics.laws.damping import damping_law
+from conveyor_sim.physics.timestep.bounds import Bound, damping_bound
+from conveyor_sim.physics.timestep.methods import Share
+from conveyor_sim.scene.schema import Scene
+
+
+def _called_for(law: DampingLaw) -> Callable[[Scene, Collection[str]], Cause | None]:
+    def called_for(scene: Scene, on: Collection[str]) -> Cause | None:
+        for index, contact in contacts_in_use(scene, on):
+            if damping_law(contact) is law:
+                damping = contact.damping
+                if damping.restitution is None:
+                    return Cause(("contacts", index, "damping"), f"{damping.coefficient:g} {law.unit}")
+                return Cause(("contacts", index, "damping", "restitution"), f"{damping.restitution:g}")
+        return None
+
+    return called_for
+
+
+def _dashpot(law: DampingLaw, meeting: Meeting, terms: Terms) -> float:
+    """What it is as a dashpot at the deepest of an impact, kg/s: its force at 1 m/s; 0 where a meeting has another."""
+    coefficient = meeting.coefficient(law)
+    if coefficient == 0.0:
+        return 0.0
+    depth, elastic = deepest(meeting, terms, terms.impact_speed)
+    return law.force(coefficient, elastic, depth, 1.0)
+
+
+def _bounds(law: DampingLaw) -> Callable[[Terms], list[Bound]]:
+    def bounds(terms: Terms) -> list[Bound]:
+        if not terms.method.explicit:
+            return []
+        found = []
+        for meeting in meetings(terms):
+            c = _dashpot(law, meeting, terms)
+            if c > 0.0:
+                said = f"m_r / (2 {law.rate}) at c = {c:g} kg/s"
+                if law.exponent > 0.0:
+                    speed = terms.impact_speed
+                    said = f"m_r / (2 {law.rate}), {c:.3g} kg/s at the deepest of an impact at {speed:g} m/s"
+                found.append(drag_bound(terms, damping_bound(c, meeting.reduced_mass), said))
+        return tightest(law.label, found, stability=True)
+
+    return bounds
+
+
+def _shares(law: DampingLaw) -> Callable[[Meeting, Terms], list[Share]]:
+    def shares(meeting: Meeting, terms: Terms) -> list[Share]:
+        c, method = _dashpot(law, meeting, terms), terms.method
+        if c == 0.0:
+            return []
+        rate = c / meeting.reduced_mass
+        if law.exponent > 0.0:
+            return [method.growing(law.exponent, rate, frequency(meeting, terms, terms.impact_speed))]
+        # How fast the force falls behind its jump is known where the spring is linear from there on.
+        return method.first_touch(rate, meeting.value(meeting.law.stiffness) / c)
+
+    return shares
+
+
+def _share(law: DampingLaw) -> str:
+    if law.exponent == 0.0:
+        return f"{law.rate} dt / m_r, or k dt / c if that is less: a jump at first touch that is met late"
+    power = "w dt" if law.exponent == 1.0 else f"(w dt)^{law.exponent:g}"
+    return f"{law.rate} dt / m_r, times {power} with a method of second order"
+
+
+def _effect(law: DampingLaw) -> Effect:
+    name: Any = law.effect
+    return Effect(
+        name=name,
+        law=law.law,
+        source=law.source,
+        called_for=_called_for(law),
+        absent=law.absent,
+        needs=law.needs,
+        bounds=_bounds(law),
+        bound=", ".join(text for text in (f"m_r / (2 {law.rate})", law.rate_at) if text),
+        shares=_shares(law),
+        share=_share(law),
+    )
+
+
+DAMPING_EFFECTS: tuple[Effect, ...] = tuple(_effect(law) for law in DAMPING)
+TURNING = tuple(effect for effect, law in zip(DAMPING_EFFECTS, DAMPING, strict=True) if law.isotropic)
+"""Those that act along the tangent as well."""

@@ -1,0 +1,182 @@
+"""Effects of friction: in contacts, its curve, how it is solved, and the spring with history."""
+
+import math
+from collections.abc import Collection
+
+from conveyor_sim.engine.contact.laws.linear import contact_time
+from conveyor_sim.physics.effects.contacts import contacts_in_use
+from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.physics.effects.load import contact_load
+from conveyor_sim.physics.effects.terms import (
+    Meeting,
+    Terms,
+    deepest,
+    drag_bound,
+    frequency,
+    meetings,
+    overlap_at,
+    tightest,
+)
+from conveyor_sim.physics.timestep.bounds import Bound, contact_friction_bound, damping_bound
+from conveyor_sim.physics.timestep.prediction import Term
+from conveyor_sim.scene.schema import BottleType, Scene
+
+
+def _contact_friction(scene: Scene, on: Collection[str]) -> Cause | None:
+    for index, contact in contacts_in_use(scene, on):
+        if contact.friction > 0.0:
+            return Cause(("contacts", index, "friction"), f"{contact.friction:g}")
+    return None
+
+
+def _contact_friction_bounds(terms: Terms) -> list[Bound]:
+    """At the load that belts can put on a contact."""
+    load = contact_load(terms)
+    if load.force == 0.0 or "implicit_friction" in terms.on or not terms.method.explicit:
+        return []
+    candidates = []
+    for meeting in meetings(terms):
+        mu, kind = _curve_friction(meeting), meeting.first
+        if mu > 0.0:
+            dt = contact_friction_bound(
+                mu, load.force, kind.mass, kind.moment_of_inertia, kind.radius, terms.scene.slip_limit
+            )
+            at = f"at mu = {mu:g} and N = {load.force:.3g} N, {load.reason}"
+            candidates.append(drag_bound(terms, dt, f"v_lim / [2 mu (1/m + R^2/J) N] {at}"))
+    return tightest("contact friction", candidates, stability=True)
+
+
+def _kick(terms: Terms, dt: float) -> list[Term]:
+    """The slip that the last step of an impact leaves where it is too long for friction, over the speed of impact.
+
+    It is used up before the end where mu (w dt)^2 is small beside v_lim / v.
+    """
+    if "implicit_friction" in terms.on or terms.method.slip == 0.0:
+        return []
+    speed = terms.impact_speed
+    kicks = []
+    for meeting in meetings(terms):
+        mu = _curve_friction(meeting)
+        w = frequency(meeting, terms, speed)
+        # Explicit friction is stable at the peak of the impact in so many steps a contact: 2 pi mu v / v_lim for hoops.
+        mobility = _rim_mobility(meeting.first) + _rim_mobility(meeting.second)
+        resolved = math.pi * mu * meeting.reduced_mass * mobility * speed / terms.scene.slip_limit
+        steps = math.pi / (w * dt)
+        if mu > 0.0 and steps < resolved:
+            kick = 0.5 * terms.method.slip * mu * (w * dt) * (w * dt)
+            reason = (
+                f"{steps:.3g} steps an impact of {meeting.what} at {speed:g} m/s, of {resolved:.3g}, 2 pi mu v / v_lim"
+            )
+            kicks.append((kick, reason))
+    return [Term("tangential speed after an impact", *max(kicks))] if kicks else []
+
+
+def _curve_friction(meeting: Meeting) -> float:
+    """mu of a contact that has friction by its curve, 0 by a tangential spring."""
+    return 0.0 if meeting.has_spring else meeting.value(meeting.law.friction)
+
+
+def _chosen(field: str, value: str, scene: Scene, on: Collection[str]) -> Cause | None:
+    if getattr(scene, field) == value and ("contact_friction" in on or "base_friction" in on):
+        return Cause((field,), value)
+    return None
+
+
+def _atan(scene: Scene, on: Collection[str]) -> Cause | None:
+    return _chosen("friction_curve", "atan", scene, on)
+
+
+def _implicit(scene: Scene, on: Collection[str]) -> Cause | None:
+    return _chosen("friction_solver", "implicit", scene, on)
+
+
+def _spring(scene: Scene, on: Collection[str]) -> Cause | None:
+    if "contact_friction" not in on:
+        return None
+    for index, contact in contacts_in_use(scene, on):
+        if contact.tangential is not None:
+            stiffness, ratio = contact.tangential.stiffness, contact.tangential.stiffness_ratio
+            said = f"{stiffness:g} N/m" if stiffness is not None else f"{ratio:g} of the normal stiffness"
+            return Cause(("contacts", index, "tangential"), said)
+    return None
+
+
+def _rim_mobility(kind: BottleType | None) -> float:
+    """1/m + R^2/J, how easily the rim of a bottle moves along itself, 1/kg; 0 for a rail."""
+    return 0.0 if kind is None else 1.0 / kind.mass + kind.radius**2 / kind.moment_of_inertia
+
+
+def _largest_stiffness(meeting: Meeting, terms: Terms) -> float:
+    """N/m, of the tangential spring; Mindlin's at the deepest overlap of an impact or a queue."""
+    if (mindlin := meeting.value(meeting.law.tangential_mindlin)) > 0.0:
+        pressed = overlap_at(meeting, terms, contact_load(terms).force)
+        return mindlin * math.sqrt(max(deepest(meeting, terms, terms.impact_speed)[0], pressed))
+    return meeting.value(meeting.law.tangential_stiffness)
+
+
+def _spring_bounds(terms: Terms) -> list[Bound]:
+    springs, dashpots = [], []
+    for meeting in meetings(terms):
+        k, c = _largest_stiffness(meeting, terms), meeting.value(meeting.law.tangential_damping)
+        mass = 1.0 / (_rim_mobility(meeting.first) + _rim_mobility(meeting.second))
+        if k > 0.0:
+            reason = f"{terms.steps:.3g} steps in pi sqrt(m_t / k_t) of {meeting.what} at k_t = {k:g} N/m"
+            springs.append((contact_time(k, mass) / terms.steps, reason))
+        if c > 0.0:
+            dashpots.append(drag_bound(terms, damping_bound(c, mass), f"m_t / (2 c_t) at c_t = {c:g} kg/s"))
+    return [*tightest("tangential spring", springs), *tightest("tangential damping", dashpots, stability=True)]
+
+
+CONTACT_FRICTION = Effect(
+    name="contact_friction",
+    law="mu N p(s), at the rim",
+    source="(7)-(10)",
+    called_for=_contact_friction,
+    absent="no contact with friction",
+    needs="mu by pair of materials",
+    bounds=_contact_friction_bounds,
+    bound="v_lim / [2 mu (1/m + R^2/J) N], N what belts full of bottles press with on "
+    "a contact, at most all bottles there can be (physics/effects/load.py)",
+    side=_kick,
+    beside="of the tangential speed after an impact, mu (w dt)^2 / 2 of the speed of impact, in fewer steps a contact "
+    "than 2 pi mu v / v_lim",
+)
+ATAN_FRICTION = Effect(
+    name="atan_friction",
+    law="p(s) = 2/pi atan(pi s / v_lim), in contacts and under bottles that stand on points",
+    source="named in the paper",
+    called_for=_atan,
+    absent="friction_curve is polynomial, or nothing has friction",
+    needs="nothing beside v_lim",
+    can_force_on=True,
+)
+IMPLICIT_FRICTION = Effect(
+    name="implicit_friction",
+    law="friction of the slip at the end of a step, with the mass of a bottle split among its contacts; with "
+    "velocity Verlet and rk4 it is explicit friction, and as exact, up to gamma dt = 2/3 and 1, with gamma = 2 "
+    "mu N / (m_t v_lim) times the closed contacts; a longer step looks ahead by what it is longer: friction is "
+    "then full from a slip of 1.5 and 1 times mu N dt / m_t on, not from v_lim, and gives way to a pull the "
+    "faster; none with dormand_prince, which divides its steps, and linearly_implicit, which solves for "
+    "friction itself",
+    source="added",
+    called_for=_implicit,
+    absent="friction_solver is explicit, or nothing has friction",
+    needs="closed contacts and 1/m + R^2/J of each bottle",
+    bound="none, and lifts those of contact_friction and, under points, base_friction; with semi-implicit Euler not "
+    "that of belts that turn",
+)
+TANGENTIAL_SPRING = Effect(
+    name="tangential_spring",
+    law="a spring along the contact, drawn out by the slip, its force at most mu N; with stiffness_ratio its stiffness "
+    "is that ratio times dN/d delta of a Hertz contact: where it grows the spring keeps its force, where it falls its "
+    "elongation; at rails that move by the slip along them; with leapfrog, semi-implicit Euler, velocity Verlet "
+    "(order 2) and rk4 (order 4 while it sticks, 2 where it begins to slide), which cut it once a step; dormand_prince "
+    "gives steps up and linearly_implicit solves for all velocities at once: they take none",
+    source="Cundall and Strack 1979; Mindlin 1949, Thornton, Cummins and Cleary 2013",
+    called_for=_spring,
+    absent="no contact with tangential, or no friction in contacts",
+    needs="elongation of each contact, kept through rebuilds; k_t, c_t and mu by pair of materials",
+    bounds=_spring_bounds,
+    bound="2 / sqrt(tolerance) steps in pi sqrt(m_t / k_t), 20 at 1 %, with k_t as in the hardest impact or queue; "
+    "m_t / (2 c_t), with 1/m_t the sum of 1/m + R^2/J of those that touch",
+)

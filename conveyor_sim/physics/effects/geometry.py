@@ -1,0 +1,82 @@
+"""Effects of what there is to touch: rails at rest and moving ones, and bottles of several sizes."""
+
+from collections.abc import Collection
+
+from conveyor_sim.physics.effects.declaration import Cause, Effect
+from conveyor_sim.scene.geometry import ArcPiece, rail_shapes
+from conveyor_sim.scene.moving import movers_of
+from conveyor_sim.scene.schema import Scene
+
+
+def _rail(scene: Scene, arc: bool) -> Cause | None:
+    for rail in rail_shapes(scene):
+        if any(isinstance(piece, ArcPiece) == arc for piece in rail.pieces):
+            if rail.name in scene.rails:
+                return Cause(("rails", rail.name))
+            belt, side = rail.name.rsplit("_", 1)
+            return Cause(("belts", belt, "rails", side))
+    return None
+
+
+def _segments(scene: Scene, on: Collection[str]) -> Cause | None:
+    return _rail(scene, arc=False)
+
+
+def _arcs(scene: Scene, on: Collection[str]) -> Cause | None:
+    return _rail(scene, arc=True)
+
+
+def _moving(scene: Scene, on: Collection[str]) -> Cause | None:
+    return next((Cause(path) for path, _ in movers_of(scene)), None)
+
+
+def _radii(scene: Scene, on: Collection[str]) -> Cause | None:
+    first, *others = scene.bottle_types.items()
+    for name, kind in others:
+        if kind.radius != first[1].radius and "bottle_contact" in on:
+            return Cause(("bottle_types", name, "radius"), f"{kind.radius:g} m, {first[0]} has {first[1].radius:g} m")
+    return None
+
+
+SEGMENT_RAILS = Effect(
+    name="segment_rails",
+    law="contact with the nearest point of a segment, its ends included; pieces that meet push as one surface (where "
+    "three or more touch at once, their push may be off sideways by 5 % of the deepest one, by 25 % between pieces "
+    "that face each other)",
+    source="(22)-(23)",
+    called_for=_segments,
+    absent="no straight rail",
+    needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
+)
+ARC_RAILS = Effect(
+    name="arc_rails",
+    law="contact with the nearest point of an arc; one like a C, both tips of which can touch a bottle at once, is two "
+    "halves",
+    source="(21)-(23)",
+    called_for=_arcs,
+    absent="no arc rail",
+    needs="pieces of rails, a grid over them, pieces near each bottle; a contact for each pair of materials",
+)
+MOVING_RAILS = Effect(
+    name="moving_rails",
+    law="straight rails that slide or swing, at constant accelerations one after another, in every step; damping and "
+    "friction know the velocity of the rail at the contact; where the drive's limit does not do for that, a body, "
+    "M a = F + Q, with F within the limit and Q what bottles exert",
+    source="added",
+    called_for=_moving,
+    absent="no gate, pusher or diverter",
+    needs="the course of each rail and where it is now; a box that it sweeps; unless no drive has a limit, the sum of "
+    "what bottles exert on each rail; a contact for each pair of materials; integrators leapfrog, "
+    "semi_implicit_euler and velocity_verlet",
+    can_force_off=False,
+)
+UNEQUAL_RADII = Effect(
+    name="unequal_radii",
+    law="overlap from the radii of both bottles",
+    source="added",
+    called_for=_radii,
+    absent="all bottles that touch have one radius",
+    needs="R_i + R_j of each pair",
+    can_force_on=True,
+    can_force_off=False,
+)

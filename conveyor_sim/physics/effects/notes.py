@@ -1,0 +1,41 @@
+"""What a reader of the results should know of how a scene was set up, in sentences."""
+
+from collections.abc import Collection
+
+from conveyor_sim.physics.effects.contacts import contacts_in_use
+from conveyor_sim.scene.geometry import rail_shapes
+from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.schema import Scene
+
+CAN = 0.73
+"""Base radius over radius of a beverage can, which stacks on the countersink of another's end (docs/base.md)."""
+
+LEAST, MOST = 0.65, 1.8
+"""Scuffing of rails by bottles on rings of CAN over that on points, the extremes of docs/studies/base_radius.csv."""
+
+
+def notes(scene: Scene, on: Collection[str]) -> list[str]:
+    """Sentences about a valid scene with some effects on; none where there is nothing to say."""
+    return [*_rolls_on_points(scene, on)]
+
+
+def _rolls_on_points(scene: Scene, on: Collection[str]) -> list[str]:
+    """Bottles on points that may rub along rails: nothing but the rail turns them, so they roll (docs/base.md)."""
+    if not {"base_friction", "contact_friction", "rotation"} <= set(on) or "static_friction" in on:
+        return []
+    rails = {rail.material for rail in rail_shapes(scene)} | {rail.material for rail in moving_shapes(scene)}
+    rub = [set(contact.between) for _, contact in contacts_in_use(scene, on) if contact.friction > 0.0]
+    on_points = {
+        name: kind
+        for name, kind in scene.bottle_types.items()
+        if kind.base_radius is None and any({kind.material, rail} in rub for rail in rails)
+    }
+    if not on_points:
+        return []
+    name, kind = next(iter(on_points.items()))
+    others = "" if len(on_points) == 1 else f", and {len(on_points) - 1} more,"
+    return [
+        f"bottle_types.{name}{others} stands on a point: its spin is free, and along rails it rolls; on rings "
+        f"scuffing was {LEAST:g} to {MOST:g} times that on shipped scenes (docs/base.md); give base_radius, of a can "
+        f"{CAN:g} of the radius: {CAN * kind.radius:.3g} m"
+    ]

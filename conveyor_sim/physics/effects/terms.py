@@ -1,0 +1,191 @@
+"""What bounds on the time step and predicted errors are computed from, and what those of several effects share."""
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.contact.laws import DAMPING, ELASTIC, DampingLaw, ElasticLaw
+from conveyor_sim.physics.laws.coefficients import Laws
+from conveyor_sim.physics.timestep.bounds import Bound, least_steps
+from conveyor_sim.physics.timestep.methods import METHODS, STEP_ERROR, Method
+from conveyor_sim.scene.geometry import initial_bottles
+from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.schema import BottleType, Scene, Single
+
+SPEED_AT_REST = 1.0
+"""m/s, assumed of impacts where nothing in a scene moves at first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """A scene, its coefficients, which effects are on, and how exact it shall be."""
+
+    scene: Scene
+    laws: Laws
+    on: Collection[str]
+    tolerance: float
+    """Relative error in contact force to stay below."""
+
+    @property
+    def types(self) -> list[BottleType]:
+        """The bottle types, T of them, in the scene's order."""
+        return list(self.scene.bottle_types.values())
+
+    @cached_property
+    def impact_speed(self) -> float:
+        """Of the hardest impact expected, m/s."""
+        return impact_speed(self.scene)
+
+    @property
+    def method(self) -> Method:
+        """What the integrator misses."""
+        return METHODS[self.scene.accuracy.integrator]
+
+    @property
+    def step_error(self) -> float:
+        """m/s, largest error of a step, of an integrator that divides its steps itself."""
+        given = self.scene.accuracy.error
+        return STEP_ERROR if given is None else given
+
+    @property
+    def steps(self) -> float:
+        """Steps that what is sampled should last at least."""
+        return least_steps(self.tolerance)
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """One entry of a ContactLaw: two bottle types, or a type and a rail material, and their coefficients."""
+
+    what: str
+    """`two bottles`, or `a bottle and a rail`."""
+    law: ContactLaw
+    entry: int
+    reduced_mass: float
+    """kg"""
+    first: BottleType
+    second: BottleType | None
+    """None: a rail."""
+
+    def value(self, column: F8 | None) -> float:
+        """The coefficient of this meeting, 0 if it has none."""
+        return 0.0 if column is None else float(column[self.entry])
+
+    def coefficient(self, law: DampingLaw) -> float:
+        """Its coefficient of a law of damping, 0 if it has another or none."""
+        return self.value(getattr(self.law, law.column))
+
+    @property
+    def elastic(self) -> tuple[ElasticLaw, Any]:
+        """Its elastic law, and its coefficient or the number of its table."""
+        columns = ((law, getattr(self.law, law.column)) for law in ELASTIC)
+        found = ((law, column[self.entry].item()) for law, column in columns if column is not None)
+        return next((law, k) for law, k in found if k > law.none)
+
+    @property
+    def damping(self) -> DampingLaw | None:
+        """Its law of damping."""
+        return next((law for law in DAMPING if self.coefficient(law)), None)
+
+    @property
+    def has_spring(self) -> bool:
+        """Whether friction is by a tangential spring in place of the curve."""
+        return self.value(self.law.tangential_stiffness) + self.value(self.law.tangential_mindlin) > 0.0
+
+
+def meetings(terms: Terms) -> Iterator[Meeting]:
+    """Every pair of types that can touch, then every type and rail material; types that no bottle has are left out."""
+    types, supplied = terms.types, supply(terms.scene)
+    present = [index for index, name in enumerate(terms.scene.bottle_types) if name in supplied]
+    if terms.laws.pair is not None:
+        for a in present:
+            for b in present:
+                one, other = types[a], types[b]
+                reduced = one.mass * other.mass / (one.mass + other.mass)
+                yield Meeting("two bottles", terms.laws.pair, a * len(types) + b, reduced, one, other)
+    if terms.laws.rail is not None:
+        columns = [column for column in terms.laws.rail if column is not None]
+        materials = columns[0].size // len(types) if columns else 0
+        for a in present:
+            one = types[a]
+            for material in range(materials):
+                entry = a * materials + material
+                yield Meeting("a bottle and a rail", terms.laws.rail, entry, one.mass, one, None)
+
+
+def tightest(name: str, candidates: Sequence[tuple[float, str]], stability: bool = False) -> list[Bound]:
+    """The least of some bounds (s, reason) as a list; empty if there are none."""
+    if not candidates:
+        return []
+    dt, reason = min(candidates)
+    return [Bound(name, dt, reason, stability)]
+
+
+def drag_bound(terms: Terms, dt: float, reason: str) -> tuple[float, str]:
+    """Semi-implicit Euler's bound (s) on a drag, a dashpot or friction at rest, as the scene's integrator has it."""
+    limit = terms.method.drag_limit
+    return limit * dt, reason if limit == 1.0 else f"{limit:g} times {reason}"
+
+
+def supply(scene: Scene) -> dict[str, float]:
+    """How many bottles of each type a run can hold at most, by name; infinite from an infeed without end.
+
+    Types that no bottle has are not in it.
+    """
+    found: dict[str, float] = {}
+    for name, *_ in initial_bottles(scene):
+        found[name] = found.get(name, 0.0) + 1.0
+    for _, entry in scene.entries():
+        found[entry.bottle] = found.get(entry.bottle, 0.0) + (math.inf if entry.most is None else entry.most)
+    return found
+
+
+def most_bottles(scene: Scene) -> int | None:
+    """Bottles that a run can hold at most, None if an infeed has no end."""
+    most = sum(supply(scene).values())
+    return int(most) if math.isfinite(most) else None
+
+
+def impact_speed(scene: Scene) -> float:
+    """The speed of the hardest impact expected, m/s; SPEED_AT_REST if all rest.
+
+    The fastest belt or bottle that enters against something at rest, or the most by which bottles differ at the start;
+    and a rail that comes against that.
+    """
+    speeds = [abs(belt.speed) for belt in scene.belts.values()]
+    speeds += [giver.heading[1] for _, giver in scene.givers()]
+    given = np.array([(0.0, 0.0), *(entry.velocity for entry in scene.bottles if isinstance(entry, Single))])
+    speeds.append(math.hypot(*np.ptp(given, axis=0)))
+    rails = [shape.max_speed * shape.fastest_point for shape in moving_shapes(scene)]
+    return max(speeds) + max(rails, default=0.0) or SPEED_AT_REST
+
+
+def deepest(meeting: Meeting, terms: Terms, speed: float) -> tuple[float, float]:
+    """Overlap (m) and force (N) at the turning point of an undamped head-on impact at a speed in m/s."""
+    law, k = meeting.elastic
+    return law.deepest(k, 0.5 * meeting.reduced_mass * speed * speed, terms.laws.curves)
+
+
+def overlap_at(meeting: Meeting, terms: Terms, force: float) -> float:
+    """Overlap (m) at which the elastic law gives a force (N)."""
+    law, k = meeting.elastic
+    return law.overlap_at(k, force, terms.laws.curves)
+
+
+def duration(meeting: Meeting, terms: Terms, speed: float) -> float:
+    """How long an undamped head-on impact at a speed in m/s lasts, s; on a table: at least."""
+    law, k = meeting.elastic
+    return law.duration(k, meeting.reduced_mass, speed, terms.laws.curves)
+
+
+def frequency(meeting: Meeting, terms: Terms, speed: float) -> float:
+    """sqrt(-N'' / N) at the peak of the force N of an undamped head-on impact at a speed in m/s, rad/s."""
+    law, k = meeting.elastic
+    depth, _ = deepest(meeting, terms, speed)
+    return math.sqrt(law.stiffest(k, depth, terms.laws.curves) / meeting.reduced_mass)

@@ -1,0 +1,225 @@
+"""Scene -> Model: the constant arrays, the chosen effects and why, the time step and its reason."""
+
+import math
+import platform
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from conveyor_sim import __version__
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
+from conveyor_sim.engine.arrays.lists import StaticGrid
+from conveyor_sim.engine.arrays.rails import Arcs, Segments
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH
+from conveyor_sim.engine.integrators import AHEAD, LAG
+from conveyor_sim.errors import SceneError
+from conveyor_sim.physics.effects import EffectChoice, prediction_of
+from conveyor_sim.physics.effects.load import Load, contact_load
+from conveyor_sim.physics.laws.coefficients import BaseSprings, Laws
+from conveyor_sim.physics.model.mouths import cut_at_mouths
+from conveyor_sim.physics.model.plant import plant_grid, rail_arrays
+from conveyor_sim.physics.model.remedies import too_many
+from conveyor_sim.physics.model.step_choice import choose_steps
+from conveyor_sim.physics.sources_hash import sources_hash
+from conveyor_sim.physics.timestep.bounds import Bound
+from conveyor_sim.physics.timestep.prediction import Impact, Prediction
+from conveyor_sim.scene.accuracy import MOST_STEPS
+from conveyor_sim.scene.effect_names import EffectName
+from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, rail_shapes
+from conveyor_sim.scene.moving import MovingShape, moving_shapes
+from conveyor_sim.scene.places import Places
+from conveyor_sim.scene.schema import BottleType, Scene
+
+SKIN = 0.2
+"""Of the smallest radius: the distance that keeps rebuilds rare and lists short on dense tables."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything about a scene that does not change while it runs. T types, H belts, M rail materials."""
+
+    name: str
+    dt: float
+    """s"""
+    steps_per_tick: int
+    tick_ns: int
+    dt_reason: str
+    bounds: tuple[Bound, ...]
+    """For the preset or tolerance of the scene; `standard` where it gives the time step itself."""
+    accuracy: str
+    """What the scene chooses, in words."""
+    impacts: tuple[Impact, ...]
+    """The hardest that are expected, of each pair of types and materials."""
+    prediction: Prediction
+    load: Load
+    """What is expected to press on a contact for long."""
+    integrator: str
+    effects: tuple[EffectChoice, ...]
+    belts: tuple[str, ...]
+    rails: tuple[str, ...]
+    bottle_types: tuple[str, ...]
+    type_radius: F8
+    """(T,), m"""
+    type_mass: F8
+    """(T,), kg"""
+    type_inertia: F8
+    """(T,), kg m^2"""
+    type_base_radius: F8 | None
+    """(T,), m, of the ring that a bottle stands on, 0 for a point; None if all stand on points."""
+    type_heights: F8
+    """(T, 2), m, of the contact band and of the centre of gravity; NaN where they are not given."""
+    belt_shapes: tuple[BeltShape, ...]
+    rail_shapes: tuple[RailShape, ...]
+    """By number; those that move are last, as they are at first."""
+    moving_shapes: tuple[MovingShape, ...]
+    rail_materials: tuple[str, ...]
+    """By number in `rail_law`."""
+    settings: Settings
+    pair_law: ContactLaw | None
+    """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
+    rail_law: ContactLaw | None
+    """(T * M,), bottle and rail; None without rails."""
+    curves: Curves | None
+    """Tables of force against overlap; None where no contact has one."""
+    friction_curve: str
+    """`polynomial` or `atan`."""
+    friction_solver: str
+    """`explicit` or `implicit`."""
+    segments: Segments | None
+    arcs: Arcs | None
+    grid: StaticGrid | None
+    base_friction: F8 | None
+    """(H + 1, T), the floor last, 0 where a spring holds; None without friction under the bottles."""
+    base_spring: BaseSprings | None
+    """None without springs under the bottles."""
+    largest_base_friction: float
+    """Of any bottle on any belt or floor, by curve or spring; 0 without."""
+    gravity: float
+    engine_hash: str
+    versions: tuple[str, ...]
+    machine: str
+
+    @property
+    def rails_at_rest(self) -> tuple[RailShape, ...]:
+        """Those of `rail_shapes` that do not move."""
+        return self.rail_shapes[: len(self.rail_shapes) - len(self.moving_shapes)]
+
+    def has(self, effect: EffectName) -> bool:
+        """Whether an effect is on."""
+        return any(choice.on for choice in self.effects if choice.name == effect)
+
+
+def build_model(scene: Scene) -> Model:
+    """Build the Model of a valid scene. Raises SceneError if a tick has more than MOST_STEPS steps."""
+    choice = choose_steps(scene)
+    laws, on, steps = choice.laws, choice.on, choice.steps
+    if steps > MOST_STEPS:
+        raise SceneError(f"{Places(scene).of(('accuracy',))}: accuracy: {too_many(scene, choice)}")
+    types = list(scene.bottle_types.values())
+    radius = np.array([kind.radius for kind in types])
+    rails, belts, moving = rail_shapes(scene), belt_shapes(scene), moving_shapes(scene)
+    rails = cut_at_mouths(rails, float(radius.max()))
+    all_rails = [*rails, *(shape.shape(shape.first) for shape in moving)]
+    rail_materials = list(choice.rail_materials)
+    skin = SKIN * float(radius.min())
+    segments, arcs = rail_arrays(rails, rail_materials)
+    dt = scene.tick_ns * 1e-9 / steps
+    ahead, at_once = AHEAD.get(scene.accuracy.integrator, (1.0, 0.0))
+    return Model(
+        name=scene.name,
+        dt=dt,
+        steps_per_tick=steps,
+        tick_ns=scene.tick_ns,
+        dt_reason=choice.reason,
+        bounds=choice.bounds,
+        accuracy=choice.aim.words if choice.given is None else f"given, {_given_words(scene)}",
+        impacts=choice.impacts,
+        prediction=prediction_of(choice.terms, choice.impacts, dt),
+        load=contact_load(choice.terms),
+        integrator=scene.accuracy.integrator,
+        effects=choice.effects,
+        belts=tuple(scene.belts),
+        rails=tuple(rail.name for rail in all_rails),
+        bottle_types=tuple(scene.bottle_types),
+        type_radius=radius,
+        type_mass=np.array([kind.mass for kind in types]),
+        type_inertia=np.array([kind.moment_of_inertia for kind in types]),
+        type_base_radius=laws.base_radius,
+        type_heights=np.array([_heights(kind) for kind in types]),
+        belt_shapes=tuple(belts),
+        rail_shapes=tuple(all_rails),
+        moving_shapes=tuple(moving),
+        rail_materials=tuple(rail_materials),
+        settings=Settings(
+            slip_limit=scene.slip_limit,
+            lever=1.0 if scene.lever_arm == "overlap" else 0.0,
+            skin=skin,
+            cell=2.0 * float(radius.max()) + skin,
+            rail_materials=len(rail_materials),
+            reach=2.0 * float(radius[0]),
+            atan=1 if "atan_friction" in on else None,
+            error=choice.terms.step_error,
+            ahead=ahead,
+            at_once=at_once,
+            lag=LAG.get(scene.accuracy.integrator, 0.0),
+        ),
+        pair_law=laws.pair,
+        rail_law=laws.rail,
+        curves=laws.curves,
+        friction_curve="atan" if "atan_friction" in on else "polynomial",
+        friction_solver="implicit" if "implicit_friction" in on else "explicit",
+        segments=segments if "segment_rails" in on else None,
+        arcs=arcs if "arc_rails" in on else None,
+        grid=plant_grid(rails, belts if "belts" in on else [], float(radius.max()), _largest(laws.base_radius), skin),
+        base_friction=_friction_table(laws),
+        base_spring=laws.base_spring,
+        largest_base_friction=laws.largest_base_friction,
+        gravity=scene.gravity,
+        engine_hash=ENGINE_HASH,
+        versions=versions_here(),
+        machine=_machine(),
+    )
+
+
+@cache
+def versions_here() -> tuple[str, ...]:
+    """ "package=version" of what can change a bit, beside the engine (`ENGINE_HASH`)."""
+    packages = (f"{package}={version(package)}" for package in ("numba", "llvmlite", "numpy"))
+    return f"conveyor_sim={__version__}+{sources_hash()}", *packages
+
+
+def _given_words(scene: Scene) -> str:
+    accuracy = scene.accuracy
+    return f"{accuracy.per_tick} steps a tick" if accuracy.dt is None else f"at most {accuracy.dt * 1e6:g} us"
+
+
+def _friction_table(laws: Laws) -> F8 | None:
+    """Friction by its curve, a table of 0 if springs hold all that there is."""
+    if laws.base_friction is None and laws.base_spring is not None:
+        return np.zeros_like(laws.base_spring.friction)
+    return laws.base_friction
+
+
+def _heights(kind: BottleType) -> tuple[float, float]:
+    """Of the contact band and of the centre of gravity, m; NaN where they are not given."""
+    if kind.contact_height is None or kind.gravity_height is None:
+        return math.nan, math.nan
+    return kind.contact_height, kind.gravity_height
+
+
+def _largest(radii: F8 | None) -> float:
+    """The largest of some radii, m; 0 if there are none."""
+    return 0.0 if radii is None else float(radii.max())
+
+
+@cache
+def _machine() -> str:
+    """CPU architecture and the features that change compiled code."""
+    features = llvm.get_host_cpu_features()
+    present = ",".join(sorted(name for name, has in features.items() if has))
+    return f"{platform.machine()} {llvm.get_host_cpu_name()} {present}"

@@ -1,0 +1,222 @@
+"""What sets the number of steps of a scene, how far it stands out, and which changes of the scene lower it.
+
+A remedy is a change of the scene file. It is tried: the steps of the changed scene are chosen anew, and only a change
+that lowers them by enough is named, with the number that it came to.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from conveyor_sim.errors import SceneError
+from conveyor_sim.physics.effects import most_bottles
+from conveyor_sim.physics.effects.terms import impact_speed
+from conveyor_sim.physics.model.step_choice import StepChoice, choose_steps
+from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps
+from conveyor_sim.physics.timestep.presets import DEFAULT
+from conveyor_sim.scene.accuracy import MANY_STEPS, MOST_STEPS
+from conveyor_sim.scene.contacts import DAMPING_CHOICES
+from conveyor_sim.scene.load import parse_overrides, parse_scene
+from conveyor_sim.scene.schema import Scene
+
+WORTH = 0.8
+"""Of the steps and of the cost of a tick: a remedy that leaves more is not worth a sentence."""
+
+NAMED = 2
+"""Remedies at most, the one that costs least first."""
+
+NEAR = 2.0
+"""Times the cost of the first remedy, up to which the second is named."""
+
+STEP_COST: Mapping[str, int] = {
+    "leapfrog": 1,
+    "semi_implicit_euler": 1,
+    "velocity_verlet": 1,
+    "rk4": 4,
+    "dormand_prince": 12,
+    "linearly_implicit": 6,
+}
+"""Of a step, in evaluations of all forces and what is like them."""
+
+OTHERS = ("leapfrog", "velocity_verlet")
+"""Integrators that a remedy may choose."""
+
+BOTTLE_STEP = 3e-8
+"""s, of one bottle in one step on one core of 2020s make, in round numbers."""
+
+BESIDE = 10
+"""Bottles that cost as much as the rest of a step."""
+
+COARSER = {"fine": "standard", "standard": "draft"}
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change of a scene that lowers its number of steps."""
+
+    words: str
+    """As in a scene file, and what else it changes."""
+    overrides: Mapping[str, Any]
+    """To be laid over the scene."""
+    steps: int
+    """In a tick of the scene with it."""
+    cost: float
+    """Of a step, over that of a step without it."""
+
+    @property
+    def price(self) -> float:
+        """Of a tick with it, in steps of the scene without it."""
+        return self.steps * self.cost
+
+    def sentence(self, before: int) -> str:
+        """In words; before: steps without it."""
+        return f"{self.words}: {_steps(self.steps)}, {_times(before / self.steps)} fewer"
+
+
+@dataclass(frozen=True)
+class StepLimit:
+    """What sets the steps in a tick of a scene."""
+
+    steps: int
+    given: bool
+    """By the scene itself, not by the bounds."""
+    bounds: tuple[Bound, ...]
+    """The tightest first."""
+    tick: float
+    """s"""
+    bottles: int | None
+    """That there can be at most; None without end."""
+    remedies: tuple[Remedy, ...]
+
+    @property
+    def ratio(self) -> float:
+        """By how much the tightest bound stands out from the next one."""
+        return self.bounds[1].dt / self.bounds[0].dt if len(self.bounds) > 1 else 1.0
+
+    @property
+    def lines(self) -> list[str]:
+        """For a reader who wants fewer steps: the bound, the remedies, and a warning where a run will be slow."""
+        found = [self.bound, self.change]
+        if self.steps >= MANY_STEPS:
+            found.append(self._warning())
+        return [line for line in found if line]
+
+    @property
+    def bound(self) -> str:
+        """The bound that rules, and by how much; empty where there is none."""
+        if not self.bounds:
+            return ""
+        first, *others = self.bounds
+        needs = fewest_steps(self.tick, first.dt)
+        text = f"{first.name} needs {_steps(needs)}"
+        if others:
+            text += f", {_times(self.ratio)} the next bound, {others[0].name} ({fewest_steps(self.tick, others[0].dt)})"
+        return f"{_steps(self.steps)} are given in the scene; {text}" if self.given else text
+
+    @property
+    def change(self) -> str:
+        """The remedies; empty where none is known, unless the steps are many."""
+        if not self.remedies:
+            return "" if self.steps < MANY_STEPS else "no single change of the scene that is known to help lowers it"
+        return "fewer steps: " + "; or ".join(remedy.sentence(self.steps) for remedy in self.remedies)
+
+    def seconds(self, bottles: int) -> float:
+        """Of computing on one core for a simulated second of so many bottles, in round numbers."""
+        return self.steps / self.tick * (bottles + BESIDE) * BOTTLE_STEP
+
+    def _warning(self) -> str:
+        bottles = 100 if self.bottles is None else max(1, self.bottles)
+        seconds = self.seconds(bottles)
+        text = f"{seconds:.2g}" if seconds < 100.0 else f"{seconds:.0f}"
+        return f"slow: a simulated second of {bottles} bottles will take about {text} s of computing on one core"
+
+
+def step_limit(scene: Scene, choice: StepChoice | None = None) -> StepLimit:
+    """What sets the steps of a valid scene, with the remedies that were tried to help. choice: of this scene."""
+    choice = choose_steps(scene) if choice is None else choice
+    tried = (_tried(scene, *candidate) for candidate in _candidates(scene, choice))
+    helpful = [one for one in tried if one is not None and max(one.price, one.steps) <= WORTH * choice.steps]
+    helpful.sort(key=lambda one: one.price)
+    return StepLimit(
+        steps=choice.steps,
+        given=choice.given is not None,
+        bounds=tuple(sorted(choice.bounds, key=lambda bound: bound.dt)),
+        tick=scene.tick,
+        bottles=most_bottles(scene),
+        remedies=tuple(one for one in helpful[:NAMED] if one.price <= NEAR * helpful[0].price),
+    )
+
+
+def with_remedy(scene: Scene, overrides: Mapping[str, Any]) -> Scene:
+    """The scene with a change laid over it. SceneError if it does not allow that."""
+    return parse_scene(scene.source_text, scene.source_name, {**parse_overrides(scene.overrides_text), **overrides})
+
+
+def too_many(scene: Scene, choice: StepChoice) -> str:
+    """Why a scene of more than MOST_STEPS steps is refused, and what helps."""
+    remedies = step_limit(scene, choice).remedies
+    helps = f", as with {remedies[0].sentence(choice.steps)}" if remedies else ""
+    return f"{choice.reason}; expected at most {MOST_STEPS} steps a tick{helps}"
+
+
+def _candidates(scene: Scene, choice: StepChoice) -> Iterator[tuple[str, Mapping[str, Any], float]]:
+    """Changes to try: words, overrides, cost of a step."""
+    accuracy = scene.accuracy.model_dump()
+    if choice.given is not None:
+        free = accuracy | {"per_tick": None, "dt": None}
+        yield f"without accuracy.{'dt' if accuracy['dt'] else 'per_tick'}", {"accuracy": free}, 1
+    if scene.friction_solver != "implicit":
+        yield "friction_solver: implicit", {"friction_solver": "implicit"}, 1
+    for integrator in OTHERS:
+        if accuracy["integrator"] != integrator:
+            cost = STEP_COST[integrator] / STEP_COST[accuracy["integrator"]]
+            extra = "" if cost <= 1.0 else f", at about {cost:g} times the cost of a step"
+            changed = {"accuracy": accuracy | {"integrator": integrator, "error": None}}
+            yield f"accuracy: {{integrator: {integrator}}}{extra}", changed, cost
+    onset = _onset(scene)
+    if onset is not None:
+        words = f"damping: {{law: onset, speed: {impact_speed(scene):g}}} where a restitution is given"
+        yield words, {"contacts": onset}, 1
+        if scene.accuracy.integrator in ("leapfrog", "semi_implicit_euler"):
+            both = {"contacts": onset, "accuracy": accuracy | {"integrator": "velocity_verlet"}}
+            yield f"{words}, with accuracy: {{integrator: velocity_verlet}}", both, 1
+    coarser = COARSER.get(scene.accuracy.preset or DEFAULT)
+    if coarser is not None and choice.given is None and scene.accuracy.tolerance is None:
+        yield f"accuracy: {{preset: {coarser}}}, less exact", {"accuracy": accuracy | {"preset": coarser}}, 1
+
+
+def _onset(scene: Scene) -> list[dict[str, Any]] | None:
+    """The contacts with Hunt and Crossley's damping, which has no jump, in place of dashpots by restitution.
+
+    None if no contact has one.
+    """
+    contacts: list[dict[str, Any]] = []
+    changed = False
+    for contact in scene.contacts:
+        data = contact.model_dump(mode="json", exclude_none=True)
+        choice = DAMPING_CHOICES.get(contact.damping.law)
+        if choice is not None and not choice.at_speed and contact.damping.restitution:
+            restitution, speed = contact.damping.restitution, impact_speed(scene)
+            data["damping"] = {"law": "onset", "restitution": restitution, "speed": speed}
+            changed = True
+        elif contact.damping.restitution is not None:
+            del data["damping"]["coefficient"]  # a scene gives one of the two
+        contacts.append(data)
+    return contacts if changed else None
+
+
+def _tried(scene: Scene, words: str, overrides: Mapping[str, Any], cost: float) -> Remedy | None:
+    """A candidate with the steps that it comes to; None if the scene does not allow it."""
+    try:
+        steps = choose_steps(with_remedy(scene, overrides)).steps
+    except SceneError:
+        return None
+    return Remedy(words, overrides, steps, cost) if steps <= MOST_STEPS else None
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2g} times" if ratio < 100.0 else f"{ratio:.0f} times"
+
+
+def _steps(steps: int) -> str:
+    return "1 step a tick" if steps == 1 else f"{steps} steps a tick"

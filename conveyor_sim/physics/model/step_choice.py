@@ -1,0 +1,54 @@
+"""How many steps a tick of a scene takes, and all that this follows from; without the arrays of the Model."""
+
+from dataclasses import dataclass
+
+from conveyor_sim.physics.effects import EffectChoice, Terms, bounds_of, choose_effects, impacts_of
+from conveyor_sim.physics.laws.coefficients import Laws, build_laws
+from conveyor_sim.physics.timestep.bounds import Bound, fewest_steps, steps_per_tick
+from conveyor_sim.physics.timestep.prediction import Impact
+from conveyor_sim.physics.timestep.presets import Target, target
+from conveyor_sim.scene.effect_names import EffectName
+from conveyor_sim.scene.geometry import rail_shapes
+from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.schema import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class StepChoice:
+    """The steps in a tick of a scene, and why."""
+
+    effects: tuple[EffectChoice, ...]
+    on: frozenset[EffectName]
+    laws: Laws
+    rail_materials: tuple[str, ...]
+    aim: Target
+    terms: Terms
+    impacts: tuple[Impact, ...]
+    bounds: tuple[Bound, ...]
+    given: int | None
+    """Steps that the scene itself gives."""
+    steps: int
+    reason: str
+
+
+def choose_steps(scene: Scene) -> StepChoice:
+    """The steps in a tick of a valid scene. SceneError if an effect can't be forced as it says."""
+    effects = choose_effects(scene)
+    on: frozenset[EffectName] = frozenset(effect.name for effect in effects if effect.on)
+    at_rest, moving = rail_shapes(scene), moving_shapes(scene)
+    materials = sorted({rail.material for rail in at_rest} | {rail.material for rail in moving})
+    laws = build_laws(scene, materials, on)
+    aim = target(scene.accuracy)
+    terms = Terms(scene, laws, on, aim.tolerance)
+    impacts = impacts_of(terms)
+    bounds = bounds_of(terms, impacts)
+    given = _given_steps(scene)
+    steps, reason = steps_per_tick(scene.tick, bounds, given, aim.words)
+    return StepChoice(effects, on, laws, tuple(materials), aim, terms, impacts, bounds, given, steps, reason)
+
+
+def _given_steps(scene: Scene) -> int | None:
+    """Steps a tick that the scene itself gives."""
+    if scene.accuracy.dt is not None:
+        return fewest_steps(scene.tick, scene.accuracy.dt)
+    return scene.accuracy.per_tick

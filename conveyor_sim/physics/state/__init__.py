@@ -1,0 +1,5 @@
+"""All that changes as a scene runs: its arrays, and their checkpoint in a file."""
+
+from conveyor_sim.physics.state.state import State
+
+__all__ = ["State"]

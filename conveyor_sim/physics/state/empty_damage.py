@@ -1,0 +1,121 @@
+"""The arrays of what bottles and rails bear, empty, as a Model needs them; and where the bins of rails lie."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.damage import (
+    MOST_TOUCHES,
+    Crushing,
+    Damage,
+    Impacts,
+    RailBins,
+    Scuffing,
+    Tipping,
+    Worst,
+)
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.physics.model import Model
+from conveyor_sim.scene.geometry import ArcPiece, Piece
+
+BIN = 0.05
+"""m, length of a bin of rail at most."""
+
+
+@dataclass(frozen=True)
+class RailPlaces:
+    """Where the bins of the rails lie, (B,), in the order of the engine: straight pieces, then arcs."""
+
+    rail: NDArray[np.uint32]
+    x: F8
+    """m, of the middle."""
+    y: F8
+    length: F8
+    """m"""
+
+
+def empty_damage(model: Model, slots: int) -> Damage | None:
+    """Room for that many bottles; None where all of it is disabled."""
+
+    def reals() -> F8:
+        return np.zeros(slots)
+
+    def worst() -> Worst:
+        return Worst(reals(), reals())
+
+    touching, touched = np.zeros((2, slots, MOST_TOUCHES), np.int64)
+    damage = Damage(
+        scuffing=Scuffing(reals(), _rail_bins(model, slots)) if model.has("scuffing") else None,
+        crushing=Crushing(worst(), worst()) if model.has("crushing") else None,
+        impacts=Impacts(worst(), worst(), reals(), reals(), touching, touched) if model.has("impacts") else None,
+        tipping=Tipping(worst(), reals(), reals(), *_levers(model), reals(), reals(), reals())
+        if model.has("tipping")
+        else None,
+    )
+    return None if all(group is None for group in damage) else damage
+
+
+def rail_places(model: Model) -> RailPlaces:
+    """The bins of all rails that are there."""
+    rail, x, y, length = [], [], [], []
+    for index, piece in _pieces(model):
+        bins = _bins(piece)
+        middle = (np.arange(bins) + 0.5) / bins
+        rail += [index] * bins
+        length += [_length(piece) / bins] * bins
+        if isinstance(piece, ArcPiece):
+            angle = piece.start_angle + piece.span * middle
+            x += (piece.centre[0] + piece.radius * np.cos(angle)).tolist()
+            y += (piece.centre[1] + piece.radius * np.sin(angle)).tolist()
+        else:
+            x += (piece.p1[0] + (piece.p2[0] - piece.p1[0]) * middle).tolist()
+            y += (piece.p1[1] + (piece.p2[1] - piece.p1[1]) * middle).tolist()
+    return RailPlaces(np.array(rail, np.uint32), np.array(x), np.array(y), np.array(length))
+
+
+def _pieces(model: Model) -> Iterator[tuple[int, Piece]]:
+    """Rail and piece in the order of `plant.rail_arrays`."""
+    pieces = [(index, piece) for index, rail in enumerate(model.rail_shapes) for piece in rail.pieces]
+    for wanted, there in ((False, model.segments), (True, model.arcs)):
+        if there is not None:
+            yield from (entry for entry in pieces if isinstance(entry[1], ArcPiece) is wanted)
+
+
+def _rail_bins(model: Model, slots: int) -> RailBins | None:
+    if model.rail_law is None:
+        return None
+    pieces = [piece for _, piece in _pieces(model)]
+    first = np.concatenate([[0], np.cumsum([_bins(piece) for piece in pieces])]).astype(np.uint32)
+    arcs = [piece for piece in pieces if isinstance(piece, ArcPiece)]
+    straight = len(pieces) - len(arcs)
+    units = slots // UNIT + 1
+    return RailBins(
+        segment_first=first[: straight + 1].copy(),
+        arc_first=first[straight:].copy(),
+        arc_span=np.array([arc.span for arc in arcs]),
+        work=np.zeros((units, int(first[-1]))),
+        impulse=np.zeros((units, int(first[-1]))),
+    )
+
+
+def _bins(piece: Piece) -> int:
+    return max(1, math.ceil(_length(piece) / BIN - 1e-9))
+
+
+def _length(piece: Piece) -> float:
+    return piece.radius * piece.span if isinstance(piece, ArcPiece) else math.dist(piece.p1, piece.p2)
+
+
+def _levers(model: Model) -> tuple[F8, F8, F8]:
+    """(T,) each: levers of contacts and base over the radius of the base, and s over which to smooth."""
+    contact, gravity = model.type_heights.T
+    radius = model.type_radius.copy()
+    if model.type_base_radius is not None:
+        radius = np.where(model.type_base_radius > 0.0, model.type_base_radius, radius)
+    known = np.isfinite(contact)
+    delay = np.sqrt(np.where(known, gravity, 1.0) / model.gravity) if model.gravity > 0.0 else np.ones(radius.size)
+    return np.where(known, (contact - gravity) / radius, 0.0), np.where(known, gravity / radius, 0.0), delay

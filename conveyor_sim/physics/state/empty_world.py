@@ -1,0 +1,274 @@
+"""The arrays of a World without bottles, as a Model needs them: groups that it does not need are None."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
+from conveyor_sim.engine.arrays.contacts import ContactLaw, Implicit, PairParts, Pairs, PairSprings, Slots
+from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
+from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
+from conveyor_sim.engine.arrays.moving import MovingRails, MovingSprings
+from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
+from conveyor_sim.engine.arrays.riding import Riding
+from conveyor_sim.engine.arrays.support import Footing, Ring, StaticFriction, Surface
+from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.contact.slots import WIDTH
+from conveyor_sim.engine.integrators import LINEAR, ON_PATHS, SLOPES, STAGED
+from conveyor_sim.engine.lists.riding import LEAST
+from conveyor_sim.engine.observers.ledger import BELTS
+from conveyor_sim.engine.threads.workers import UNIT
+from conveyor_sim.physics.model import Model
+from conveyor_sim.physics.model.moving_rails import moving_arrays
+from conveyor_sim.physics.model.plant import belt_arrays, listed
+from conveyor_sim.physics.state.empty_damage import empty_damage
+
+
+def empty_pairs(model: Model, entries: int) -> Pairs | None:
+    """Room for so many pairs; None where bottles do not touch bottles."""
+    law = model.pair_law
+    if law is None:
+        return None
+    unequal = model.has("unequal_radii")
+
+    def forces(wanted: bool) -> F8 | None:
+        return np.zeros(2 * entries + 1) if wanted else None
+
+    return Pairs(
+        i=np.zeros(entries, np.uint32),
+        j=np.zeros(entries, np.uint32),
+        reach=np.zeros(entries) if unequal else None,
+        radius_i=np.zeros(entries) if unequal else None,
+        law=ContactLaw(*(None if table is None else np.zeros(entries, table.dtype) for table in law)),
+        used=np.zeros(1, np.int64),
+        fx=np.zeros(2 * entries + 1),
+        fy=np.zeros(2 * entries + 1),
+        moment=forces(model.has("rotation")),
+        normal=forces(model.has("peaks")),
+        touch=forces(model.has("implicit_friction")),
+        spring=_pair_springs(entries) if law.tangential_stiffness is not None else None,
+        tangent=_pair_tangent(entries) if model.integrator in LINEAR else None,
+        parts=PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1)) if model.has("energy_ledger") else None,
+    )
+
+
+def empty_near(model: Model, slots: int, entries: int) -> Near:
+    """Room for so many entries of rail pieces near bottles."""
+    law = model.rail_law
+    springs = _near_springs(entries) if law is not None and law.tangential_stiffness is not None else None
+    return Near(np.zeros(slots + 1, np.uint32), np.zeros(entries, np.uint32), springs)
+
+
+def empty_world(model: Model, slots: int) -> World:
+    """A World with room for so many bottles; its lists are stale."""
+    entries = 4 * slots
+    buckets = 1 << max(4, (2 * slots - 1).bit_length())
+    peaks = model.has("peaks")
+
+    def reals() -> F8:
+        return np.zeros(slots)
+
+    return World(
+        settings=model.settings,
+        bottles=Bottles(
+            x=reals(),
+            y=reals(),
+            vx=reals(),
+            vy=reals(),
+            radius=reals(),
+            inverse_mass=reals(),
+            weight=reals(),
+            type=np.zeros(slots, np.uint32),
+            id=np.full(slots, -1, dtype=np.int64),
+            packed=np.zeros(4 * slots),
+        ),
+        spin=Spin(reals(), reals(), reals(), reals()) if model.has("rotation") else None,
+        load=Load(reals(), reals(), reals() if peaks else None, reals() if peaks else None),
+        peaks=Peaks(reals(), reals()) if peaks else None,
+        stage=Stage(reals(), reals(), reals()) if model.integrator in STAGED else None,
+        path=_triple(slots) if model.integrator in ON_PATHS and _has_springs(model) else None,
+        slopes=_slopes(SLOPES[model.integrator], slots, peaks) if model.integrator in SLOPES else None,
+        linear=_linear(slots) if model.integrator in LINEAR else None,
+        implicit=Implicit(reals(), reals(), reals()) if model.has("implicit_friction") else None,
+        riding=_riding(model, slots) if model.has("riding") else None,
+        neighbourhood=Neighbourhood(
+            x=reals(),
+            y=reals(),
+            stale=np.ones(1, np.int64),
+            cell=np.zeros((slots, 2), np.int64),
+            bucket=np.zeros(buckets + 1, np.uint32),
+            order=np.zeros(slots, np.uint32),
+        ),
+        probe=GuardProbe(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
+        pairs=empty_pairs(model, entries),
+        slots=empty_slots(slots, entries) if model.pair_law is not None else None,
+        pair_law=model.pair_law,
+        curves=model.curves,
+        grid=model.grid,
+        segments=model.segments,
+        near_segments=empty_near(model, slots, entries) if model.segments is not None else None,
+        arcs=model.arcs,
+        near_arcs=empty_near(model, slots, entries) if model.arcs is not None else None,
+        moving=_moving(model, slots),
+        railed=listed(slots) if model.rail_law is not None else None,
+        rail_law=model.rail_law,
+        belts=belt_arrays(model.belt_shapes, slots, entries) if model.has("belts") else None,
+        surface=_surface(model),
+        footing=_footing(model, slots),
+        ring=Ring(reals()) if model.has("ring_base") else None,
+        static_friction=_static_friction(model, slots),
+        ledger=_ledger(slots, model) if model.has("energy_ledger") else None,
+        damage=empty_damage(model, slots),
+    )
+
+
+def _moving(model: Model, slots: int) -> MovingRails | None:
+    if not model.has("moving_rails"):
+        return None
+    pieces = sum(len(rail.pieces) for rail in model.rails_at_rest)
+    rails, ledger = len(model.rails_at_rest), model.has("energy_ledger")
+    moving = moving_arrays(model.moving_shapes, model.rail_materials, rails, pieces, slots, ledger)
+    if model.rail_law is None or model.rail_law.tangential_stiffness is None:
+        return moving
+    count = len(model.moving_shapes)
+    return moving._replace(springs=MovingSprings(np.zeros((slots, count)), np.zeros(count)))
+
+
+def _has_springs(model: Model) -> bool:
+    return any(law is not None and law.tangential_stiffness is not None for law in (model.pair_law, model.rail_law))
+
+
+def _surface(model: Model) -> Surface | None:
+    if model.base_friction is None:
+        return None
+    surfaces = len(model.belts) + 1
+    return Surface(
+        ux=np.zeros(surfaces),
+        uy=np.zeros(surfaces),
+        turn=np.zeros(surfaces) if model.has("curved_belts") else None,
+        friction=model.base_friction,
+    )
+
+
+def _footing(model: Model, slots: int) -> Footing | None:
+    if model.base_friction is None:
+        return None
+    return Footing(
+        carrier=np.full(slots, len(model.belts), dtype=np.int32),
+        ux=np.zeros(slots),
+        uy=np.zeros(slots),
+        turn=np.zeros(slots) if model.has("curved_belts") else None,
+        friction_limit=np.zeros(slots),
+    )
+
+
+def _static_friction(model: Model, slots: int) -> StaticFriction | None:
+    if model.base_spring is None:
+        return None
+    return StaticFriction(
+        x=np.zeros(slots),
+        y=np.zeros(slots),
+        belt=np.full(slots, -1, dtype=np.int32),
+        stiffness=model.base_spring.stiffness.ravel(),
+        damping=model.base_spring.damping.ravel(),
+        friction=model.base_spring.friction.ravel(),
+        types=len(model.bottle_types),
+    )
+
+
+def _slopes(stages: int, slots: int, peaks: bool) -> Slopes:
+    def of_stages() -> F8:
+        return np.zeros((stages, slots))
+
+    return Slopes(
+        x=np.zeros(slots),
+        y=np.zeros(slots),
+        vx=np.zeros(slots),
+        vy=np.zeros(slots),
+        omega=np.zeros(slots),
+        ax=of_stages(),
+        ay=of_stages(),
+        alpha=of_stages(),
+        normal=of_stages() if peaks else None,
+        error=np.zeros(slots),
+        progress=np.zeros(4),
+    )
+
+
+def _linear(slots: int) -> Linear:
+    units = slots // UNIT + 1
+
+    def columns(count: int) -> Iterator[F8]:
+        return (np.zeros(slots) for _ in range(count))
+
+    return Linear(
+        x=np.zeros(slots),
+        y=np.zeros(slots),
+        own=Blocks(*columns(6)),
+        inverse=Blocks(*columns(6)),
+        change=Triple(*columns(3)),
+        left=Triple(*columns(3)),
+        way=Triple(*columns(3)),
+        product=Triple(*columns(3)),
+        left_sum=np.zeros(units),
+        way_sum=np.zeros(units),
+        most=np.zeros(units),
+    )
+
+
+def _riding(model: Model, slots: int) -> Riding:
+    runs, units = slots // LEAST + 2, slots // UNIT + 1
+    return Riding(
+        vx=np.zeros(slots),
+        vy=np.zeros(slots),
+        omega=np.zeros(slots) if model.has("rotation") else None,
+        rides=np.zeros(slots, np.int8),
+        first=np.zeros(runs, np.uint32),
+        end=np.zeros(runs, np.uint32),
+        runs=np.zeros(units, np.int64),
+        progress=np.zeros(units, np.int64),
+    )
+
+
+def _ledger(slots: int, model: Model) -> Ledger:
+    units, surfaces, rails = slots // UNIT + 1, len(model.belts) + 1, len(model.moving_shapes)
+    return Ledger(
+        damping=_triple(slots),
+        friction=_triple(slots),
+        base=_triple(slots),
+        belt_power=np.zeros((units, surfaces)),
+        rail_power=np.zeros((units, rails + 2)) if rails else None,
+        power=np.zeros((SLOPES.get(model.integrator, 1), units, BELTS + surfaces + rails)),
+        work=np.zeros((units, BELTS + surfaces + rails)),
+    )
+
+
+def _triple(entries: int) -> Triple:
+    return Triple(np.zeros(entries), np.zeros(entries), np.zeros(entries))
+
+
+def _pair_tangent(entries: int) -> PairTangent:
+    nx, ny, normal, tangential, arm_i, arm_j = (np.zeros(entries) for _ in range(6))
+    return PairTangent(nx, ny, normal, tangential, arm_i, arm_j, np.zeros(entries // UNIT + 1))
+
+
+def empty_slots(slots: int, entries: int) -> Slots:
+    """Room for so many entries beyond the rows of the bottles."""
+    return Slots(
+        entry=np.zeros(slots * WIDTH, np.uint32),
+        filled=np.zeros(slots, np.uint32),
+        more_start=np.zeros(slots + 1, np.uint32),
+        more_bottle=np.zeros(entries, np.uint32),
+        more_entry=np.zeros(entries, np.uint32),
+    )
+
+
+def _pair_springs(entries: int) -> PairSprings:
+    i, j = np.zeros((2, entries), np.uint32)
+    return PairSprings(np.zeros(entries), i, j, np.zeros(entries), np.full(1, -1, np.int64))
+
+
+def _near_springs(entries: int) -> NearSprings:
+    bottle, piece = np.zeros((2, entries), np.uint32)
+    return NearSprings(np.zeros(entries), bottle, piece, np.zeros(entries), np.full(1, -1, np.int64))

@@ -1,0 +1,317 @@
+"""State: the only thing that changes. Slots for bottles, the lists between them, the belts' speeds."""
+
+import heapq
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.contacts import PairSprings
+from conveyor_sim.engine.arrays.damage import bin_columns, lasting_columns, slot_columns
+from conveyor_sim.engine.arrays.lists import Near, NearSprings
+from conveyor_sim.engine.arrays.moving import present
+from conveyor_sim.engine.lists.near import drop_near_springs
+from conveyor_sim.engine.lists.neighbours import drop_springs, fill_column
+from conveyor_sim.engine.lists.rebuild import rebuild
+from conveyor_sim.engine.world_views import lists_of
+from conveyor_sim.physics.model import Model
+from conveyor_sim.physics.model.moving_rails import for_slots
+from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
+from conveyor_sim.physics.state.world_arrays import Arrays, with_arrays
+from conveyor_sim.physics.state.world_checks import require_sound
+from conveyor_sim.scene.geometry import RailShape
+
+FIRST_SLOTS = 16
+
+Held = tuple[int, float, tuple[float, ...]]
+"""Of a bottle that a machine has: its type, its angle (rad), and the loads that it has borne."""
+
+
+class State:
+    """Bottles in slots (free ones are reused, ids never), as the arrays of one `World`."""
+
+    def __init__(self, model: Model, room: int = FIRST_SLOTS) -> None:
+        """Make an empty State with room for that many bottles at first."""
+        self.model = model
+        self.next_id = 0
+        self.world = empty_world(self.model, max(1, room))
+        self._free = list(range(max(1, room)))
+        self._removed: list[int] = []
+        self.held: dict[int, Held] = {}
+        """Bottles that machines have taken and will give back, by id: they are not on the line."""
+
+    def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
+        """Put a new bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot; return its id."""
+        self._put(self.next_id, kind, x, y, theta, vx, vy, omega)
+        self.next_id += 1
+        return self.next_id - 1
+
+    def hold(self, slot: int) -> int:
+        """Take the bottle in a slot off the line until it is given back (`give`); return its id."""
+        world = self.world
+        bottle, theta = int(world.bottles.id[slot]), 0.0 if world.spin is None else float(world.spin.theta[slot])
+        loads = tuple(float(column[slot]) for column in self._loads())
+        self.held[bottle] = int(world.bottles.type[slot]), theta, loads
+        self._free_slot(slot)
+        return bottle
+
+    def give(self, bottle: int, x: float, y: float, vx: float, vy: float) -> None:
+        """Put a bottle that was held back at (x, y) m, moving at m/s, with its id and what it has borne.
+
+        KeyError if it is not held.
+        """
+        kind, theta, loads = self.held.pop(bottle)
+        slot = self._put(bottle, kind, x, y, theta, vx, vy, 0.0)
+        for column, load in zip(self._loads(), loads, strict=True):
+            column[slot] = load
+
+    def _loads(self) -> Iterator[NDArray[np.float64]]:
+        """What is kept of a bottle while it is held, by slot."""
+        if self.world.peaks is not None:
+            yield from self.world.peaks
+        if self.world.damage is not None:
+            yield from lasting_columns(self.world.damage)
+
+    def _put(self, bottle: int, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
+        """Put a bottle of an id into the first free slot; return that."""
+        if not self._free:
+            slots = self.world.bottles.id.size
+            # Free slots cost as much as bottles in every loop.
+            self._resize(slots + max(FIRST_SLOTS, slots // 32))
+        slot = heapq.heappop(self._free)
+        bottles = self.world.bottles
+        bottles.x[slot], bottles.y[slot] = x, y
+        bottles.vx[slot], bottles.vy[slot] = vx, vy
+        bottles.type[slot] = kind
+        bottles.id[slot] = bottle
+        if self.world.spin is not None:
+            self.world.spin.theta[slot], self.world.spin.omega[slot] = theta, omega
+        if self.world.static_friction is not None:
+            self.world.static_friction.belt[slot] = -1
+        self._equip(slice(slot, slot + 1))
+        self._note_velocities(slice(slot, slot + 1))
+        self.world.neighbourhood.stale[0] = 1
+        return slot
+
+    def remove(self, slot: int) -> None:
+        """Take the bottle in a slot away for good; the slot is free and at rest."""
+        self._removed.append(int(self.world.bottles.id[slot]))
+        self._free_slot(slot)
+
+    def _free_slot(self, slot: int) -> None:
+        world = self.world
+        for group in (world.bottles, world.spin, world.peaks, world.ring, world.implicit):
+            for name, column in zip(group._fields, group, strict=True) if group is not None else ():
+                if name != "packed":
+                    np.asarray(column)[slot] = 0
+        for column in slot_columns(world.damage) if world.damage is not None else ():
+            column[slot] = 0
+        world.bottles.id[slot] = -1
+        if world.static_friction is not None:
+            world.static_friction.belt[slot] = -1
+        heapq.heappush(self._free, slot)
+        if world.pairs is not None and world.pairs.spring is not None:
+            drop_springs(world.pairs, world.pairs.spring, slot)
+        for near in (world.near_segments, world.near_arcs):
+            if near is not None and near.springs is not None:
+                drop_near_springs(near, near.springs, slot)
+        if world.moving is not None and world.moving.springs is not None:
+            world.moving.springs.elongation[slot] = 0.0
+        world.neighbourhood.stale[0] = 1
+
+    def take_removed(self) -> list[int]:
+        """Ids of the bottles that were taken away since the last call, in order."""
+        removed, self._removed = self._removed, []
+        return removed
+
+    def restore_from(self, other: "State") -> None:
+        """Take over the bottles of a State of the same line and bottle types, each in its slot.
+
+        What their bases are tied to comes along; tangential springs of contacts start anew.
+        """
+        slots = other.world.bottles.id.size
+        self.world, self.next_id = empty_world(self.model, slots), other.next_id
+        none = tuple(0.0 for _ in self._loads())
+        self.held = {bottle: (kind, theta, none) for bottle, (kind, theta, _) in other.held.items()}
+        bottles, spin, before = self.world.bottles, self.world.spin, other.world.spin
+        for name in ("x", "y", "vx", "vy", "type", "id"):
+            getattr(bottles, name)[:] = getattr(other.world.bottles, name)
+        if spin is not None and before is not None:
+            spin.theta[:], spin.omega[:] = before.theta, before.omega
+        self._free = np.flatnonzero(bottles.id < 0).tolist()
+        self._equip(np.flatnonzero(bottles.id >= 0))
+        if (static := self.world.static_friction) is not None and (kept := other.world.static_friction) is not None:
+            static.x[:], static.y[:], static.belt[:] = kept.x, kept.y, kept.belt
+        if self.world.moving is not None and other.world.moving is not None:
+            # Scenes that differ in force limits share what is there without them.
+            for now, then in zip(present(self.world.moving), present(other.world.moving), strict=False):
+                now[:] = then
+        self._note_velocities(slice(None))
+        self.make_lists()
+
+    def restore(self, arrays: Arrays, next_id: int, held: list[tuple[int, Held]]) -> None:
+        """Take the arrays of another State of the same Model for its own (`changing_arrays`), lists included.
+
+        held: by id. Raises ValueError where they are not those of such a State.
+        """
+        world = with_arrays(self.world, arrays)
+        require_sound(world, self.model, next_id)
+        self.world, self.next_id, self.held = world, next_id, dict(held)
+        loads = sum(1 for _ in self._loads())
+        sound = all(
+            0 <= bottle < next_id and 0 <= kind < len(self.model.bottle_types) and len(borne) == loads
+            for bottle, (kind, _, borne) in held
+        )
+        there = set(world.bottles.id.tolist())
+        if not sound or len(self.held) < len(held) or not there.isdisjoint(self.held):
+            raise ValueError("held has bottles that can't be, or that are on the line too")
+        self._free = np.flatnonzero(self.world.bottles.id < 0).tolist()
+
+    def _equip(self, slots: "slice | NDArray[np.int64]") -> None:
+        """Give the bottles in some slots what is constant for their types."""
+        world, model = self.world, self.model
+        kind = world.bottles.type[slots]
+        mass, radius, inertia = model.type_mass[kind], model.type_radius[kind], model.type_inertia[kind]
+        world.bottles.radius[slots] = radius
+        world.bottles.inverse_mass[slots] = 1.0 / mass
+        world.bottles.weight[slots] = mass * model.gravity
+        if world.spin is not None:
+            world.spin.inverse_inertia[slots] = 1.0 / inertia
+        if world.ring is not None and model.type_base_radius is not None:
+            world.ring.radius[slots] = model.type_base_radius[kind]
+        if world.implicit is not None:
+            world.implicit.mobility[slots] = 1.0 / mass + (radius**2 / inertia if world.spin is not None else 0.0)
+
+    def _note_velocities(self, slots: slice) -> None:
+        """What has just been put in has not been looked at before."""
+        damage, bottles = self.world.damage, self.world.bottles
+        if damage is not None and damage.impacts is not None:
+            damage.impacts.vx[slots], damage.impacts.vy[slots] = bottles.vx[slots], bottles.vy[slots]
+
+    def springs(self) -> bytes:
+        """All tangential springs that are not slack, with the slots and rail pieces that they tie; no others' bits."""
+        world = self.world
+        parts: list[NDArray[Any]] = []
+        if world.pairs is not None and world.pairs.spring is not None:
+            held = np.flatnonzero(world.pairs.spring.elongation[: world.pairs.used[0]])
+            parts += [world.pairs.i[held], world.pairs.j[held], world.pairs.spring.elongation[held]]
+        for near in (world.near_segments, world.near_arcs):
+            if near is not None and near.springs is not None:
+                held = np.flatnonzero(near.springs.elongation[: near.start[-1]])
+                bottle = np.searchsorted(near.start, held, side="right") - 1
+                parts += [bottle, near.piece[held], near.springs.elongation[held]]
+        if (static := world.static_friction) is not None:
+            entry = np.maximum(static.belt, 0) * static.types + world.bottles.type
+            held = np.flatnonzero((static.belt >= 0) & (static.stiffness[entry] > 0.0))
+            parts += [held, static.belt[held], static.x[held], static.y[held]]
+        if world.moving is not None and world.moving.springs is not None:
+            bottle, rail = np.nonzero(world.moving.springs.elongation)
+            parts += [bottle, rail, world.moving.springs.elongation[bottle, rail]]
+        return b"".join(part.tobytes() for part in parts)
+
+    def moving_rails(self) -> tuple[RailShape, ...]:
+        """The rails that move, where they are now."""
+        if self.world.moving is None:
+            return ()
+        places = zip(self.model.moving_shapes, self.world.moving.position.tolist(), strict=True)
+        return tuple(shape.shape(position) for shape, position in places)
+
+    def rails(self) -> tuple[RailShape, ...]:
+        """All rails by number, where they are now."""
+        return (*self.model.rails_at_rest, *self.moving_rails())
+
+    def make_lists(self) -> None:
+        """Rebuild the neighbour lists if they are stale, growing those that are too short."""
+        while self.world.neighbourhood.stale[0]:
+            needed = rebuild(lists_of(self.world))
+            if self.world.neighbourhood.stale[0]:
+                self._lengthen_lists(*needed)
+            else:
+                self._fill_laws()
+
+    def _fill_laws(self) -> None:
+        """The coefficients by pair; one column after the other, so that no combination of laws has to be compiled."""
+        pairs, tables = self.world.pairs, self.world.pair_law
+        if pairs is not None and tables is not None:
+            for column, table in zip(pairs.law, tables, strict=True):
+                if column is not None:
+                    fill_column(column, table, pairs.i, pairs.j, pairs.used, self.world.bottles.type)
+
+    def _resize(self, slots: int) -> None:
+        """Room for more bottles; lists stay as they are, for tangential springs are remembered by them."""
+        old = self.world
+        new = empty_world(self.model, slots)
+        used = old.bottles.id.size
+        for source, target in [
+            (old.bottles, new.bottles),
+            (old.peaks, new.peaks),
+            (old.spin, new.spin),
+            (old.ring, new.ring),
+            (old.implicit, new.implicit),
+        ]:
+            for name in source._fields if source is not None and target is not None else ():
+                if name != "packed":
+                    getattr(target, name)[:used] = getattr(source, name)
+        if old.surface is not None and new.surface is not None:
+            for name in ("ux", "uy", "turn"):
+                if (before := getattr(old.surface, name)) is not None:
+                    getattr(new.surface, name)[:] = before
+        if old.ledger is not None and new.ledger is not None:
+            new.ledger.work[: len(old.ledger.work)] = old.ledger.work
+        if old.static_friction is not None and new.static_friction is not None:
+            for name in ("x", "y", "belt"):
+                getattr(new.static_friction, name)[:used] = getattr(old.static_friction, name)
+        if old.damage is not None and new.damage is not None:
+            for columns in (slot_columns, bin_columns):
+                for before, after in zip(columns(old.damage), columns(new.damage), strict=True):
+                    after[: len(before)] = before
+        # Higher than all there are, and none is free: still a heap.
+        self._free += range(used, slots)
+        self.world = new._replace(
+            pairs=old.pairs,
+            near_segments=_for_slots(old.near_segments, slots),
+            near_arcs=_for_slots(old.near_arcs, slots),
+            moving=for_slots(old.moving, slots),
+        )
+
+    def _lengthen_lists(self, pairs: int, more: int, segments: int, arcs: int, belts: int) -> None:
+        """Room for twice the entries that are needed in lists that are too short; the others hold springs by now."""
+        world, slots = self.world, self.world.bottles.id.size
+        if world.pairs is not None and pairs > world.pairs.i.size:
+            longer = empty_pairs(self.model, 2 * pairs)
+            if longer is not None:
+                _carry(world.pairs.spring, longer.spring)
+            world = world._replace(pairs=longer)
+        if world.slots is not None and more > world.slots.more_entry.size:
+            world = world._replace(slots=empty_slots(slots, 2 * more))
+        if world.near_segments is not None and segments > world.near_segments.piece.size:
+            world = world._replace(near_segments=_longer(self.model, world.near_segments, slots, 2 * segments))
+        if world.near_arcs is not None and arcs > world.near_arcs.piece.size:
+            world = world._replace(near_arcs=_longer(self.model, world.near_arcs, slots, 2 * arcs))
+        if world.belts is not None and belts > world.belts.candidate.size:
+            world = world._replace(belts=world.belts._replace(candidate=np.zeros(2 * belts, np.uint32)))
+        self.world = world
+
+
+def _carry(before: PairSprings | NearSprings | None, after: PairSprings | NearSprings | None) -> None:
+    """Copy what is kept of tangential springs while their list is lengthened."""
+    for name in before._fields if before is not None else ():
+        if name.startswith("kept"):
+            getattr(after, name)[: getattr(before, name).size] = getattr(before, name)
+
+
+def _longer(model: Model, before: Near, slots: int, entries: int) -> Near:
+    """Room for more entries, with what is kept of springs."""
+    near = empty_near(model, slots, entries)
+    _carry(before.springs, near.springs)
+    return near
+
+
+def _for_slots(near: Near | None, slots: int) -> Near | None:
+    """The same list with room for more bottles, which have nothing near."""
+    if near is None:
+        return None
+    start = np.full(slots + 1, near.start[-1], np.uint32)
+    start[: near.start.size] = near.start
+    return near._replace(start=start)

@@ -1,0 +1,191 @@
+"""Whether arrays that come from a file can be those of a World: the kernels trust every index and every length."""
+
+from typing import Any
+
+import numpy as np
+
+from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.contact.slots import WIDTH
+from conveyor_sim.engine.lists.riding import PLANNED, STEPPED
+from conveyor_sim.physics.model import Model
+from conveyor_sim.physics.state.empty_world import empty_near, empty_pairs, empty_slots, empty_world
+from conveyor_sim.physics.state.world_arrays import Arrays, changing_arrays
+
+FIXED = (
+    *(f"belts.{name}" for name in ("x", "y", "ax", "ay", "length", "width", "sectors.")),
+    *(f"moving.{name}" for name in ("length", "material", "rail", "surface", "home_", "along_", "turning", "sweep")),
+    "moving.ends.joint",
+    *(f"moving.actuators.{name}" for name in ("limit", "mass", "max_", "stroke")),
+    *(f"damage.scuffing.bins.{name}" for name in ("segment_first", "arc_first", "arc_span")),
+    *(f"damage.tipping.{name}" for name in ("contact_lever", "base_lever", "delay")),
+    "surface.friction",
+    *(f"static_friction.{name}" for name in ("stiffness", "damping", "friction")),
+)
+"""Beginnings of the names of arrays in changing groups that nothing changes."""
+
+SCRATCH = (
+    "bottles.packed",
+    "spin.moment",
+    "load.",
+    "stage.",
+    "path.",
+    "moving.springs.path",
+    "slopes.",
+    "linear.",
+    "implicit.",
+    "riding.",
+    "probe.depth",
+    *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
+    *(f"pairs.{name}" for name in ("reach", "radius_i")),
+    *(f"ledger.{name}" for name in ("damping.", "friction.", "base.", "belt_power", "rail_power", "power")),
+    *(f"damage.tipping.{name}" for name in ("fx", "fy", "moment")),
+    "moving.actuators.push",
+)
+"""Beginnings of the names of arrays that are written before they are read, or are no state. They may hold anything
+finite or not: a tick that failed leaves them so.
+"""
+
+
+def require_sound(world: World, model: Model, next_id: int) -> None:
+    """ValueError, in words, unless a World with arrays of the right names and types is one of the Model.
+
+    Lengths fit together, indices lie in what they point into, what the Model gives is as it gives it, and the state is
+    finite. `with_arrays` has checked names and types.
+    """
+    arrays, expected = changing_arrays(world), changing_arrays(_alike(world, model))
+    for name, array in arrays.items():
+        if array.shape != expected[name].shape:
+            raise ValueError(f"array {name} has the shape {array.shape}, expected {expected[name].shape}")
+    for name, array in arrays.items():
+        if name.startswith(FIXED):
+            if array.tobytes() != expected[name].tobytes():
+                raise ValueError(f"array {name} is not that of the scene")
+        elif array.dtype.kind == "f" and not name.startswith(SCRATCH) and not np.isfinite(array).all():
+            raise ValueError(f"array {name} is not finite")
+    for name, (low, high) in ranges(world, model, next_id).items():
+        array = arrays.get(name, np.zeros(0))
+        if array.size and not low <= int(array.min()) <= int(array.max()) <= high:
+            raise ValueError(f"array {name} holds {int(array.min())} to {int(array.max())}, expected {low} to {high}")
+    for name in (*(f"{list_}.start" for list_ in ("near_segments", "near_arcs", "belts")), "slots.more_start"):
+        _require_starts(name, arrays)
+    for name in ("railed.first", "belts.uncertain.first", "neighbourhood.bucket"):
+        _require_starts(name, arrays)
+    _require_bottles(world, model)
+
+
+def _alike(world: World, model: Model) -> World:
+    """A World of the Model with room for as many bottles and list entries, and what it gives for good."""
+    slots = world.bottles.id.size
+    alike = empty_world(model, slots)
+    if world.pairs is not None:
+        alike = alike._replace(pairs=empty_pairs(model, world.pairs.i.size))
+    if world.slots is not None:
+        alike = alike._replace(slots=empty_slots(slots, world.slots.more_entry.size))
+    if world.near_segments is not None:
+        alike = alike._replace(near_segments=empty_near(model, slots, world.near_segments.piece.size))
+    if world.near_arcs is not None:
+        alike = alike._replace(near_arcs=empty_near(model, slots, world.near_arcs.piece.size))
+    if world.belts is not None and alike.belts is not None:
+        candidate = np.zeros_like(world.belts.candidate)
+        alike = alike._replace(belts=alike.belts._replace(candidate=candidate))
+    return alike
+
+
+def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int]]:
+    """Least and greatest value of the arrays of whole numbers that index something, or count entries, by name."""
+    slots, belts = world.bottles.id.size, len(model.belts)
+    given: dict[str, tuple[int, int]] = {
+        "bottles.type": (0, len(model.bottle_types) - 1),
+        "bottles.id": (-1, next_id - 1),
+        "neighbourhood.stale": (0, 0),
+        "neighbourhood.bucket": (0, slots),
+        "neighbourhood.order": (0, slots - 1),
+        "probe.bottle": (0, slots - 1),
+        "probe.other": (0, max(slots, len(model.rail_shapes)) - 1),
+        "probe.due": (0, 1),
+        "railed.bottle": (0, slots - 1),
+        "railed.first": (0, slots),
+        "belts.certain": (-1, belts),
+        "belts.candidate": (0, max(0, belts - 1)),
+        "belts.uncertain.bottle": (0, slots - 1),
+        "belts.uncertain.first": (0, slots),
+        "footing.carrier": (0, belts),
+        "moving.actuators.mode": (ON_PROFILE, HELD),
+        "moving.actuators.left": (0, 1),
+        "static_friction.belt": (-1, belts),
+        "riding.rides": (0, 1),
+        "riding.first": (0, slots),
+        "riding.end": (0, slots),
+        "riding.runs": (0, slots),
+        "riding.progress": (STEPPED, PLANNED),
+    }
+    if world.belts is not None:
+        given["belts.start"] = (0, world.belts.candidate.size)
+    if world.pairs is not None:
+        pairs = world.pairs.i.size
+        given |= {
+            "pairs.i": (0, slots - 1),
+            "pairs.j": (0, slots - 1),
+            "pairs.used": (0, pairs),
+            "pairs.law.curve": (-1, _curves(model) - 1),
+            "pairs.spring.kept_i": (0, slots - 1),
+            "pairs.spring.kept_j": (0, slots - 1),
+            "pairs.spring.kept_count": (-1, pairs),
+            "slots.entry": (0, 2 * pairs),
+            "slots.more_bottle": (0, slots - 1),
+            "slots.more_entry": (0, 2 * pairs),
+        }
+    if world.slots is not None:
+        more = world.slots.more_entry.size
+        given |= {"slots.more_start": (0, more), "slots.filled": (0, WIDTH + more)}
+    for name, near, pieces in (
+        ("near_segments", world.near_segments, 0 if model.segments is None else model.segments.x.size),
+        ("near_arcs", world.near_arcs, 0 if model.arcs is None else model.arcs.x.size),
+    ):
+        if near is not None:
+            given |= {
+                f"{name}.start": (0, near.piece.size),
+                f"{name}.piece": (0, max(0, pieces - 1)),
+                f"{name}.springs.kept_bottle": (0, slots - 1),
+                f"{name}.springs.kept_piece": (0, max(0, pieces - 1)),
+                f"{name}.springs.kept_count": (-1, near.piece.size),
+            }
+    return given
+
+
+def indices(arrays: Arrays) -> set[str]:
+    """Names of the arrays of whole numbers that must lie in a range; all but these compare only."""
+    free = ("neighbourhood.cell", "damage.impacts.")
+    return {name for name, array in arrays.items() if array.dtype.kind in "iu" and not name.startswith((*FIXED, *free))}
+
+
+def _curves(model: Model) -> int:
+    return 0 if model.curves is None else model.curves.start.size - 1
+
+
+def _require_starts(name: str, arrays: Arrays) -> None:
+    """Starts of lists, one behind the other."""
+    if name in arrays and (np.diff(arrays[name].astype(np.int64)) < 0).any():
+        raise ValueError(f"array {name} goes back")
+
+
+def _require_bottles(world: World, model: Model) -> None:
+    bottles = world.bottles
+    there = bottles.id >= 0
+    if np.unique(bottles.id[there]).size != int(there.sum()):
+        raise ValueError("array bottles.id holds an id twice")
+    kind = bottles.type[there]
+    mass = model.type_mass[kind]
+    expected: list[tuple[str, Any, Any]] = [
+        ("bottles.radius", bottles.radius, model.type_radius[kind]),
+        ("bottles.inverse_mass", bottles.inverse_mass, 1.0 / mass),
+        ("bottles.weight", bottles.weight, mass * model.gravity),
+    ]
+    if world.spin is not None:
+        expected.append(("spin.inverse_inertia", world.spin.inverse_inertia, 1.0 / model.type_inertia[kind]))
+    if world.ring is not None and model.type_base_radius is not None:
+        expected.append(("ring.radius", world.ring.radius, model.type_base_radius[kind]))
+    for name, column, values in expected:
+        if not np.array_equal(column[there], values) or column[~there].any():
+            raise ValueError(f"array {name} does not fit the types of the bottles")

@@ -1,0 +1,173 @@
+"""The guard of one simulation: what it looks at, when, and from where on it is too much."""
+
+import math
+from typing import Any
+
+from conveyor_sim.columns.events import GuardEvent
+from conveyor_sim.engine.arrays.bodies import Bottles, Spin
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
+from conveyor_sim.engine.observers.guard_probe import look
+from conveyor_sim.engine.observers.stored_energy import stored_energy
+from conveyor_sim.physics.accounts.elastic import deepest_overlap
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.stepping.guard.squeeze import Squeeze, squeeze_of
+from conveyor_sim.physics.stepping.guard.violation import Violation, Words
+from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+
+DEEPEST = 0.75
+"""Overlap over the (smaller) radius: at 1 an axis is on a rail, and the normal turns round beyond."""
+
+GROWTH = 2.0
+"""Of all energy in a tick, what belts do apart: explicit methods swing by less in a contact that they can follow."""
+
+SOFT = 0.2
+"""Overlap over the radius from which it is reported: places and gaps are wrong by as much."""
+
+CLOSELY = 128
+"""Steps after which overlaps are looked at again at the latest; that costs about half a step."""
+
+
+class Guard:
+    """Looks at a State before and after every tick.
+
+    has_put_in: bottles were put somewhere from outside, and what is deep by that may part. deepest: the largest overlap
+    over a radius so far.
+    """
+
+    def __init__(self, state: State, found: RailContacts) -> None:
+        """found: scratch of the thread that calls."""
+        self._state = state
+        self._model = state.model
+        self._found = found
+        self._memory = WorldSnapshot()
+        self._every = max(1, math.ceil(CLOSELY / self._model.steps_per_tick))
+        tick, slip = self._model.tick_ns * 1e-9, self._model.settings.slip_limit
+        self._friction = tick * self._model.largest_base_friction
+        # Bottles that move within the slip limit have no energy worth the name.
+        self._noise = 0.5 * slip**2 / self._model.gravity if self._model.gravity > 0.0 else 0.0
+        self._something_there = self._model.pair_law is not None or self._model.rail_law is not None
+        self._kinetic = 0.0
+        self._work = 0.0
+        self._look: Any = self._compile
+        self._soft: Violation | None = None
+        self.has_put_in = False
+        self.deepest = 0.0
+
+    def begin(self, tick: int, surface_speed: float, rail_speed: float) -> Violation | None:
+        """Keep the state at the beginning of a tick; report a bottle that is not finite there.
+
+        surface_speed: m/s, the largest of any belt's surface; rail_speed: m/s, of any rail that moves.
+        """
+        model, world = self._model, self._state.world
+        self._memory.take(world)
+        if tick % self._every == 0:
+            world.probe.due[0] = 1
+        bad, _, _, weight, self._kinetic = self._look(world.bottles, world.spin)
+        # A rail that pushes a queue works against its friction; one that hits a bottle of speed v leaves it v + 2 u.
+        hits = 4.0 * rail_speed**2 * self._mass() if rail_speed > 0.0 else 0.0
+        self._work = weight * (self._friction * (surface_speed + rail_speed) + self._noise) + hits
+        return Words(model, world).put_in(bad) if bad >= 0 else None
+
+    def end(self, dt: float) -> Violation | None:
+        """What is wrong with the state at the end of a tick, reached in steps of dt (s); it is put back then."""
+        world, model = self._state.world, self._model
+        bad, fastest, square, _, kinetic = self._look(world.bottles, world.spin)
+        deep = float(world.probe.depth[0]), float(world.probe.depth[1])
+        self.forget()
+        if bad >= 0:
+            return self._words_before().not_finite(bad)
+        if fastest < 0:
+            return None
+        speed = math.sqrt(square)
+        if self._something_there and speed * dt > model.settings.skin:
+            return self._words_before(fastest).far(fastest, speed, dt)
+        if kinetic > GROWTH * self._kinetic + self._work and (energies := self._grown()):
+            return self._words_before(fastest).energy(fastest, *energies, self._work)
+        depth = max(deep)
+        if self.has_put_in and depth > DEEPEST and self._was_deep():
+            return None
+        # Until overlaps are seen that are not too deep.
+        self.has_put_in = self.has_put_in and depth == 0.0
+        if depth > SOFT >= self.deepest or depth > DEEPEST:
+            worst = deep.index(depth)
+            bottle, other = int(world.probe.bottle[worst]), int(world.probe.other[worst])
+            words = self._words_before(bottle) if depth > DEEPEST else Words(model, world, self._squeeze(bottle))
+            found = (words.rail if worst else words.pair)(bottle, other, depth)
+            if depth > DEEPEST:
+                return found
+            self._soft = found
+        self.deepest = max(self.deepest, depth)
+        return None
+
+    def forget(self) -> None:
+        """What was seen of overlaps since the last tick."""
+        self._state.world.probe.depth[:] = 0.0
+        self._state.world.probe.due[0] = 0
+
+    def soft(self, tick: int) -> GuardEvent | None:
+        """A contact that is too soft for what it bears, reported once, at a tick."""
+        found, self._soft = self._soft, None
+        if found is None:
+            return None
+        text = f"{found.what} at ({found.x:.4g}, {found.y:.4g}) m: {found.why}"
+        return GuardEvent(tick, "soft", found.bottle, found.x, found.y, text)
+
+    def chatters(self, tick: int, slot: int, share: float) -> GuardEvent:
+        """A bottle that shakes by a share of slip_limit at every step."""
+        bottle, x, y = Words(self._model, self._state.world).place(slot)
+        text = (
+            f"bottle {bottle} at ({x:.4g}, {y:.4g}) m shakes by {share:.2g} of slip_limit at every step: friction "
+            f"chatters at dt = {self._model.dt:g} s ({self._model.dt_reason}); choose a finer accuracy"
+        )
+        return GuardEvent(tick, "chatter", bottle, x, y, text)
+
+    def _mass(self) -> float:
+        """Of all bottles, kg."""
+        bottles = self._state.world.bottles
+        return float(self._model.type_mass[bottles.type[bottles.id >= 0]].sum())
+
+    def _grown(self) -> tuple[float, float] | None:
+        """Energy (J) before and after the tick if it grew by too much: a contact that opened may explain a speed."""
+        after = WorldSnapshot()
+        after.take(self._state.world)
+        total = self._energy()
+        self._put_back()
+        before = self._energy()
+        after.restore(self._state)
+        return (before, total) if total > GROWTH * before + self._work else None
+
+    def _was_deep(self) -> bool:
+        """Whether bottles were put in so deep before the tick: they may part."""
+        after, watch = WorldSnapshot(), self._state.world.probe
+        bottle, other = watch.bottle.copy(), watch.other.copy()
+        after.take(self._state.world)
+        self._put_back()
+        deep = deepest_overlap(self._state.world, self._found)
+        after.restore(self._state)
+        watch.bottle[:], watch.other[:] = bottle, other
+        return deep > DEEPEST
+
+    def _energy(self) -> float:
+        return float(stored_energy(self._state.world, self._found).sum())
+
+    def _compile(self, bottles: Bottles, spin: Spin | None) -> Any:
+        """Look for the first time."""
+        self._look = entry(look, bottles, spin)
+        return self._look(bottles, spin)
+
+    def _squeeze(self, slot: int) -> Squeeze | None:
+        return squeeze_of(self._model, self._state.world, self._found, slot)
+
+    def _words_before(self, slot: int = -1) -> Words:
+        """Have the state as it was at the beginning of the tick, to find words for; slot: the bottle in question."""
+        after = None if slot < 0 else self._squeeze(slot)
+        self._put_back()
+        # Once an axis has passed a rail, that pushes it on.
+        before = None if slot < 0 else self._squeeze(slot)
+        return Words(self._model, self._state.world, before if before is not None and before.held else after or before)
+
+    def _put_back(self) -> None:
+        """Have the state as it was at the beginning of the tick."""
+        self._memory.restore(self._state)
+        self.forget()

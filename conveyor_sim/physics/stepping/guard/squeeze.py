@@ -1,0 +1,105 @@
+"""Which gate, pusher or diverter presses on a bottle, and what holds the bottle against it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.engine.arrays.moving import MovingRails
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.observers.contact_list import BOTTLE_BOTTLE, BOTTLE_RAIL, closed_contacts
+from conveyor_sim.physics.model import Model
+from conveyor_sim.scene.moving import MovingShape
+
+ACTIONS = {"gates": "gate {} closes on", "pushers": "pusher {} pushes", "diverters": "diverter {} swings against"}
+"""What a mover does to a bottle, by kind."""
+
+
+@dataclass(frozen=True)
+class Squeeze:
+    """A rail that moves into a bottle."""
+
+    what: str
+    """A clause, such as "gate exit closes on bottle 7 against rail wall"."""
+    field: str
+    """Of the scene: what limits its drive."""
+    force: float | None
+    """N, the most that it exerts on the bottle; None: it has no limit."""
+    held: bool
+    """Whether something holds the bottle on the other side."""
+
+
+def squeeze_of(model: Model, world: World, found: RailContacts, slot: int) -> Squeeze | None:
+    """Who moves into a bottle, or into those that it touches, one by one; None if nobody does. found: scratch.
+
+    Of several, the first one without a limit. The neighbour lists must hold.
+    """
+    moving = world.moving
+    if moving is None:
+        return None
+    kind, (a, b), values = closed_contacts(world, found)
+    normal = values[2:4].T
+    cluster = _cluster(slot, kind, a, b)
+    fixed, pushers = len(model.rails_at_rest), []
+    for c in np.flatnonzero((kind == BOTTLE_RAIL) & (b >= fixed)).tolist():
+        q = int(b[c]) - fixed
+        if int(a[c]) in cluster and _moves(moving, q):
+            pushers.append((model.moving_shapes[q].limit is not None, int(a[c]) != slot, c))
+    if not pushers:
+        return None
+    _, _, c = min(pushers)
+    q, bottle = int(b[c]) - fixed, int(a[c])
+    shape = model.moving_shapes[q]
+    section, name = shape.name.split("/")
+    what = f"{ACTIONS[section].format(name)} bottle {int(world.bottles.id[bottle])}"
+    held = _held_by(model, world, bottle, c, kind, a, b, normal)
+    what += f" against {held}" if held else ""
+    limit = "torque_limit" if shape.turning else "force_limit"
+    return Squeeze(what, limit, _force(shape, moving, q, values[:2, c]), bool(held))
+
+
+def _cluster(slot: int, kind: NDArray[np.uint8], a: NDArray[np.int64], b: NDArray[np.int64]) -> set[int]:
+    """The bottle and all that touch it, or one that does."""
+    pairs = kind == BOTTLE_BOTTLE
+    ends, found = np.column_stack([a[pairs], b[pairs]]), {slot}
+    while True:
+        touching = set(ends[np.isin(ends, list(found)).any(axis=1)].ravel().tolist()) | found
+        if touching == found:
+            return found
+        found = touching
+
+
+def _moves(moving: MovingRails, q: int) -> bool:
+    return bool(moving.speed[q] != 0.0 or (moving.course[q, :, 2] != 0.0).any())
+
+
+def _force(shape: MovingShape, moving: MovingRails, q: int, place: NDArray[np.float64]) -> float | None:
+    if shape.limit is None or not shape.turning:
+        return shape.limit
+    return shape.limit / max(1e-3 * shape.length, float(np.hypot(place[0] - moving.x[q], place[1] - moving.y[q])))
+
+
+def _held_by(
+    model: Model,
+    world: World,
+    bottle: int,
+    pushed: int,
+    kind: NDArray[np.uint8],
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    normal: NDArray[np.float64],
+) -> str:
+    """What a bottle touches on the side away from its contact `pushed`, in words; "" if nothing."""
+    facing, held = 0.0, ""
+    for c in range(kind.size):
+        second = kind[c] == BOTTLE_BOTTLE and b[c] == bottle
+        if c == pushed or (a[c] != bottle and not second):
+            continue
+        along = float(normal[c] @ normal[pushed]) * (-1.0 if second else 1.0)
+        if along < facing:
+            facing = along
+            other = int(a[c] if second else b[c])
+            on_rail = kind[c] == BOTTLE_RAIL
+            held = f"rail {model.rail_shapes[other].name}" if on_rail else f"bottle {int(world.bottles.id[other])}"
+    return held

@@ -1,0 +1,172 @@
+"""What the guard found, in words: which bottle, where, when, why, and what helps."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from conveyor_sim.engine.arrays.contacts import ContactLaw
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.integrators.dormand_prince import MOST
+from conveyor_sim.physics.accounts.elastic import elastic_energy, rail_entries
+from conveyor_sim.physics.model import Model
+from conveyor_sim.physics.stepping.guard.squeeze import Squeeze
+
+CAME_FAST = 0.5
+"""Of the speed that a contact can stop: above it an overlap is put down to an impact, below to a lasting force."""
+
+REMEDY_DEPTH = 0.1
+"""Overlap over the radius for which a stiffness is proposed."""
+
+
+@dataclass(frozen=True)
+class Violation:
+    """Something that no bottle can do."""
+
+    bottle: int
+    """Id."""
+    x: float
+    """m, at the beginning of the tick."""
+    y: float
+    what: str
+    """What was found, as a clause that begins with the bottle."""
+    why: str
+    """The cause, and after a semicolon what helps."""
+    kind: Literal["unstable", "tunnelling"]
+    curable: bool = True
+    """Whether shorter steps may help."""
+
+    def sentence(self, time: float, tried: int) -> str:
+        """In one sentence; time: s, at the beginning of the tick; tried: by what factor steps were shorter."""
+        even = "" if tried == 1 else f", even in steps {tried} times shorter"
+        return f"{self.what} in the tick that began at {time:g} s at ({self.x:.4g}, {self.y:.4g}) m{even}: {self.why}"
+
+
+class Words:
+    """Finds words for one state, that at the beginning of a tick."""
+
+    def __init__(self, model: Model, world: World, squeeze: Squeeze | None = None) -> None:
+        """squeeze: what moves into the bottle in question, as found where the tick came to."""
+        self._model = model
+        self._world = world
+        self._squeeze = squeeze
+        self._bottles = world.bottles
+
+    def put_in(self, slot: int) -> Violation:
+        """A bottle that was not finite before a step was taken."""
+        what = f"bottle {self._id(slot)} has no finite position or velocity before a step was taken"
+        return self._unstable(slot, what, "the number was written into the state; reset it", curable=False)
+
+    def not_finite(self, slot: int) -> Violation:
+        """A bottle that is not finite any more."""
+        what = f"bottle {self._id(slot)} has no finite position or velocity"
+        if self._model.integrator != "dormand_prince":
+            return self._unstable(slot, what, self._too_long())
+        why = (
+            f"dormand_prince does not keep an error of {self._model.settings.error:g} m/s within {MOST:,} substeps "
+            "of a tick; allow a larger error or choose another integrator"
+        )
+        return self._unstable(slot, what, why, curable=False)
+
+    def far(self, slot: int, speed: float, dt: float) -> Violation:
+        """A bottle that moves too far in one step. speed: m/s."""
+        what = f"bottle {self._id(slot)} moves {1e3 * speed * dt:.3g} mm in one step of {dt:g} s"
+        limit = f"more than {1e3 * self._model.settings.skin:.3g} mm could pass through a contact unseen"
+        why = f"it has {speed:.3g} m/s, and {limit}; choose a finer accuracy"
+        return self._tunnelling(slot, what, self._forced() or why)
+
+    def energy(self, slot: int, before: float, after: float, explained: float) -> Violation:
+        """Energy (J) that came from nowhere; slot: of the fastest bottle."""
+        rise = f"from {before:.3g} to {after:.3g} J"
+        what = f"bottle {self._id(slot)} is the fastest while the energy of all rises {rise}"
+        what_works = "belts and rails" if self._model.moving_shapes else "belts"
+        why = f"{what_works} explain {explained:.3g} J of it at most, so it comes of the time step: {self._too_long()}"
+        return self._unstable(slot, what, self._forced() or why)
+
+    def pair(self, slot: int, other: int, depth: float) -> Violation:
+        """Two bottles that overlap too deep; depth: over the smaller radius."""
+        a, b = self._bottles, slot
+        kinds = a.type[[b, other]].astype(np.int64)
+        relative = float(np.hypot(a.vx[b] - a.vx[other], a.vy[b] - a.vy[other]))
+        masses = self._model.type_mass[kinds]
+        reduced = float(masses.prod() / masses.sum())
+        what = f"bottle {self._id(slot)} overlaps bottle {self._id(other)} by {depth:.2g} of a radius"
+        radius = float(self._model.type_radius[kinds].min())
+        entry = int(kinds[0]) * len(self._model.bottle_types) + int(kinds[1])
+        why = self._too_soft(self._model.pair_law, entry, radius, reduced, relative, depth, "bottles")
+        return self._tunnelling(slot, what, why)
+
+    def rail(self, slot: int, rail: int, depth: float) -> Violation:
+        """A bottle that has sunk too deep into a rail; depth: over the radius."""
+        model, bottles, kind = self._model, self._bottles, int(self._bottles.type[slot])
+        shape = model.rail_shapes[rail]
+        entry = int(rail_entries(model, np.array([kind]), np.array([rail]))[0])
+        ux, uy = self._velocity_of_rail(rail, slot)
+        speed = float(np.hypot(bottles.vx[slot] - ux, bottles.vy[slot] - uy))
+        what = f"bottle {self._id(slot)} sinks {depth:.2g} of its radius into rail {shape.name}"
+        radius, mass = float(model.type_radius[kind]), float(model.type_mass[kind])
+        why = self._too_soft(model.rail_law, entry, radius, mass, speed, depth, f"rail {shape.name}")
+        return self._tunnelling(slot, what, why)
+
+    def place(self, slot: int) -> tuple[int, float, float]:
+        """Id, x and y (m)."""
+        return self._id(slot), float(self._bottles.x[slot]), float(self._bottles.y[slot])
+
+    def _velocity_of_rail(self, rail: int, slot: int) -> tuple[float, float]:
+        """m/s, at a bottle's axis."""
+        moving, q = self._world.moving, rail - len(self._model.rails_at_rest)
+        if moving is None or q < 0:
+            return 0.0, 0.0
+        dx, dy = self._bottles.x[slot] - moving.x[q], self._bottles.y[slot] - moving.y[q]
+        return float(moving.vx[q] - moving.turn[q] * dy), float(moving.vy[q] + moving.turn[q] * dx)
+
+    def _forced(self, pressed: bool = False) -> str:
+        """That a rail without a force limit squeezes a bottle, "" if none does; pressed: by a lasting force."""
+        squeeze = self._squeeze
+        if squeeze is None or squeeze.force is not None or not (squeeze.held or pressed):
+            return ""
+        return f"{squeeze.what} with whatever force that takes; give it a {squeeze.field}"
+
+    def _too_soft(
+        self,
+        law: ContactLaw | None,
+        entry: int,
+        radius: float,
+        mass: float,
+        speed: float,
+        depth: float,
+        what: str,
+    ) -> str:
+        entries = np.array([entry])
+        most = float(elastic_energy(self._model, law, entries, np.array([radius]))[0])
+        stopped = float(np.sqrt(2.0 * most / mass))
+        if forced := self._forced(speed <= CAME_FAST * stopped):
+            return forced
+        if speed > CAME_FAST * stopped:
+            needed = mass * (speed / (REMEDY_DEPTH * radius)) ** 2
+            return (
+                f"it came with {speed:.3g} m/s, and the contact with {what} stops {stopped:.3g} m/s within a radius; "
+                f"give it a stiffness of about {needed:.2g} N/m"
+            )
+        here = float(elastic_energy(self._model, law, entries, np.array([depth * radius]))[0])
+        force, cause = 2.0 * here / (depth * radius), "it is pressed"
+        if self._squeeze is not None and self._squeeze.force is not None:
+            force, cause = max(force, self._squeeze.force), self._squeeze.what
+        needed = force / (REMEDY_DEPTH * radius)
+        return (
+            f"{cause} with about {force:.3g} N, too much for the contact with {what}; "
+            f"give it a stiffness of about {needed:.2g} N/m"
+        )
+
+    def _too_long(self) -> str:
+        model = self._model
+        return f"dt = {model.dt:g} s is too long for this scene ({model.dt_reason}); choose a finer accuracy"
+
+    def _unstable(self, slot: int, what: str, why: str, curable: bool = True) -> Violation:
+        return Violation(*self.place(slot), what, why, "unstable", curable)
+
+    def _tunnelling(self, slot: int, what: str, why: str) -> Violation:
+        return Violation(*self.place(slot), what, why, "tunnelling")
+
+    def _id(self, slot: int) -> int:
+        return int(self._bottles.id[slot])

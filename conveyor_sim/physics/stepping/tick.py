@@ -1,0 +1,181 @@
+"""One tick of the engine: whole steps on a pool of threads, with the guard looking on."""
+
+import os
+import time
+from dataclasses import astuple
+from typing import Any, Literal
+
+from conveyor_sim.columns.events import GuardEvent
+from conveyor_sim.engine.arrays.rails import RailContacts
+from conveyor_sim.engine.integrators import INTEGRATORS, RESUME, START
+from conveyor_sim.engine.threads.thread_choice import ThreadChoice
+from conveyor_sim.engine.threads.thread_pool import ThreadPool
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.physics.model.moving_rails import fastest_rail
+from conveyor_sim.physics.state import State
+from conveyor_sim.physics.state.snapshot import entries, typed
+from conveyor_sim.physics.stepping.guard import Guard, Violation, chatter
+from conveyor_sim.physics.stepping.guard.world_snapshot import WorldSnapshot
+from conveyor_sim.scene.types import Unchecked
+
+SHORTER = (4, 16, 64)
+"""By what factors steps are shortened, one after another, for a tick that the guard objects to."""
+
+
+_Event = tuple[int, Literal["shorter_steps", "chatter", "soft", "stopped"], int, Unchecked, Unchecked, str]
+
+
+class Integration:
+    """Takes a State through time, tick by tick."""
+
+    def __init__(self, state: State, threads: int | None, shorten: bool) -> None:
+        """threads: to step with, None has them chosen. shorten: do a tick again before the run is stopped."""
+        cores = len(os.sched_getaffinity(0))
+        self._state = state
+        self._model = state.model
+        self._advance = INTEGRATORS[state.model.integrator]
+        self._pool = ThreadPool(cores if threads is None else threads)
+        self._choice = ThreadChoice(cores) if threads is None else None
+        self._shorter = SHORTER if shorten else ()
+        self._guard = Guard(state, self.found)
+        self._events: list[GuardEvent] = []
+        self._chatters = False
+        self._listening = self._ticks_between_listening()
+        self.shortened_ticks = 0
+        self._kernel_seconds = 0.0
+
+    @property
+    def kernel_seconds(self) -> float:
+        """Wall time that steps have taken, s."""
+        return self._kernel_seconds
+
+    @property
+    def threads(self) -> int:
+        """Threads that the next tick is to be stepped with."""
+        return self._pool.most if self._choice is None else self._choice.size
+
+    @property
+    def found(self) -> RailContacts:
+        """Scratch of the calling thread."""
+        return self._pool.group(1)[0].found
+
+    @property
+    def deepest_overlap(self) -> float:
+        """The largest overlap over a radius so far."""
+        return self._guard.deepest
+
+    def take_events(self) -> list[GuardEvent]:
+        """What the guard has reported since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    def snapshot(self) -> dict[str, Any]:
+        """What is remembered from tick to tick beside the State, as plain data for `restore`."""
+        return {
+            "events": [astuple(event) for event in self._events],
+            "chatters": self._chatters,
+            "shortened_ticks": self.shortened_ticks,
+            "deepest": self._guard.deepest,
+            "put_in": self._guard.has_put_in,
+        }
+
+    def restore(self, memory: dict[str, Any]) -> None:
+        """Take over what another one of the same Model remembered. Raises ValueError for what is no such memory."""
+        entries(memory, self.snapshot(), "integration")
+        self._events = [GuardEvent(*event) for event in typed(list[_Event], memory["events"], "integration.events")]
+        self._chatters = typed(bool, memory["chatters"], "integration.chatters")
+        self.shortened_ticks = typed(int, memory["shortened_ticks"], "integration.shortened_ticks")
+        self._guard.deepest = typed(float, memory["deepest"], "integration.deepest")
+        self._guard.has_put_in = typed(bool, memory["put_in"], "integration.put_in")
+
+    def put_in(self) -> None:
+        """Bottles were put somewhere from outside."""
+        self._guard.has_put_in = True
+
+    def take_tick(self, tick: int, surface_speed: float) -> None:
+        """From a tick to the next. surface_speed: m/s, of the fastest belt. SimulationError: back at the beginning."""
+        seconds = tick * self._model.tick_ns * 1e-9
+        wrong = self._guard.begin(tick, surface_speed, fastest_rail(self._state.world.moving))
+        if wrong is not None:
+            raise self._stopped(tick, wrong, wrong.sentence(seconds, 1))
+        began = time.perf_counter()
+        self._take_steps(1)
+        took = time.perf_counter() - began
+        self._kernel_seconds += took
+        if self._choice is not None:
+            self._choice.took(took, self._model.steps_per_tick * self._state.world.bottles.id.size)
+        wrong = self._guard.end(self._model.dt)
+        if wrong is not None:
+            self._do_again(tick, seconds, wrong)
+        self._tell(tick + 1)
+
+    def _do_again(self, tick: int, seconds: float, wrong: Violation) -> None:
+        """In shorter steps, from the beginning of the tick, where the guard has put the state back."""
+        tried, first = 1, wrong
+        for factor in self._shorter if wrong.curable else ():
+            self._take_steps(factor)
+            again = self._guard.end(self._model.dt / factor)
+            if again is None:
+                self.shortened_ticks += 1
+                text = f"{first.sentence(seconds, 1)}; the tick was done again in steps {factor} times shorter"
+                self._events.append(GuardEvent(tick + 1, "shorter_steps", first.bottle, first.x, first.y, text))
+                return
+            tried, wrong = factor, again
+        raise self._stopped(tick, wrong, wrong.sentence(seconds, tried))
+
+    def _stopped(self, tick: int, wrong: Violation, text: str) -> SimulationError:
+        self._events.append(GuardEvent(tick, "stopped", wrong.bottle, wrong.x, wrong.y, text))
+        return SimulationError(text, wrong.kind)
+
+    def _take_steps(self, factor: int) -> None:
+        """One tick in steps shortened by a factor; lists that turn out too short are grown in it, without a trace."""
+        done, phase, steps, dt = 0, START, factor * self._model.steps_per_tick, self._model.dt / factor
+        self._set_clock(0)
+        while True:
+            done += self._pool.advance(self.threads, self._advance, self._state.world, steps - done, dt, phase)
+            if not self._state.world.neighbourhood.stale[0]:
+                return
+            self._state.make_lists()
+            phase = RESUME
+
+    def _set_clock(self, steps: int) -> None:
+        """Rails that move are where they are after so many steps of the tick."""
+        if self._state.world.moving is not None:
+            self._state.world.moving.clock[0] = steps
+
+    def _tell(self, tick: int) -> None:
+        """What does not stop a run, reported the first time."""
+        if (event := self._guard.soft(tick)) is not None:
+            self._events.append(event)
+        if self._listening and not self._chatters and tick % self._listening == 0:
+            self._listen(tick)
+
+    def _ticks_between_listening(self) -> int:
+        """How often chatter is listened to; 0: there is none to be heard."""
+        model = self._model
+        rubs = model.base_friction is not None or any(
+            law is not None and law.friction is not None for law in (model.pair_law, model.rail_law)
+        )
+        if not rubs or model.friction_solver == "implicit" or model.integrator not in chatter.EXPLICIT:
+            return 0
+        return -(-chatter.EVERY // model.steps_per_tick)
+
+    def _listen(self, tick: int) -> None:
+        """Take some steps on, one by one, and go back."""
+        state, model = self._state, self._model
+        memory = WorldSnapshot()
+        memory.take(state.world)
+        self._set_clock(model.steps_per_tick)
+        meter = chatter.ChatterMeter()
+        chatter.note_world(meter, state.world)
+        for _ in range(chatter.STEPS):
+            self._pool.advance(self.threads, self._advance, state.world, 1, model.dt, START)
+            state.make_lists()
+            chatter.note_world(meter, state.world)
+        memory.restore(state)
+        self._guard.forget()
+        worst, amplitude = meter.worst()
+        share = amplitude / model.settings.slip_limit
+        if share > chatter.LEAST:
+            self._chatters = True
+            self._events.append(self._guard.chatters(tick, worst, share))

@@ -1,0 +1,80 @@
+"""The presets of `accuracy`: tolerances, and the numbers that follow from them."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from conveyor_sim.physics.laws.damping import DAMPING_BY_NAME
+from conveyor_sim.physics.timestep.bounds import least_steps
+from conveyor_sim.physics.timestep.methods import METHODS, Method
+from conveyor_sim.physics.timestep.prediction import Impact, percent
+from conveyor_sim.scene.accuracy import Accuracy, Preset
+
+PRESETS: Mapping[Preset, float] = {"draft": 0.05, "standard": 0.01, "fine": 0.001}
+"""Relative error in contact force to stay below; all else follows from it."""
+
+DEFAULT: Preset = "standard"
+"""What a scene gets that says nothing, and what the bounds assume where it gives the time step itself."""
+
+RESTITUTIONS = (1.0, 0.9, 0.5)
+"""Of the impacts in the table of steps."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What the bounds on the time step are for."""
+
+    tolerance: float
+    """Relative error in contact force."""
+    words: str
+
+
+def target(accuracy: Accuracy) -> Target:
+    """What a scene chooses; the default where it chooses nothing, or gives the time step itself."""
+    if accuracy.tolerance is not None:
+        return Target(accuracy.tolerance, f"tolerance {percent(accuracy.tolerance)} in contact force")
+    preset = accuracy.preset or DEFAULT
+    return Target(PRESETS[preset], f"{preset} ({percent(PRESETS[preset])} in contact force)")
+
+
+def table() -> str:
+    """The presets and their numbers, as Markdown: two tables."""
+    numbers: list[tuple[str, Callable[[float], str]]] = [
+        ("relative error in contact force, at most", percent),
+        ("steps a contact, at least", lambda tolerance: f"{least_steps(tolerance):.3g}"),
+        (
+            "by which a peak between two of so many steps is missed, (π/n)²/8",
+            lambda tolerance: percent((math.pi / least_steps(tolerance)) ** 2 / 8.0),
+        ),
+        ("steps in v_lim/(μ g), leapfrog and semi-implicit Euler", lambda tolerance: f"{least_steps(tolerance):.3g}"),
+        (
+            "the same for semi-implicit Euler where a belt turns: creep and resting load are off by one part in them",
+            lambda tolerance: f"{1.0 / tolerance:.0f}",
+        ),
+    ]
+    presets = [(name, *(number(tolerance) for tolerance in PRESETS.values())) for name, number in numbers]
+    contacts = [
+        (
+            f"`{integrator}`, {f'e = {e:g}' if e < 1.0 else 'undamped'}",
+            *(f"{math.pi / _impact(method, e).bound(tolerance).dt:.0f}" for tolerance in PRESETS.values()),
+        )
+        for integrator, method in METHODS.items()
+        for e in RESTITUTIONS
+    ]
+    return "\n".join(
+        [*_markdown("preset", presets), "", *_markdown("steps a contact, linear, `paper` damping", contacts), ""]
+    )
+
+
+def _impact(method: Method, restitution: float) -> Impact:
+    """A linear contact of unit mass, stiffness and speed with a dashpot that jumps at first touch."""
+    shares = [method.between_steps(1.0)]
+    if restitution < 1.0:
+        c = DAMPING_BY_NAME["paper"].coefficient(restitution, 1.0, 1.0, 1.0)
+        shares += method.first_touch(c, 1.0 / c)
+    return Impact("", "", math.pi, tuple(shares), 0.0, 1.0, 1.0, lambda force: force)
+
+
+def _markdown(title: str, rows: Sequence[Sequence[str]]) -> list[str]:
+    head = [(title, *PRESETS), ("---", *("---:" for _ in PRESETS))]
+    return [f"| {' | '.join(row)} |" for row in [*head, *rows]]

@@ -1,0 +1,1 @@
+"""Protocol servers: the tags of a line over OPC UA, Modbus, MQTT Sparkplug, Foxglove and a web page."""

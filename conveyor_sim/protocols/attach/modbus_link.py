@@ -1,0 +1,130 @@
+"""`ModbusLink`: the way to the registers of a PLC that is a Modbus TCP server."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, get_args
+
+from pymodbus.client import AsyncModbusTcpClient
+from pymodbus.exceptions import ModbusException
+
+from conveyor_sim.line.tag import SIGNALS
+from conveyor_sim.protocols.attach.link import PATIENCE, LinkError
+from conveyor_sim.protocols.attach.tag_map import OWN, Mapped, TagMapError
+from conveyor_sim.protocols.handshake import TICK
+from conveyor_sim.support.modbus_rows import MOST_ADDRESSES, Row, Table, Type, WordOrder, decode, encode
+from conveyor_sim.support.printable import printable
+
+MOST_WORDS = 100
+"""Of one request; the protocol has 125 to read and 123 to write."""
+
+_BITS: tuple[Table, ...] = ("coil", "discrete input")
+_WRITABLE: tuple[Table, ...] = ("coil", "holding register")
+_WRITABLE_TEXT = " or ".join(f"a {table}" for table in _WRITABLE)
+
+
+class ModbusLink:
+    """Neighbouring addresses are one request."""
+
+    def __init__(self, host: str, port: int, mapped: Sequence[Mapped]) -> None:
+        """Raises TagMapError."""
+        self._url, self._at = f"modbus://{host}:{port}", (host, port)
+        self._rows = {each.tag.name: _row(each) for each in mapped}
+        self._client: AsyncModbusTcpClient | None = None
+
+    async def connect(self) -> None:
+        """Reach it, and read every place of the map once: who does not answer there is not reached."""
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # it logs what LinkError says
+        host, port = self._at
+        client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
+        self._client = client
+        if not await asyncio.wait_for(client.connect(), 2.0 * PATIENCE):
+            raise LinkError(f"{self._url}: can't be reached, expected the Modbus server of a PLC")
+        await self.read(list(self._rows))
+
+    async def write(self, values: Mapping[str, float]) -> None:
+        """Set coils and holding registers, in the order of the values."""
+        client = self._there()
+        for rows in _runs(self._rows[name] for name in values):
+            words = [word for row in rows for word in encode(row, values[row.name])]
+            if rows[0].table == "coil":
+                await self._ask(rows, client.write_coils, rows[0].address, [bool(word) for word in words])
+            else:
+                await self._ask(rows, client.write_registers, rows[0].address, words)
+
+    async def read(self, names: Sequence[str]) -> dict[str, float]:
+        """Values by our names."""
+        client, found = self._there(), {}
+        ask = {
+            "coil": client.read_coils,
+            "discrete input": client.read_discrete_inputs,
+            "holding register": client.read_holding_registers,
+            "input register": client.read_input_registers,
+        }
+        for rows in _runs(sorted((self._rows[name] for name in names), key=lambda row: (row.table, row.address))):
+            first, count = rows[0].address, rows[-1].addresses.stop - rows[0].address
+            answer = await self._ask(rows, ask[rows[0].table], first, count=count)
+            words = answer.bits if rows[0].table in _BITS else answer.registers
+            for row in rows:
+                found[row.name] = decode(row, words[row.address - first : row.addresses.stop - first])
+        return found
+
+    async def close(self) -> None:
+        """Leave it."""
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
+
+    def _there(self) -> AsyncModbusTcpClient:
+        if self._client is None:
+            raise LinkError(f"{self._url}: is not reached")
+        return self._client
+
+    async def _ask(self, rows: Sequence[Row], request: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
+        try:
+            answer = await asyncio.wait_for(request(*arguments, **more), 2.0 * PATIENCE)
+        except (ModbusException, OSError, asyncio.TimeoutError) as error:
+            raise LinkError(f"{self._url}: does not answer ({printable(error) or 'in time'})") from error
+        if answer.isError():
+            row = rows[0]
+            code = getattr(answer, "exception_code", "?")
+            raise LinkError(f"{self._url}: {row.table} {row.address} ({row.name}) is refused with exception {code}")
+        return answer
+
+
+def _runs(rows: Iterable[Row]) -> Iterator[list[Row]]:
+    """Rows that follow one another, as far as they go into one request."""
+    run: list[Row] = []
+    for row in rows:
+        last = run[-1] if run else None
+        if last is not None and (
+            (last.table, last.addresses.stop) != (row.table, row.address)
+            or row.addresses.stop - run[0].address > MOST_WORDS
+        ):
+            yield run
+            run = []
+        run.append(row)
+    if run:
+        yield run
+
+
+def _row(mapped: Mapped) -> Row:
+    expected = 'expected such as "coil 3 bool", "holding register 12 float32 big"'
+    words = mapped.theirs.split()
+    table = next((table for table in get_args(Table) if mapped.theirs.startswith(f"{table} ")), None)
+    rest = words[len(table.split()) :] if table else []
+    order: WordOrder = "little" if rest[2:] == ["little"] else "big"
+    if table is None or len(rest) not in (2, 3) or rest[1] not in get_args(Type) or rest[2:] not in ([], [order]):
+        raise TagMapError(f"{mapped.where}: {printable(mapped.theirs)} given, {expected}")
+    kind: Type = rest[1]  # type: ignore[assignment]
+    if not (rest[0].isascii() and rest[0].isdigit() and int(rest[0]) < MOST_ADDRESSES):
+        raise TagMapError(f"{mapped.where}: address {printable(rest[0])} given, expected 0 to {MOST_ADDRESSES - 1}")
+    if (kind == "bool") != (table in _BITS):
+        raise TagMapError(f"{mapped.where}: {kind} given in a {table}, {expected}")
+    tag = mapped.tag
+    written = tag.name == TICK or (tag.role in SIGNALS and not tag.name.startswith(OWN))
+    if written and table not in _WRITABLE:
+        raise TagMapError(f"{mapped.where}: {tag.name} is written, but {table}s can't be, expected {_WRITABLE_TEXT}")
+    return Row(tag.name, table, int(rest[0]), kind, order, tag.unit, "read", tag.low, tag.high, "")

@@ -1,0 +1,1 @@
+"""Foxglove server of a line."""

@@ -1,0 +1,213 @@
+"""`FoxgloveServer`: a line in Foxglove and Lichtblick, by their websocket protocol; messages go there as they come.
+
+Topics have the names and definitions that recordings have, so that a layout shows both. Clients only read.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import foxglove
+import numpy as np
+from foxglove.websocket import ChannelView, Client, ServerListener, WebSocketServer
+
+from conveyor_sim.bag.channels import schema_of
+from conveyor_sim.bag.markers import bottles_markers, plant_markers
+from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.protocols.face import FaceError, Status
+from conveyor_sim.protocols.view import DRAWN, HEARD, PictureSource
+from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.scene.geometry import belt_shapes, rail_shapes
+from conveyor_sim.scene.marks import marks_of
+from conveyor_sim.scene.moving import moving_shapes
+
+PLANT, MARKERS = "plant", "markers"
+"""Made here, of what is heard: the drawing."""
+
+KEPT = ("line", "run_state", "readback", "alarm_states")
+"""Topics whose last message a client is sent as it begins to look."""
+
+SHORTEST = 0.04
+"""s of wall time from one message of MARKERS to the next, at least."""
+
+WAITING = 256
+"""Messages that wait for a client, at most; of one that takes them too slowly the oldest are forgotten."""
+
+FRAME = "world"
+
+
+class FoxgloveServer:
+    """Follows a source; what is drawn is asked of it as long as somebody looks at that."""
+
+    def __init__(self, source: PictureSource, host: str, port: int) -> None:
+        """port: 0 for any that is free."""
+        self._source, self._at = source, (host, port)
+        self._context = foxglove.Context()  # without it channels are closed
+        self._channels: dict[str, foxglove.Channel] = {}
+        self._server: WebSocketServer | None = None
+        self._looks: dict[str, set[int]] = defaultdict(set)  # by topic, clients
+        self._ends: list[Callable[[], None]] = []
+        self._end_watch: Callable[[], None] | None = None
+        self._changed = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self._drawn: Any = None
+        self._latency = 0.0
+
+    @property
+    def address(self) -> str:
+        """As it is entered in Foxglove: Open connection, Foxglove WebSocket."""
+        port = self._at[1] if self._server is None else self._server.port
+        host = f"[{self._at[0]}]" if ":" in self._at[0] else self._at[0]
+        return f"ws://{host}:{port}"
+
+    async def start(self) -> None:
+        """Serve from now on. Raises FaceError if that can't be."""
+        self._loop = asyncio.get_running_loop()
+        distro = default_distro()
+        for topic in (*HEARD, *DRAWN, PLANT, MARKERS):
+            known = schema_of(topic, distro)
+            schema = foxglove.Schema(name=known.name, encoding=known.encoding, data=known.text)
+            self._channels[topic] = foxglove.Channel(
+                f"/{topic}", message_encoding="cdr", schema=schema, context=self._context
+            )
+
+        try:
+            self._server = foxglove.start_server(
+                name=self._source.about.name,
+                host=self._at[0],
+                port=self._at[1],
+                context=self._context,
+                server_listener=_Listener(self._in_loop, self._look, self._look_away),
+                message_backlog_size=WAITING,
+            )
+        except Exception as error:  # the library has no type of its own for it
+            raise FaceError(f"foxglove: {self._at[0]}:{self._at[1]} can't be served ({error})") from error
+        self._ends = [self._source.hear(self._heard), self._source.listen(lambda: self._in_loop(self._changed.set))]
+        self._task = asyncio.create_task(self._draw_all())
+
+    async def stop(self) -> None:
+        """End all connections."""
+        for end in self._ends:
+            end()
+        self._ends = []
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+            self._task = None
+        self._looks.clear()
+        self._watch()
+        if self._server is not None:
+            await asyncio.to_thread(self._server.stop)  # it waits for threads that may wait for the interpreter
+            self._server = None
+
+    def status(self) -> Status:
+        """What it is doing; a client counts as long as it looks at something."""
+        latency, self._latency = self._latency, 0.0
+        looks = [client for clients in self._looks.values() for client in clients]
+        return Status(len(set(looks)), len(looks), 0, 0, latency)
+
+    def _heard(self, topic: str, data: bytes) -> None:
+        """By the thread of the source."""
+        server = self._server
+        if topic == "line" and server is not None:  # another run or time: they forget what they have
+            server.clear_session()
+            self._in_loop(self._draw_plant)
+        self._channels[topic].log(data)
+
+    def _in_loop(self, function: Callable[..., object], *given: object) -> None:
+        """By any thread."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(function, *given)
+
+    # In the loop
+
+    def _look(self, client: int, topic: str) -> None:
+        self._looks[topic].add(client)
+        self._watch()
+        if topic == PLANT:
+            self._draw_plant()
+        elif topic in KEPT and (data := self._source.newest.get(topic)) is not None:
+            self._channels[topic].log(data)
+        elif topic == MARKERS:
+            self._drawn = None
+            self._changed.set()
+
+    def _look_away(self, client: int, topic: str) -> None:
+        self._looks[topic].discard(client)
+        self._watch()
+
+    def _watch(self) -> None:
+        """Have drawn what somebody looks at, and nothing else."""
+        wanted = any(self._looks[topic] for topic in (*DRAWN, MARKERS))
+        if wanted and self._end_watch is None:
+            self._end_watch = self._source.watch()
+        elif not wanted and self._end_watch is not None:
+            self._end_watch()
+            self._end_watch = None
+
+    async def _draw_all(self) -> None:
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            if self._looks[MARKERS]:
+                with suppress(Exception):  # of a damaged recording, messages may be anything; the next may be sound
+                    self._draw()
+            await asyncio.sleep(SHORTEST)
+
+    def _draw(self) -> None:
+        """What moves, where it is now."""
+        picture = self._source.picture
+        decode = picture.drawn.get("bottles")
+        if decode is None or decode is self._drawn:
+            return
+        self._drawn = decode
+        message, line = decode(), picture.line
+        signals = dict(zip(line.signal_names, picture.signals.tolist(), strict=False))
+        shapes = moving_shapes(self._scene())
+        moving = [shape.shape(signals[f"{shape.name}/position"] * shape.stroke) for shape in shapes]
+        header = Header(int(message.tick), int(message.tick) * int(line.tick_ns), FRAME)
+        columns = TOPICS["bottles"].unpack(message)
+        self._channels[MARKERS].log(bottles_markers(columns, np.asarray(line.type_radius), moving, header))
+        self._latency = max(self._latency, time.time() - picture.at)
+
+    def _draw_plant(self) -> None:
+        """What stands, if somebody looks at it."""
+        if self._looks[PLANT]:
+            scene = self._scene()
+            shapes = belt_shapes(scene), rail_shapes(scene), marks_of(scene)
+            self._channels[PLANT].log(plant_markers(*shapes, Header(0, 0, FRAME)))
+
+    def _scene(self) -> Any:
+        line = self._source.picture.line
+        if self._parsed[0] is not line:
+            scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+            self._parsed = line, scene
+        return self._parsed[1]
+
+    _parsed: tuple[Any, Any] = (None, None)
+    """The last message of topic line, and its scene."""
+
+
+class _Listener(ServerListener):
+    """Called by threads of the library."""
+
+    def __init__(
+        self,
+        in_loop: Callable[..., None],
+        look: Callable[[int, str], None],
+        look_away: Callable[[int, str], None],
+    ) -> None:
+        self._in_loop, self._look, self._look_away = in_loop, look, look_away
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        self._in_loop(self._look, client.id, channel.topic.removeprefix("/"))
+
+    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
+        self._in_loop(self._look_away, client.id, channel.topic.removeprefix("/"))

@@ -1,0 +1,1 @@
+"""Modbus server of a line, and the addresses of its tags."""

@@ -1,0 +1,151 @@
+"""`Commands`: what hosts want of a line by NCMD and DCMD, judged at once, and then given to the source as inputs are.
+
+A command names nobody, and Sparkplug has no answers: whoever the broker lets publish it gives it, in the role that the
+face was given, and hosts find what came of it in metrics of the edge node.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.receipt import Receipt
+from conveyor_sim.line.tag import COMMANDS, Tag
+from conveyor_sim.protocols.hands import TAKES_NO_INPUT, is_mode, objection, refused_for_good
+from conveyor_sim.protocols.holding import Holding, HoldingService
+from conveyor_sim.protocols.mqtt.line_metrics import number_of
+from conveyor_sim.protocols.mqtt.payload import decoded
+from conveyor_sim.protocols.source import MQTT, TagSource
+from conveyor_sim.support.printable import SENTENCE, printable
+
+REBIRTH = "Node Control/Rebirth"
+"""Metric of the edge node that has all births sent again."""
+
+MOST_METRICS = 1000
+"""Of one command."""
+
+SILENCE = 30.0
+"""s of wall time without a command after which no controller holds the line by this face."""
+
+
+class Commands:
+    """Of all hosts of one source, by one broker."""
+
+    def __init__(
+        self,
+        source: TagSource,
+        role: WriterKind | None,
+        broker: str,
+        silence: float = SILENCE,
+        holding: HoldingService | None = None,
+    ) -> None:
+        """role: in which they command; None: they may not. broker: its address, which inputs are recorded under.
+        holding: decides whether they hold the line; None: a new one.
+        """
+        self._source, self._role, self._silence = source, role, silence
+        self._writer = f"{MQTT} {broker}"
+        self._receipt = Receipt(source.about.tags, source.about.where)
+        self._holding = holding or Holding(source, MQTT)
+        self._last = 0.0  # s of wall time, of the last command that was taken
+        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
+        self.before = (0, 0)
+        """Commands that were passed on, and commands that were refused, before the edge node was restarted."""
+        self.writes = self.refused = 0
+        """Commands so far that were passed on to the line, and that were not."""
+        self.refusal = ""
+        """Why the last one was not; empty: none was refused yet."""
+
+    def refuse(self, reason: str, count: int = 1) -> None:
+        """So many commands more are refused for a reason."""
+        self.refused += count
+        self.refusal = printable(reason, SENTENCE)
+
+    def take_node(self, data: bytes) -> bool:
+        """A command to the edge node; whether it asks for all births again."""
+        metrics = self._metrics(data)
+        if isinstance(metrics, str):
+            self.refuse(metrics)
+            return False
+        others = [metric.name for metric in metrics if metric.name != REBIRTH]
+        if others or not all(metric.WhichOneof("value") == "boolean_value" for metric in metrics):
+            what = printable(others[0]) if others else REBIRTH
+            self.refuse(f"{what}: given to the edge node, expected {REBIRTH} as a Boolean; commands go to the device")
+            return False
+        return any(metric.boolean_value for metric in metrics)
+
+    def take_line(self, data: bytes) -> None:
+        """A command to the line: all metrics of it act together, or not at all."""
+        metrics = self._metrics(data)
+        if reason := metrics if isinstance(metrics, str) else self._give(metrics):
+            self.refuse(reason)
+        else:
+            self.writes += 1
+
+    def leave(self) -> None:
+        """Have the line given up, if it is held: no host can be heard any more."""
+        self._holding.leave(self._writer)
+
+    def look(self) -> None:
+        """Have the line given up after a silence. To be called now and then."""
+        if self._holding.holder and time.monotonic() > self._last + self._silence:
+            self.leave()
+        self._holding.look()
+
+    def _metrics(self, data: bytes) -> Any:
+        """Those of a command, or why it is refused."""
+        try:
+            metrics = decoded(data).metrics
+            names = [metric.name for metric in metrics]
+        except ValueError as error:
+            return str(error)
+        if not 1 <= len(names) <= MOST_METRICS:
+            return f"{len(names)} metrics given, expected 1 to {MOST_METRICS}, each with its name"
+        return metrics
+
+    def _give(self, metrics: Any) -> str:
+        """Why a command to the line is refused, "" if it was given to the source."""
+        role, shown = self._role, self._source.shown
+        if role is None:
+            return "a command given, expected none: the line is served to be read only"
+        if shown.lost or shown.run.state in TAKES_NO_INPUT:
+            return f"a command given, expected none: {shown.lost or f'the run is {shown.run.text}'}"
+        known = {**self._commands, **self._modes}
+        names: list[str] = []
+        numbers: list[float] = []
+        for metric in metrics:
+            tag = known.get(metric.name)
+            if tag is None:
+                return f"{printable(metric.name)}: can't be commanded, expected a metric that is not readOnly"
+            number = number_of(tag, metric)
+            if number is None:
+                return f"{tag.name}: no value of its data type given, expected {tag.kind}, as its birth has it"
+            names.append(tag.name)
+            numbers.append(number)
+        modes = [name for name in names if name in self._modes]
+        if modes and len(modes) < len(names):
+            return f"{modes[0]}: given with commands, expected modes in a message of their own"
+        return self._set_modes(role, names, numbers) if modes else self._set(role, names, numbers)
+
+    def _set(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
+        given = Input(MQTT, self._writer, role, SET, tuple(names), tuple(numbers))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return refusal.reason
+        for name, number in zip(names, numbers, strict=True):
+            if reason := objection(self._source, self._commands[name], number, role, self._writer):
+                return reason
+        # Whoever attached a PLC that goes in lockstep has said whose the line is.
+        if role == "controller" and "target" not in self._source.controls:
+            if reason := self._holding.take(self._writer):
+                return reason
+            self._last = time.monotonic()
+        return self._source.give(given)
+
+    def _set_modes(self, role: WriterKind, names: list[str], numbers: list[float]) -> str:
+        devices = tuple(self._modes[name].device for name in names)
+        given = Input(MQTT, self._writer, role, MODE, devices, tuple(numbers))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return refusal.reason
+        return self._source.give(given)

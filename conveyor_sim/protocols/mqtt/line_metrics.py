@@ -1,0 +1,140 @@
+"""`LineMetrics`: the tags of a line as metrics of Sparkplug B, and what of them has changed since it was sent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
+from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, seconds
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.hands import is_mode
+from conveyor_sim.protocols.handshake import TICK
+from conveyor_sim.protocols.mqtt.payload import (
+    BOOLEAN,
+    DOUBLE,
+    GOOD,
+    INT32,
+    INT64,
+    QUALITY,
+    STALE,
+    STRING,
+    Payload,
+    add_metric,
+    add_property,
+    whole,
+)
+from conveyor_sim.protocols.source import About, Shown
+from conveyor_sim.support.rounded_limit import at_limit
+
+FORCED = "forced"
+"""Key of the property of a signal that reads otherwise than it is; it is left out where that is not so."""
+
+TIME = "run/time"
+"""Metric: simulated time, s."""
+
+_KINDS = {"bool": BOOLEAN, "count": INT64, "enumeration": INT32, "number": DOUBLE}
+_TAKEN = {BOOLEAN: ("boolean_value",), DOUBLE: ("double_value", "float_value")}
+_WHOLE = ("int_value", "long_value")
+
+
+class _Reading(NamedTuple):
+    value: float | None
+    quality: int
+    forced: bool
+
+
+def is_there(shown: Shown) -> bool:
+    """Whether a line is one whose values are those of now, or of a pause: otherwise the device is dead."""
+    return not shown.lost and shown.run.state not in (ENDED, STOPPED)
+
+
+def milliseconds(date: datetime) -> int:
+    """Since 1970, UTC."""
+    return int(date.timestamp() * 1e3)
+
+
+def number_of(tag: Tag, metric: Any) -> float | None:
+    """Return the value that a metric gives a tag; None if it has none of the tag's type.
+
+    A Double may come as a Float, in which a limit has fewer digits.
+    """
+    kind = _KINDS[tag.kind]
+    field = metric.WhichOneof("value")
+    if metric.is_null or field not in _TAKEN.get(kind, _WHOLE):
+        return None
+    value = getattr(metric, field)
+    if field == "float_value":
+        return at_limit(float(value), tag.low, tag.high)
+    return float(whole(field, value) if kind in (INT32, INT64) else value)
+
+
+class LineMetrics:
+    """Of one line, as its hosts know it."""
+
+    def __init__(self, about: About, clock: Clock, writes: bool) -> None:
+        """writes: whether hosts may command."""
+        self._tick, self._clock, self._writes = about.tick, clock, writes
+        shown = [tag for tag in about.tags if tag.role in (*SIGNALS, *COMMANDS)]
+        run = [count(TICK, "run", "Ticks since the start."), seconds(TIME, "run", "Simulated time.")]
+        self._tags = [*run, *shown]
+        self._clocks = {TICK, TIME, *(tag.name for tag in shown if tag.role == "counter" and tag.unit == "s")}
+        self._sent: dict[str, _Reading] = {}
+
+    def birth(self, shown: Shown, heard: datetime) -> Any:
+        """All of them, with what stays the same of each, as a payload."""
+        payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
+        self._sent.clear()
+        for tag, reading in self._readings(shown):
+            metric = self._add(payload, tag, reading, stamp)
+            self._describe(metric, tag)
+            self._sent[tag.name] = reading
+        return payload
+
+    def changes(self, shown: Shown, heard: datetime, passing: bool = True) -> Any:
+        """Those that have changed, as a payload.
+
+        passing: whether to say so if that is but how time passes, on a clock or in a state; with others it is always
+        said.
+        """
+        payload, stamp = Payload(), milliseconds(self._clock.stamp(shown.tick, heard))
+        changed: list[tuple[Tag, _Reading]] = []
+        for tag, reading in self._readings(shown):
+            if reading != self._sent.get(tag.name):
+                changed.append((tag, reading))
+        if not passing and all(tag.name in self._clocks for tag, _ in changed):
+            return payload
+        for tag, reading in changed:
+            self._add(payload, tag, reading, stamp)
+            self._sent[tag.name] = reading
+        return payload
+
+    def _readings(self, shown: Shown) -> Iterator[tuple[Tag, _Reading]]:
+        values = {**shown.values, TICK: float(shown.tick), TIME: shown.tick * self._tick}
+        quality = STALE if shown.run.state == PAUSED else GOOD
+        for tag in self._tags:
+            value = values.get(tag.name)
+            known = value is not None and not math.isnan(value)
+            yield tag, _Reading(value if known else None, quality, tag.name in shown.forced)
+
+    def _add(self, payload: Any, tag: Tag, reading: _Reading, stamp: int) -> Any:
+        metric = add_metric(payload, tag.name, _KINDS[tag.kind], reading.value, stamp)
+        before = self._sent.get(tag.name)
+        if reading.quality != GOOD or before is None or before.quality != GOOD:
+            add_property(metric, QUALITY, INT32, reading.quality)
+        if reading.forced or (before is not None and before.forced):
+            add_property(metric, FORCED, BOOLEAN, reading.forced)
+        return metric
+
+    def _describe(self, metric: Any, tag: Tag) -> None:
+        metric.metadata.description = tag.description
+        writable = self._writes and (tag.role in COMMANDS or is_mode(tag))
+        add_property(metric, "readOnly", BOOLEAN, not writable)
+        if tag.kind in ("number", "count"):
+            add_property(metric, "engUnit", STRING, "" if tag.unit == "1" else tag.unit)
+            add_property(metric, "engLow", DOUBLE, tag.low)
+            add_property(metric, "engHigh", DOUBLE, tag.high)
+        elif tag.kind == "enumeration":
+            add_property(metric, "texts", STRING, tag.listed_texts)

@@ -1,0 +1,146 @@
+"""`Session`: what an edge node sends over one connection: births, what changes, deaths, each with its number."""
+
+from __future__ import annotations
+
+import time
+from datetime import datetime, timezone
+from typing import Any
+
+from conveyor_sim.line.run_state import RUN, STATES
+from conveyor_sim.protocols.mqtt.commands import REBIRTH, Commands
+from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics, is_there, milliseconds
+from conveyor_sim.protocols.mqtt.link import Link
+from conveyor_sim.protocols.mqtt.payload import BOOLEAN, INT32, INT64, STRING, Payload, add_metric, add_property
+from conveyor_sim.protocols.source import Shown
+
+NAMESPACE = "spBv1.0"
+DEVICE = "line"
+"""The device of each edge node: commands act, values change and the connection is lost for the line as a whole."""
+
+BETWEEN = 0.1
+"""s of wall time, at least, between two messages of the edge node itself, and to one that says but how time passes."""
+
+_NUMBERS = 256
+
+
+class Names:
+    """Topics of an edge node and of its device."""
+
+    def __init__(self, group: str, node: str) -> None:
+        """group, node: ids."""
+        self.group, self.node = group, node
+        self.node_commands, self.line_commands = self.of("NCMD"), self.of("DCMD")
+
+    def of(self, kind: str) -> str:
+        """Of a type of message: NBIRTH, DDATA, ..."""
+        topic = f"{NAMESPACE}/{self.group}/{kind}/{self.node}"
+        return f"{topic}/{DEVICE}" if kind.startswith("D") else topic
+
+
+def death(number: int) -> bytes:
+    """Payload of NDEATH. number: of the connection."""
+    payload = Payload(timestamp=_now())
+    add_metric(payload, "bdSeq", INT64, number, payload.timestamp)
+    return bytes(payload.SerializeToString())
+
+
+class Session:
+    """Of one connection."""
+
+    def __init__(self, link: Link, names: Names, number: int, line: LineMetrics, commands: Commands) -> None:
+        """number: of the connection, as its death has it."""
+        self._link, self._names, self._number, self._line, self._commands = link, names, number, line, commands
+        self._next = 0  # sequence number
+        self._last: Shown | None = None
+        self._node: dict[str, tuple[int, float | str]] = {}
+        self._node_at = 0.0  # s of wall time
+        self._alive = False
+        self._line_at = 0.0  # s of wall time, of the last data of the line
+        self._put_off: tuple[Shown, datetime] | None = None
+        self.born_at: float | None = None
+        """s of wall time of the last births; None: there were none yet."""
+
+    def bear(self, shown: Shown, heard: datetime) -> None:
+        """All births, from the first number on."""
+        self._next, self.born_at = 0, time.monotonic()
+        payload, stamp = Payload(), _now()
+        add_metric(payload, "bdSeq", INT64, self._number, stamp)
+        add_metric(payload, REBIRTH, BOOLEAN, False, stamp)
+        self._node = self._of_node(shown)
+        for name, (kind, value) in self._node.items():
+            metric = add_metric(payload, name, kind, value, stamp)
+            if kind == INT32:
+                add_property(metric, "texts", STRING, ", ".join(f"{number} {text}" for number, text in STATES.items()))
+        self._send("NBIRTH", payload)
+        self._last, self._alive = shown, is_there(shown)
+        if self._alive:
+            self._bear_line(shown, heard)
+
+    def bring(self, shown: Shown, heard: datetime) -> None:
+        """What a line shows: what has changed, or its death, or that it is there again. After `bear`."""
+        last, self._last = self._last, shown
+        back = last is not None and (shown.tick < last.tick or shown.run_id != last.run_id)
+        there = is_there(shown)
+        if there and (back or not self._alive):
+            # Where time has stepped back, what has stayed the same would be of the future.
+            self._bear_line(shown, heard)
+        elif self._alive and not shown.lost:
+            self._say(shown, heard, passing=not there or time.monotonic() >= self._line_at + BETWEEN)
+        if self._alive and not there:
+            self._send("DDEATH", Payload())
+        self._alive = there
+
+    @property
+    def behind(self) -> bool:
+        """Whether time has passed that was not said."""
+        return self._alive and self._put_off is not None
+
+    def catch_up(self) -> None:
+        """Say how time has passed, where that was put off for long enough."""
+        if self.behind and self._put_off is not None and time.monotonic() >= self._line_at + BETWEEN:
+            self._say(*self._put_off, passing=True)
+
+    def _say(self, shown: Shown, heard: datetime, passing: bool) -> None:
+        changed = self._line.changes(shown, heard, passing)
+        self._put_off = None if changed.metrics or passing else (shown, heard)
+        if changed.metrics:
+            self._line_at = time.monotonic()
+            self._send("DDATA", changed)
+
+    def tell(self, shown: Shown) -> None:
+        """What has changed of the edge node itself, unless it was told just now. After `bear`."""
+        now, metrics = time.monotonic(), self._of_node(shown)
+        if metrics == self._node or now < self._node_at + BETWEEN:
+            return
+        payload, stamp = Payload(), _now()
+        for name, (kind, value) in metrics.items():
+            if self._node.get(name) != (kind, value):
+                add_metric(payload, name, kind, value, stamp)
+        self._node, self._node_at = metrics, now
+        self._send("NDATA", payload)
+
+    def _bear_line(self, shown: Shown, heard: datetime) -> None:
+        self._put_off, self._line_at = None, time.monotonic()
+        self._send("DBIRTH", self._line.birth(shown, heard))
+
+    def _of_node(self, shown: Shown) -> dict[str, tuple[int, float | str]]:
+        """Always good: it says what has become of the rest."""
+        commands = self._commands
+        written, refused = commands.before
+        return {
+            f"{RUN}/state": (INT32, shown.run.state),
+            f"{RUN}/reason": (STRING, shown.run.reason),
+            f"{RUN}/lost": (STRING, shown.lost),
+            "commands/written": (INT64, written + commands.writes),
+            "commands/refused": (INT64, refused + commands.refused),
+            "commands/refusal": (STRING, commands.refusal),
+        }
+
+    def _send(self, kind: str, payload: Any) -> None:
+        payload.timestamp, payload.seq = _now(), self._next
+        self._next = (self._next + 1) % _NUMBERS
+        self._link.publish(self._names.of(kind), payload.SerializeToString())
+
+
+def _now() -> int:
+    return milliseconds(datetime.now(timezone.utc))

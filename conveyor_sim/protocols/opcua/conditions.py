@@ -1,0 +1,208 @@
+"""`AlarmStates`: every alarm of a line as an object with variables, and as a condition whose changes are events."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any, NamedTuple
+from uuid import uuid4
+
+from asyncua import Node, ua
+from asyncua.common.events import get_event_obj_from_type_node
+
+from conveyor_sim.columns.alarms import AlarmColumns
+from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.opcua.emitter import Emitter
+from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
+from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
+from conveyor_sim.protocols.opcua.values import status_of
+from conveyor_sim.protocols.source import Shown
+
+MOST_OBJECTS = 4000
+"""One for each alarm that there ever was; those that come after so many have events, and no object."""
+
+STATE_TEXTS = [state.name.replace("_", " ").capitalize() for state in AlarmState]
+
+_HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED)
+_LATCHED = (AlarmState.LATCHED_UNACKNOWLEDGED, AlarmState.LATCHED_ACKNOWLEDGED)
+
+
+class _Row(NamedTuple):
+    """One alarm, as its variables have it."""
+
+    state: int
+    active: bool
+    acknowledged: bool
+    first_out: bool
+    priority: int
+    alarm_class: str
+    text: str
+    tag: str
+    group: str
+    since: int
+    shelved_until: int
+    changed_by: str
+
+
+class _Variable(NamedTuple):
+    kind: ua.VariantType
+    what: str
+
+
+_VARIABLES: Mapping[str, _Variable] = {
+    "state": _Variable(ua.VariantType.UInt32, "By ISA-18.2."),
+    "active": _Variable(ua.VariantType.Boolean, "Whether its condition holds."),
+    "acknowledged": _Variable(ua.VariantType.Boolean, "Whether it waits for nobody."),
+    "first_out": _Variable(ua.VariantType.Boolean, "Whether it was the first of its group."),
+    "priority": _Variable(ua.VariantType.UInt16, "1 to 1000."),
+    "alarm_class": _Variable(ua.VariantType.String, "error, warning or message."),
+    "text": _Variable(ua.VariantType.String, "What it says."),
+    "tag": _Variable(ua.VariantType.String, "Signal that it is about; empty: none."),
+    "group": _Variable(ua.VariantType.String, "Within which one comes first."),
+    "since": _Variable(ua.VariantType.DateTime, "Simulated time of the last change of its state."),
+    "shelved_until": _Variable(ua.VariantType.DateTime, "Simulated time; 1601: not shelved for a time."),
+    "changed_by": _Variable(ua.VariantType.String, "Who acknowledged, shelved or reset it, ... last."),
+}
+
+
+class AlarmStates:
+    """Of one line."""
+
+    def __init__(self, nodes: Nodes, emitter: Emitter, clock: Clock) -> None:
+        self._nodes, self._emitter, self._clock = nodes, emitter, clock
+        nodes.object(ALARM_STATES, ALARM_STATES, node_id(LINE), "All alarms, each with its state.")
+        add_alarm_methods(nodes)
+        self._template: Any = None
+        self._rows: dict[str, _Row] = {}
+        self._objects = 0
+        self._columns: AlarmColumns | None = None
+        self._status = int(ua.StatusCodes.Good)
+        self._event_ids: dict[str, bytes] = {}
+
+    def is_last_event(self, alarm: str, event_id: bytes) -> bool:
+        """Whether that is the id of the last event of an alarm."""
+        return self._event_ids.get(alarm) == event_id
+
+    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+        """Bring in what has changed."""
+        status = status_of(shown)
+        every = back or status != self._status
+        if shown.alarms is None or (shown.alarms is self._columns and not every):
+            return
+        first, self._columns, self._status = self._columns is None, shown.alarms, status
+        rows = _rows(shown.alarms)
+        stamp = self._clock.stamp(shown.tick, heard)
+        for id in self._rows.keys() - rows.keys():
+            await self._write(id, self._rows.pop(id), stamp, ua.StatusCodes.BadNoData)
+            self._emitter.forget(_object(id))
+            self._event_ids.pop(id, None)
+        for id, row in rows.items():
+            before = self._rows.get(id)
+            self._rows[id] = row
+            if before is None and not self._add(id):
+                pass
+            elif before != row or every:
+                await self._write(id, row, stamp, status)
+            changed = before is None or (before.state, before.active) != (row.state, row.active)
+            if changed and not (row.state == AlarmState.NORMAL and (first or before is None)):
+                await self._emit(id, row, self._clock.stamp(row.since, heard))
+
+    def _add(self, id: str) -> bool:
+        name = f"{ALARM_STATES}/{id}"
+        if name in self._nodes:
+            return True
+        if self._objects >= MOST_OBJECTS:
+            return False
+        self._objects += 1
+        made = self._nodes.object(name, id, node_id(ALARM_STATES), f"The alarm {id}.")
+        for field, (kind, what) in _VARIABLES.items():
+            is_state = field == "state"
+            variable = self._nodes.variable(
+                f"{name}/{field}",
+                field,
+                made,
+                ua.Variant(nothing(kind), kind),
+                what,
+                ua.ObjectIds.MultiStateDiscreteType if is_state else ua.ObjectIds.BaseDataVariableType,
+            )
+            if is_state:
+                texts = [ua.LocalizedText(text) for text in STATE_TEXTS]
+                self._nodes.property(
+                    f"{name}/{field}/EnumStrings",
+                    variable,
+                    texts,
+                    ua.ObjectIds.LocalizedText,
+                    ua.VariantType.LocalizedText,
+                )
+        for method in ALARM_METHODS:
+            target = node_id(f"{ALARM_STATES}/{method}")
+            self._nodes.refer(made, target, ua.ObjectIds.HasComponent, ua.NodeClass.Method)
+        return True
+
+    async def _write(self, id: str, row: _Row, stamp: datetime, status: int) -> None:
+        name = f"{ALARM_STATES}/{id}"
+        if name not in self._nodes:
+            return
+        for field, given in row._asdict().items():
+            value: Any = given
+            if _VARIABLES[field].kind is ua.VariantType.DateTime:
+                value = nothing(ua.VariantType.DateTime) if given == NEVER else self._clock.simulated(given)
+            await self._nodes.write(f"{name}/{field}", ua.Variant(value, _VARIABLES[field].kind), stamp, status)
+
+    async def _emit(self, id: str, row: _Row, at: datetime) -> None:
+        """An event of AlarmConditionType (OPC 10000-9, 5.8.2)."""
+        if self._template is None:
+            kind = Node(self._emitter.session, ua.NodeId(ua.ObjectIds.AlarmConditionType))
+            self._template = await get_event_obj_from_type_node(kind)
+            self._template.add_property("NodeId", None, ua.VariantType.NodeId)
+        event = copy.copy(self._template)
+        self._event_ids[id] = event.EventId = uuid4().bytes
+        source = node_id(row.tag) if row.tag and row.tag in self._nodes else node_id(LINE)
+        event.NodeId, event.SourceNode, event.InputNode = _object(id), source, source
+        event.SourceName, event.ConditionName = row.tag or LINE, id
+        event.Message, event.Severity, event.LastSeverity = ua.LocalizedText(row.text), row.priority, row.priority
+        event.ConditionClassId = ua.NodeId(ua.ObjectIds.ProcessConditionClassType)
+        event.ConditionClassName = ua.LocalizedText("ProcessConditionClassType")
+        event.BranchId, event.Quality, event.Comment = ua.NodeId(), ua.StatusCode(), ua.LocalizedText("")
+        event.ClientUserId = row.changed_by
+        event.Retain = row.state not in (AlarmState.NORMAL, AlarmState.OUT_OF_SERVICE)
+        event.SuppressedOrShelved = row.state in _HIDDEN
+        event.FirstInGroupFlag = row.first_out
+        for field, on, true, false in (
+            ("EnabledState", True, "Enabled", "Disabled"),
+            ("ActiveState", row.active, "Active", "Inactive"),
+            ("AckedState", row.acknowledged, "Acknowledged", "Unacknowledged"),
+            ("SuppressedState", row.state == AlarmState.SUPPRESSED, "Suppressed", "Unsuppressed"),
+            ("OutOfServiceState", row.state == AlarmState.OUT_OF_SERVICE, "Out of Service", "In Service"),
+            ("LatchedState", row.state in _LATCHED, "Latched", "Unlatched"),
+        ):
+            setattr(event, field, ua.LocalizedText(true if on else false, "en"))
+            setattr(event, f"{field}/Id", on)
+        await self._emitter.emit(event, at)
+
+
+def _rows(columns: AlarmColumns) -> dict[str, _Row]:
+    rows: dict[str, _Row] = {}
+    for place, id in enumerate(columns.id):
+        state = int(columns.state[place])
+        rows[id] = _Row(
+            state,
+            bool(columns.active[place]),
+            state not in WAITING,
+            bool(columns.first_out[place]),
+            int(columns.priority[place]),
+            columns.alarm_class[place],
+            columns.text[place],
+            columns.tag[place],
+            columns.group[place],
+            int(columns.since[place]),
+            int(columns.shelved_until[place]),
+            columns.changed_by[place],
+        )
+    return rows
+
+
+def _object(id: str) -> ua.NodeId:
+    return node_id(f"{ALARM_STATES}/{id}")

@@ -1,0 +1,78 @@
+"""`LineEvents`: what happens on a line, as events of OPC UA; alarms have their own."""
+
+from __future__ import annotations
+
+import copy
+from datetime import datetime
+from typing import Any
+from uuid import uuid4
+
+from asyncua import Node, ua
+from asyncua.common.events import get_event_obj_from_type_node
+
+from conveyor_sim.columns.events import Event
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.opcua.emitter import Emitter
+from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id
+from conveyor_sim.protocols.source import Shown, TagSource
+
+TYPE = "LineEventType"
+
+FIELDS = (
+    ("Kind", ua.VariantType.String),
+    ("Name", ua.VariantType.String),
+    ("Value", ua.VariantType.Double),
+    ("Bottle", ua.VariantType.Int64),
+    ("Tick", ua.VariantType.Int64),
+)
+"""As in conveyor_msgs/Events."""
+
+_BOTTLES, _STATES, _HANDS, _WRONG = 1, 100, 300, 500
+
+SEVERITIES = {
+    "bottle_fed": _BOTTLES,
+    "bottle_removed": _BOTTLES,
+    "bottle_rejected": _BOTTLES,
+    "machine_state": _STATES,
+    "mode_changed": _HANDS,
+    "owner_changed": _HANDS,
+    "signal_forced": _HANDS,
+    "signal_unforced": _HANDS,
+}
+"""By kind, so that a client can leave out what it does not want; of others, something is wrong."""
+
+
+class LineEvents:
+    """Of one source."""
+
+    def __init__(self, source: TagSource, nodes: Nodes, emitter: Emitter, clock: Clock) -> None:
+        """Those from now on."""
+        self._source, self._nodes, self._emitter, self._clock = source, nodes, emitter, clock
+        self._type = nodes.event_type(TYPE, TYPE, ua.ObjectIds.BaseEventType, FIELDS)
+        self._template: Any = None
+        self._seen, _ = source.events(0)
+
+    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+        """Send what has happened."""
+        total, new = self._source.events(self._seen)
+        self._seen = total
+        if not self._emitter.heard:
+            return
+        for happened in new:
+            if not happened.kind.startswith("alarm_"):
+                await self._emit(happened, self._clock.stamp(happened.at, heard))
+
+    async def _emit(self, happened: Event, at: datetime) -> None:
+        if self._template is None:
+            self._template = await get_event_obj_from_type_node(Node(self._emitter.session, self._type))
+        event = copy.copy(self._template)
+        event.EventId = uuid4().bytes
+        known = bool(happened.name) and happened.name in self._nodes
+        event.SourceNode = node_id(happened.name if known else LINE)
+        event.SourceName = happened.name or LINE
+        words = f"{happened.kind.replace('_', ' ')}: {happened.name}"
+        event.Message = ua.LocalizedText(f"{words}: {happened.text}" if happened.text else words)
+        event.Severity = SEVERITIES.get(happened.kind, _WRONG)
+        event.Kind, event.Name, event.Value = happened.kind, happened.name, happened.value
+        event.Bottle, event.Tick = happened.bottle, happened.at
+        await self._emitter.emit(event, at)

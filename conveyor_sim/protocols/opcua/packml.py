@@ -1,0 +1,264 @@
+"""`PackMl`: each machine as a PackML object by OPC 30050, with the types of the OPC Foundation's own NodeSet.
+
+nodesets/Opc.Ua.PackML.NodeSet2.xml is version 1.01 of github.com/OPCFoundation/UA-Nodeset, under the OPC Foundation MIT
+License 1.00, which stands in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from asyncua import Server, ua
+from asyncua.common.instantiate_util import instantiate
+from asyncua.crypto.permission_rules import User
+
+from conveyor_sim.line.inputs import MODE, SET
+from conveyor_sim.line.packml import Command, State, objection
+from conveyor_sim.line.tag import Tag
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
+from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
+from conveyor_sim.protocols.opcua.packml_admin import NAME as ADMIN
+from conveyor_sim.protocols.opcua.requests import Codes, Requests
+from conveyor_sim.protocols.opcua.values import status_of
+from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.support.rounded_limit import at_limit, single
+
+NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"
+NAMESPACE = "http://opcfoundation.org/UA/PackML/"
+
+NAME = "PackML"
+"""Of the object below a machine."""
+
+_TYPE = 6
+"""PackMLBaseObjectType."""
+
+_MODES = 11
+"""ProductionMaintenanceModeEnum: the modes are those of it, with its numbers."""
+
+_METHODS: Mapping[int, Command] = {
+    361: Command.RESET,
+    376: Command.RESET,
+    369: Command.START,
+    375: Command.STOP,
+    366: Command.HOLD,
+    368: Command.UNHOLD,
+    367: Command.SUSPEND,
+    372: Command.UNSUSPEND,
+    364: Command.ABORT,
+    363: Command.CLEAR,
+    365: Command.COMPLETE,
+}
+"""By the ids of the NodeSet."""
+
+_BASE, _MACHINE, _EXECUTE = (
+    "BaseStateMachine",
+    "BaseStateMachine.MachineState",
+    "BaseStateMachine.MachineState.ExecuteState",
+)
+
+_OF: Mapping[str, tuple[int, ...]] = {
+    _BASE: (363, 364),
+    _MACHINE: (375, 376),
+    _EXECUTE: (361, 365, 366, 367, 368, 369, 372),
+}
+"""Methods of each of the three state machines, one in the other."""
+
+_TYPES: Mapping[str, int] = {_BASE: 3, _MACHINE: 2, _EXECUTE: 1}
+"""Types of the state machines."""
+
+_PARTS: Mapping[str, tuple[int, ...]] = {
+    "AvailableStates": (ua.ObjectIds.StateType, ua.ObjectIds.InitialStateType),
+    "AvailableTransitions": (ua.ObjectIds.TransitionType,),
+}
+"""Variables of a state machine, and of which types the parts of its own type are that they list."""
+
+_CLEARED, _RUNNING = ("Cleared", 71), ("Running", 75)
+
+_STATES: Mapping[str, Mapping[State, tuple[str, int]]] = {
+    _BASE: {State.ABORTING: ("Aborting", 61), State.ABORTED: ("Aborted", 62)},
+    _MACHINE: {State.STOPPED: ("Stopped", 53), State.STOPPING: ("Stopping", 54), State.CLEARING: ("Clearing", 55)},
+    _EXECUTE: {
+        State.RESETTING: ("Resetting", 27),
+        State.IDLE: ("Idle", 28),
+        State.STARTING: ("Starting", 29),
+        State.SUSPENDING: ("Suspending", 30),
+        State.SUSPENDED: ("Suspended", 31),
+        State.UNSUSPENDING: ("Unsuspending", 32),
+        State.HOLDING: ("Holding", 33),
+        State.HELD: ("Held", 34),
+        State.UNHOLDING: ("Unholding", 35),
+        State.EXECUTE: ("Execute", 36),
+        State.COMPLETING: ("Completing", 37),
+        State.COMPLETE: ("Complete", 38),
+    },
+}
+"""Names and ids of states, by the state machine that has them."""
+
+_NONE = (ua.LocalizedText(None), ua.NodeId())
+"""State of a state machine that is not active, and its id."""
+
+
+class PackMl:
+    """Of one source."""
+
+    def __init__(self, source: TagSource, requests: Requests, clock: Clock) -> None:
+        self._source, self._requests, self._clock = source, requests, clock
+        self._tags: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags}
+        self._machines = [tag.device for tag in source.about.tags if tag.name == f"{tag.device}/cntrl_cmd"]
+        self._admins = {machine: Admin(machine, self._tags, clock) for machine in self._machines}
+        self._nodes: Nodes | None = None
+        self._index = 0
+        self._status = int(Codes.Good)
+        self._written: dict[tuple[str, str], Any] = {}
+
+    async def add(self, server: Server, nodes: Nodes) -> None:
+        """Add the types, and an object for each machine, if there is any."""
+        if not self._machines:
+            return
+        self._nodes = nodes
+        await server.import_xml(NODESET)
+        self._index = await server.get_namespace_index(NAMESPACE)
+        kind = server.get_node(ua.NodeId(_TYPE, self._index))
+        parts = await self._parts(server)
+        modes, data_type = ua.NodeId(_MODES, self._index), ua.AttributeIds.DataType
+        for machine in self._machines:
+            root = f"{machine}/{NAME}"
+            parent, name = server.get_node(node_id(machine)), ua.QualifiedName(NAME, INDEX)
+            await instantiate(parent, kind, node_id(root), bname=name, instantiate_optional=False)
+            for state_machine, methods in _OF.items():
+                for method in methods:
+                    target = ua.NodeId(method, self._index)
+                    owner = node_id(f"{root}.{state_machine}")
+                    nodes.refer(owner, target, ua.ObjectIds.HasComponent, ua.NodeClass.Method)
+            await self._admins[machine].add(server, root, self._index)
+            rate = self._tags[f"{machine}/rate"]
+            span = ua.Variant(ua.Range(rate.low * A_MINUTE, rate.high * A_MINUTE))
+            now = self._clock.simulated(0)
+            for name, found in parts.items():
+                await nodes.write(f"{root}.{name}", found, now)
+            await nodes.write(f"{root}.Status.UnitSupportedModes", ua.Variant(modes), now)
+            mode = server.get_node(node_id(f"{root}.Status.UnitModeCurrent"))
+            await mode.write_attribute(data_type, ua.DataValue(ua.Variant(modes)))
+            for speed in ("MachSpeed", "CurMachSpeed"):
+                await nodes.write(f"{root}.Status.{speed}.EURange", span, now)
+
+    async def _parts(self, server: Server) -> dict[str, ua.Variant]:
+        """Ids of the states and transitions of each state machine, by the variables that list them."""
+        found: dict[str, ua.Variant] = {}
+        for state_machine, kind in _TYPES.items():
+            parts = await server.get_node(ua.NodeId(kind, self._index)).get_children_descriptions()
+            for name, kinds in _PARTS.items():
+                ids = [part.NodeId for part in parts if part.TypeDefinition in [ua.NodeId(each) for each in kinds]]
+                found[f"{state_machine}.{name}"] = ua.Variant(ids, ua.VariantType.NodeId, is_array=True)
+        return found
+
+    async def follow(self, shown: Shown, heard: datetime, back: bool) -> None:
+        """Bring in what has changed."""
+        if self._nodes is None:
+            return
+        status, stamp = status_of(shown), self._clock.stamp(shown.tick, heard)
+        if status != self._status or back:
+            self._status = status
+            self._written.clear()
+        for machine in self._machines:
+            admin = {f"{ADMIN}.{name}": value for name, value in self._admins[machine].values(shown).items()}
+            for name, value in {**self._values(machine, shown.values), **admin}.items():
+                if self._written.get((machine, name)) != value:
+                    self._written[machine, name] = value
+                    inactive = value.Value in _NONE and status == Codes.Good
+                    code = Codes.BadStateNotActive if inactive else status
+                    await self._nodes.write(f"{machine}/{NAME}.{name}", value, stamp, code)
+
+    def call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
+        """Return the result of a call of a machine's method and count it; None for any other method."""
+        result = self._call(client, request)
+        return None if result is None else self._requests.counted(result)
+
+    def _call(self, client: User, request: ua.CallMethodRequest) -> ua.CallMethodResult | None:
+        machine, _, _ = name_of(request.ObjectId).partition(f"/{NAME}")
+        if machine not in self._machines:
+            return None
+        given = [each.Value for each in request.InputArguments or []]
+        method = int(request.MethodId.Identifier) if request.MethodId.NamespaceIndex == self._index else 0
+        name = name_of(request.MethodId).rpartition(".")[2] or {362: "SetUnitMode", 400: "SetMachSpeed"}.get(method, "")
+        if method in _METHODS:
+            return _result(self._command(client, machine, _METHODS[method]))
+        if name not in ("SetUnitMode", "SetMachSpeed"):
+            return None
+        if not self._requests.may(client, SET if name == "SetMachSpeed" else MODE):
+            return _result(Codes.BadUserAccessDenied)
+        if len(given) != 1 or not isinstance(given[0], int | float) or isinstance(given[0], bool):
+            return _result(Codes.BadInvalidArgument)
+        value = float(given[0])
+        if name == "SetMachSpeed":
+            is_single = request.InputArguments[0].VariantType is ua.VariantType.Float
+            rate = _a_second(value, self._tags[f"{machine}/rate"], is_single)
+            return _result(self._requests.write_together(client, [f"{machine}/rate"], [rate]))
+        if isinstance(given[0], float) or value not in self._tags[f"{machine}/mode"].texts:
+            return _result(Codes.BadInvalidArgument)
+        return _result(self._requests.operate(client, MODE, (machine,), (value,)))
+
+    def _command(self, client: User, machine: str, command: Command) -> int:
+        name, shown = f"{machine}/cntrl_cmd", self._source.shown.values
+        if not self._requests.may(client, SET):
+            return int(Codes.BadUserAccessDenied)
+        if objection(command, int(shown[f"{machine}/state"])):
+            return int(Codes.BadInvalidState)
+        if shown.get(name) == command:  # it acts as it changes
+            code = self._requests.write_together(client, [name], [0.0])
+            if code != Codes.GoodCompletesAsynchronously:
+                return code
+        return self._requests.write_together(client, [name], [float(command)])
+
+    def _values(self, machine: str, values: Mapping[str, float]) -> dict[str, ua.Variant]:
+        """Of the variables of a machine, by their names below its object."""
+
+        def flag(name: str) -> ua.Variant:
+            return ua.Variant(values.get(f"{machine}/{name}", 0.0) != 0.0, ua.VariantType.Boolean)
+
+        def speed(name: str) -> ua.Variant:
+            return ua.Variant(values[f"{machine}/{name}"] * A_MINUTE, ua.VariantType.Float)
+
+        found = {
+            "Status.UnitModeCurrent": ua.Variant(int(values[f"{machine}/mode"]), ua.VariantType.Int32),
+            "Status.MachSpeed": speed("rate"),
+            "Status.CurMachSpeed": speed("cur_rate"),
+            "Status.EquipmentBlocked": flag("blocked"),
+            "Status.EquipmentStarved": flag("starved"),
+        }
+        number = int(values[f"{machine}/state"])
+        for state_machine, (text, state) in self._current(number).items():
+            found[f"{state_machine}.CurrentState"] = ua.Variant(ua.LocalizedText(text))
+            found[f"{state_machine}.CurrentState.Id"] = ua.Variant(
+                ua.NodeId(state, self._index) if state else ua.NodeId()
+            )
+        return found
+
+    def _current(self, number: int) -> dict[str, tuple[str | None, int]]:
+        """The present state of each state machine; no text: it has none now."""
+        none: tuple[str | None, int] = (None, 0)
+        if number in _STATES[_BASE]:
+            return {_BASE: _STATES[_BASE][State(number)], _MACHINE: none, _EXECUTE: none}
+        if number in _STATES[_MACHINE]:
+            return {_BASE: _CLEARED, _MACHINE: _STATES[_MACHINE][State(number)], _EXECUTE: none}
+        if number in _STATES[_EXECUTE]:
+            return {_BASE: _CLEARED, _MACHINE: _RUNNING, _EXECUTE: _STATES[_EXECUTE][State(number)]}
+        return dict.fromkeys((_BASE, _MACHINE, _EXECUTE), none)
+
+
+def _a_second(speed: float, rate: Tag, is_single: bool) -> float:
+    """Return a speed (packages per minute) as a rate (1/s). A limit rounded to the sender's type becomes the limit."""
+
+    def there_and_back(limit: float) -> float:
+        a_minute = limit * A_MINUTE
+        return (single(a_minute) if is_single else a_minute) / A_MINUTE
+
+    return at_limit(speed / A_MINUTE, rate.low, rate.high, there_and_back)
+
+
+def _result(code: int) -> ua.CallMethodResult:
+    return ua.CallMethodResult(ua.StatusCode(code), [], [], [])

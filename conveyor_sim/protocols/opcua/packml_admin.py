@@ -1,0 +1,138 @@
+"""`Admin`: what a machine has produced, why it stands, its alarms: variables of OPC 30050 that tags have values for.
+
+Types and names are those of the NodeSet (R 30050, 6.3.4). A machine counts once, so Count and AccCount are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from asyncua import Server, ua
+from asyncua.common.copy_node_util import _copy_node
+
+from conveyor_sim.columns.alarms import AlarmColumns
+from conveyor_sim.line.alarms.alarm import WAITING, AlarmState
+from conveyor_sim.line.tag import Tag
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.opcua.nodes import NEVER, node_id
+from conveyor_sim.protocols.opcua.values import unit_of
+from conveyor_sim.protocols.source import Shown
+
+NAME = "Admin"
+
+A_MINUTE = 60.0
+"""PackML counts speed in packages a minute."""
+
+_TYPE = 5
+"""PackMLAdminObjectType."""
+
+_COUNTS: Mapping[str, tuple[str, ...]] = {
+    "ProdConsumedCount": ("taken",),
+    "ProdProcessedCount": ("produced", "taken", "processed"),
+    "ProdDefectiveCount": ("taken_bad", "defective"),
+}
+"""Which counter of a machine is which; the first that it has."""
+
+_MOST = 2**31 - 1
+
+
+@dataclass
+class PackMLCountDataType:
+    """How many of one kind of bottles."""
+
+    ID: ua.Int32
+    Name: ua.String
+    Unit: ua.EUInformation
+    Count: ua.Int32
+    AccCount: ua.Int32
+
+
+@dataclass
+class PackMLAlarmDataType:
+    """An alarm, or why the machine stands."""
+
+    ID: ua.Int32
+    Value: ua.Int32
+    Message: ua.String
+    Category: ua.Int32
+    DateTime: ua.DateTime
+    AckDateTime: ua.DateTime
+    Trigger: ua.Boolean
+
+
+class Admin:
+    """Of one machine."""
+
+    def __init__(self, machine: str, tags: Mapping[str, Tag], clock: Clock) -> None:
+        """tags: of the line, by name."""
+        self._machine, self._clock = machine, clock
+        self._own = {name for name, tag in tags.items() if tag.device == machine}
+        self._reasons = tags[f"{machine}/stop_reason"].texts
+        self._design = tags[f"{machine}/rate"].nominal
+        self._counts = {
+            name: tags[f"{machine}/{found[0]}"]
+            for name, ends in _COUNTS.items()
+            if (found := [end for end in ends if f"{machine}/{end}" in tags])
+        }
+        self._reason, self._since = 0, NEVER
+        self._alarms: AlarmColumns | None = None
+        self._rows: dict[str, ua.Variant] = {}
+
+    async def add(self, server: Server, root: str, index: int) -> None:
+        """Add its variables below the object of a machine. index: namespace of PackML."""
+        for name, encoding, kind in (("Count", 69, PackMLCountDataType), ("Alarm", 74, PackMLAlarmDataType)):
+            data_type = ua.NodeId({"Count": 14, "Alarm": 15}[name], index)
+            ua.register_extension_object(kind.__name__, ua.NodeId(encoding, index), kind, data_type)
+        declared = await server.get_node(ua.NodeId(_TYPE, index)).get_children_descriptions()
+        parent, session = node_id(f"{root}.{NAME}"), server.iserver.isession
+        wanted = {*self._counts, "StopReason", "Alarm", "AlarmExtent", "Warning", "WarningExtent"}
+        wanted |= {"MachDesignSpeed"} if self._design is not None else set()
+        for each in declared:
+            if each.BrowseName.Name in wanted:
+                # Unlike the public one it keeps the kind of reference, HasAlarm and others.
+                await _copy_node(session, parent, each, node_id(f"{root}.{NAME}.{each.BrowseName.Name}"), False)
+
+    def values(self, shown: Shown) -> dict[str, ua.Variant]:
+        """Of its variables, by name."""
+        found = {name: self._count(tag, shown.values) for name, tag in self._counts.items()}
+        if self._design is not None:
+            found["MachDesignSpeed"] = ua.Variant(self._design * A_MINUTE, ua.VariantType.Float)
+        found["StopReason"] = self._stop_reason(shown)
+        if shown.alarms is not self._alarms and shown.alarms is not None:
+            self._alarms, self._rows = shown.alarms, self._standing(shown.alarms)
+        return found | self._rows
+
+    def _count(self, tag: Tag, values: Mapping[str, float]) -> ua.Variant:
+        count = min(_MOST, int(values.get(tag.name, 0.0)))
+        return _array([PackMLCountDataType(0, "bottles", unit_of(tag), count, count)])
+
+    def _stop_reason(self, shown: Shown) -> ua.Variant:
+        reason = int(shown.values[f"{self._machine}/stop_reason"])
+        if reason != self._reason:
+            self._reason, self._since = reason, self._clock.simulated(shown.tick) if reason else NEVER
+        category = int(shown.values[f"{self._machine}/category"])
+        text, on = self._reasons.get(reason, ""), category != 0
+        made = PackMLAlarmDataType(reason, reason, text, category, self._since, NEVER, on)
+        return ua.Variant(made, ua.VariantType.ExtensionObject)
+
+    def _standing(self, columns: AlarmColumns) -> dict[str, ua.Variant]:
+        """Its alarms that are not normal; those of class message are none of PackML's."""
+        rows: dict[str, list[PackMLAlarmDataType]] = {"error": [], "warning": []}
+        for place, tag in enumerate(columns.tag):
+            state, kind = int(columns.state[place]), columns.alarm_class[place]
+            if tag in self._own and state != AlarmState.NORMAL and kind in rows:
+                since = self._clock.simulated(int(columns.since[place]))
+                acknowledged = since if state not in WAITING else NEVER
+                text, priority, active = columns.text[place], int(columns.priority[place]), bool(columns.active[place])
+                made = PackMLAlarmDataType(place, state, text, priority, since, acknowledged, active)
+                rows[kind].append(made)
+        found: dict[str, ua.Variant] = {}
+        for name, kind in (("Alarm", "error"), ("Warning", "warning")):
+            found[name] = _array(rows[kind])
+            found[f"{name}Extent"] = ua.Variant(len(rows[kind]), ua.VariantType.Int32)
+        return found
+
+
+def _array(values: Sequence[object]) -> ua.Variant:
+    return ua.Variant(list(values), ua.VariantType.ExtensionObject, is_array=True)

@@ -1,0 +1,155 @@
+"""`Processor`: the messages of one connection, with limits before, while and after they are decoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from asyncua import ua
+from asyncua.common.connection import SecureConnection, TransportLimits
+from asyncua.common.utils import ServiceError
+from asyncua.crypto.security_policies import SecurityPolicyNone
+from asyncua.ua.ua_binary import struct_to_binary
+
+from conveyor_sim.protocols.opcua.decoding import Allowance, BoundedBuffer
+from conveyor_sim.protocols.opcua.dispatch import Dispatcher
+from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.opcua.operations import require_operations
+
+Codes = ua.StatusCodes
+
+CHUNK = 65_535
+"""Bytes of a part of a message, at most."""
+
+SMALLEST_CHUNK = 8192
+"""Bytes that a client must be able to receive and send at once (OPC 10000-6, 7.1.2.3)."""
+
+REQUEST_UNITS, CHANNEL_UNITS, LOGIN_UNITS = 10, 500, 5000
+"""Work units of any message, of opening a channel (RSA), and of a password (scrypt)."""
+
+ANSWER_BYTES = 25
+"""Bytes of an answer that cost a work unit: it takes about as long to encode them."""
+
+_ACTIVATE = ua.NodeId(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
+
+
+@dataclass
+class ConnectionLimits(TransportLimits):
+    """Sizes of the messages of one connection; lower ones until its session is activated."""
+
+    is_logged_in: bool = False
+    before_login: int = 65_536
+    """Bytes of one message."""
+
+    @classmethod
+    def of(cls, limits: Limits) -> ConnectionLimits:
+        """Return the limits of a new connection."""
+        size = limits.message_bytes
+        return cls(CHUNK, CHUNK, -(-size // SMALLEST_CHUNK) + 1, size, before_login=limits.message_bytes_before_login)
+
+    def create_acknowledge_and_set_limits(self, msg: ua.Hello) -> ua.Acknowledge:
+        """Agree on sizes. Raise ServiceError for buffers in which answers would be cut into tiny parts."""
+        if min(msg.ReceiveBufferSize, msg.SendBufferSize) < SMALLEST_CHUNK:
+            raise ServiceError(Codes.BadConnectionRejected)
+        return super().create_acknowledge_and_set_limits(msg)
+
+    def is_msg_size_within_limit(self, sz: int) -> bool:
+        """Return True for a size within the limit. Raise ServiceError otherwise; the library has another code."""
+        if sz > self.max_message_size or not (self.is_logged_in or sz <= self.before_login):
+            raise ServiceError(Codes.BadTcpMessageTooLarge)
+        return True
+
+    def is_chunk_count_within_limit(self, sz: int) -> bool:
+        """Return True for a number of parts within the limit. Raise ServiceError otherwise."""
+        if sz > self.max_chunk_count or not (self.is_logged_in or sz <= self.before_login // SMALLEST_CHUNK + 1):
+            raise ServiceError(Codes.BadTcpMessageTooLarge)
+        return True
+
+
+class Processor(Dispatcher):
+    """Messages of one connection, within its limits."""
+
+    _limits: ConnectionLimits
+    iserver: Any
+    name: Any
+    session: Any
+
+    def __init__(self, server: Any, transport: Any, limits: Limits) -> None:
+        """Start without a session."""
+        super().__init__(server, transport, ConnectionLimits.of(limits))
+        self._bounds = limits
+        self._connection = SecureConnection(SecurityPolicyNone(), self._limits)
+        self.units = 0
+        """Work units so far."""
+
+    def send_response(
+        self, requesthandle: int, seqhdr: Any, response: Any, msgtype: bytes = ua.MessageType.SecureMessage
+    ) -> None:
+        """Send an answer as the library does, and count its size as work.
+
+        End the connection of a client that does not read its answers.
+        """
+        response.ResponseHeader.RequestHandle = requesthandle
+        content = struct_to_binary(response)
+        self.units += len(content) // ANSWER_BYTES
+        self._transport.write(
+            self._connection.message_to_binary(content, message_type=msgtype, request_id=seqhdr.RequestId)
+        )
+        if self._transport.get_write_buffer_size() > self._bounds.answer_bytes:
+            self._transport.abort()
+
+    async def process(self, header: Any, body: Any) -> bool:
+        """Process one part of a message. Raise ServiceError, after which the connection ends."""
+        self.units += CHANNEL_UNITS if header.MessageType == ua.MessageType.SecureOpen else REQUEST_UNITS
+        self._limits.is_logged_in = self._is_active
+        return await super().process(header, body)
+
+    def open_secure_channel(self, algohdr: Any, seqhdr: Any, body: Any) -> None:
+        """Open a channel, by a message that is decoded within the limits before a login."""
+        super().open_secure_channel(algohdr, seqhdr, BoundedBuffer(bytes(body), self._allowance(False)))
+
+    async def process_message(self, seqhdr: Any, body: Any) -> bool:
+        """Answer one message. Raise ServiceError if it exceeds the limits of decoding."""
+        was_active, examined = self._is_active, self._examined
+        allowance = self._allowance(was_active)
+        try:
+            goes_on = await super().process_message(seqhdr, BoundedBuffer(bytes(body), allowance))
+        finally:
+            self.units += allowance.used + max(0, self._examined - examined)  # the session may have changed
+        if allowance.exceeded and not was_active:  # an active session continues after the fault
+            raise ServiceError(Codes.BadEncodingLimitsExceeded)
+        return goes_on
+
+    async def _process_message(self, typeid: Any, requesthdr: Any, seqhdr: Any, body: Any) -> Any:
+        try:
+            self._require_session(typeid, requesthdr)
+            if self._is_active:
+                self.units += require_operations(typeid, body, self._bounds)
+            if typeid == _ACTIVATE:
+                self.units += LOGIN_UNITS
+                session = self.session or self.iserver.lookup_external_session(requesthdr.AuthenticationToken)
+                await self.iserver.passwords.check(self.iserver, session, body, str(self.name[0]))
+            return await super()._process_message(typeid, requesthdr, seqhdr, body)
+        except ServiceError as error:
+            if error.code == Codes.BadEncodingLimitsExceeded:  # also nesting deeper than the interpreter allows
+                body.allowance.exceeded = True
+            raise
+
+    def _allowance(self, is_active: bool) -> Allowance:
+        limits = self._bounds
+        if is_active:
+            return Allowance(limits.decoding_steps, limits.array_length, limits.string_bytes)
+        return Allowance(
+            limits.decoding_steps_before_login,
+            limits.decoding_steps_before_login,
+            limits.string_bytes_before_login,
+        )
+
+    @property
+    def _is_active(self) -> bool:
+        return self.session is not None and bool(self.session.is_activated())
+
+    @property
+    def _examined(self) -> int:
+        """Work units of the services of the session so far."""
+        return 0 if self.session is None else int(self.session.bounds.units)

@@ -1,0 +1,225 @@
+"""`Requests`: what clients want of a line, judged at once as far as that is possible, and handed to its source.
+
+Nothing here waits for a tick. What the line makes of it then is in the read-back of each command, and in events.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from asyncua import ua
+from asyncua.crypto.permission_rules import User, UserRole
+
+from conveyor_sim.line.authority import MAY
+from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.receipt import Cause, Receipt
+from conveyor_sim.line.tag import COMMANDS, Tag
+from conveyor_sim.protocols.hands import (
+    CONTROL_RANGES,
+    MAY_CONTROL,
+    TAKES_NO_INPUT,
+    is_mode,
+    objection,
+    refused_for_good,
+)
+from conveyor_sim.protocols.handshake import MAY_GO_ON, TARGET
+from conveyor_sim.protocols.opcua.nodes import name_of
+from conveyor_sim.protocols.opcua.values import type_of
+from conveyor_sim.protocols.source import OPCUA, Control, TagSource
+
+Codes = ua.StatusCodes
+
+CODES: Mapping[Cause, int] = {
+    "operation": Codes.BadUserAccessDenied,
+    "role": Codes.BadUserAccessDenied,
+    "name": Codes.BadNodeIdUnknown,
+    "value": Codes.BadOutOfRange,
+    "form": Codes.BadInvalidArgument,
+}
+"""Status code of an input that no state of the line allows, by the cause of its refusal."""
+
+
+@dataclass
+class Client(User):
+    """Whoever is behind a session."""
+
+    kind: WriterKind | None = None
+    """None: only reads."""
+
+    @property
+    def writer(self) -> str:
+        """As inputs are recorded."""
+        return f"{OPCUA} {self.name}"
+
+
+def reader(name: str = "") -> Client:
+    """One who only reads."""
+    return Client(UserRole.User, name)
+
+
+class Requests:
+    """Of all clients of one source."""
+
+    def __init__(self, source: TagSource) -> None:
+        self._source = source
+        self._receipt = Receipt(source.about.tags, source.about.where)
+        self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}
+        self._modes: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if is_mode(tag)}
+        self.writes = self.refused = 0
+        """Requests that were passed on to the line, and those that were not."""
+
+    def write(self, client: User, values: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+        """What becomes of each. Those that can be given are given together, as one input."""
+        codes: list[int] = []
+        together: dict[str, float] = {}
+        places: list[int] = []
+        for place, value in enumerate(values):
+            name = name_of(value.NodeId)
+            if name == TARGET or name in self._modes:
+                self._flush(client, together, places, codes)
+                codes.append(self._go_on(client, value) if name == TARGET else self._set_mode(client, value))
+                continue
+            code, number = self._judge(client, value)
+            if name in together:
+                self._flush(client, together, places, codes)
+            if code == Codes.Good:
+                together[name] = number
+                places.append(place)
+            codes.append(code)
+        self._flush(client, together, places, codes)
+        self.writes += (given := codes.count(Codes.GoodCompletesAsynchronously))
+        self.refused += len(codes) - given
+        return [ua.StatusCode(code) for code in codes]
+
+    def write_together(self, client: User, names: Sequence[str], values: Sequence[float]) -> int:
+        """Give commands as one input, all or none. Return a status code, not counted. Each name occurs once."""
+        tags = [self._commands[name] for name in names]
+        codes = [self._judge_number(client, tag, value) for tag, value in zip(tags, values, strict=True)]
+        bad = next((code for code in codes if code != Codes.Good), None)
+        return self._give(client, SET, tuple(names), tuple(values), ()) if bad is None else bad
+
+    def operate(
+        self,
+        client: User,
+        operation: str,
+        names: tuple[str, ...] = (),
+        values: tuple[float, ...] = (),
+        texts: tuple[str, ...] = (),
+    ) -> int:
+        """Give the line an operation. Return a status code, which is not counted."""
+        return self._give(client, operation, names, values, texts)
+
+    def control(self, client: User, what: Control, value: float) -> int:
+        """Control the run. Return a status code, which is not counted."""
+        if not self.may_control(client):
+            return int(Codes.BadUserAccessDenied)
+        if what not in self._source.controls:
+            return int(Codes.BadNotSupported)
+        low, high = CONTROL_RANGES.get(what, (-math.inf, math.inf))
+        if not low <= value <= high:
+            return int(Codes.BadOutOfRange)
+        refused = self._source.control(what, value, f"{_kind(client)} {_writer(client)}")
+        return int(Codes.BadInvalidState if refused else Codes.GoodCompletesAsynchronously)
+
+    def may_control(self, client: User) -> bool:
+        """Return True if this client may control the run."""
+        return _kind(client) in MAY_CONTROL
+
+    def may(self, client: User, operation: str) -> bool:
+        """Whether this client may ever do that."""
+        return operation in MAY and _kind(client) in MAY[operation].writers
+
+    def counted(self, result: ua.CallMethodResult) -> ua.CallMethodResult:
+        """Count a call by its result, and return the result."""
+        good = result.StatusCode.value == Codes.GoodCompletesAsynchronously
+        self.writes, self.refused = self.writes + good, self.refused + (not good)
+        return result
+
+    def _go_on(self, client: User, value: ua.WriteValue) -> int:
+        """Have a line in lockstep go on up to a tick."""
+        if _kind(client) not in MAY_GO_ON:
+            return int(Codes.BadUserAccessDenied)
+        if (code := _judge_form(value, ua.VariantType.Int64)) != Codes.Good:
+            return code
+        if "target" not in self._source.controls:
+            return int(Codes.BadInvalidState)
+        refused = self._source.control("target", value.Value.Value.Value, _writer(client))
+        return int(Codes.BadOutOfRange if refused else Codes.GoodCompletesAsynchronously)
+
+    def _set_mode(self, client: User, value: ua.WriteValue) -> int:
+        """Put a device into a mode, for clients that can only write."""
+        if not self.may(client, MODE):
+            return int(Codes.BadUserAccessDenied)
+        tag = self._modes[name_of(value.NodeId)]
+        if (code := _judge_form(value, type_of(tag))) != Codes.Good:
+            return code
+        return self._give(client, MODE, (tag.device,), (float(value.Value.Value.Value),), ())
+
+    def _judge(self, client: User, value: ua.WriteValue) -> tuple[int, float]:
+        """Whether a value can be given, and as what number."""
+        if not self.may(client, SET):
+            return Codes.BadUserAccessDenied, 0.0
+        tag = self._commands.get(name_of(value.NodeId))
+        if tag is None:
+            return Codes.BadNotWritable, 0.0
+        if (code := _judge_form(value, type_of(tag))) != Codes.Good:
+            return code, 0.0
+        number = float(value.Value.Value.Value)
+        return self._judge_number(client, tag, number), number
+
+    def _judge_number(self, client: User, tag: Tag, number: float) -> int:
+        kind, writer = _kind(client), _writer(client)
+        if kind is None:
+            return Codes.BadUserAccessDenied
+        given = Input(OPCUA, writer, kind, SET, (tag.name,), (number,))
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return CODES[refusal.cause]
+        if objection(self._source, tag, number, kind, writer):
+            return Codes.BadInvalidState
+        return Codes.Good
+
+    def _flush(self, client: User, together: dict[str, float], places: list[int], codes: list[int]) -> None:
+        if together:
+            code = self._give(client, SET, tuple(together), tuple(together.values()), ())
+            for place in places:
+                codes[place] = code
+        together.clear()
+        places.clear()
+
+    def _give(
+        self, client: User, operation: str, names: tuple[str, ...], values: tuple[float, ...], texts: tuple[str, ...]
+    ) -> int:
+        kind = _kind(client)
+        if kind is None or not self.may(client, operation):
+            return Codes.BadUserAccessDenied
+        given = Input(OPCUA, _writer(client), kind, operation, names, values, texts)
+        if refusal := refused_for_good(self._source, self._receipt, given):
+            return CODES[refusal.cause]
+        shown = self._source.shown
+        if shown.lost or shown.run.state in TAKES_NO_INPUT:
+            return Codes.BadInvalidState
+        return Codes.BadTooManyOperations if self._source.give(given) else Codes.GoodCompletesAsynchronously
+
+
+def _judge_form(value: ua.WriteValue, kind: ua.VariantType) -> int:
+    """Whether that is one value of a type, and nothing but that."""
+    if value.AttributeId != ua.AttributeIds.Value:
+        return int(Codes.BadNotWritable)
+    if value.IndexRange:
+        return int(Codes.BadIndexRangeInvalid)
+    status, variant = value.Value.StatusCode, value.Value.Value
+    if status is not None and not status.is_good():
+        return int(Codes.BadWriteNotSupported)
+    if variant is None or variant.VariantType is not kind or isinstance(variant.Value, list):
+        return int(Codes.BadTypeMismatch)
+    return int(Codes.Good)
+
+
+def _kind(client: User) -> WriterKind | None:
+    return client.kind if isinstance(client, Client) else None
+
+
+def _writer(client: User) -> str:
+    return client.writer if isinstance(client, Client) else OPCUA

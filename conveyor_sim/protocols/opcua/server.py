@@ -1,0 +1,211 @@
+"""`OpcUaServer`: a line as an OPC UA server, by names that stay."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from asyncua import ua
+from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
+
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.face import HERE, FaceError, Stamps, Status, require_free
+from conveyor_sim.protocols.opcua.certificates import default_folder, identity
+from conveyor_sim.protocols.opcua.conditions import AlarmStates
+from conveyor_sim.protocols.opcua.emitter import Emitter
+from conveyor_sim.protocols.opcua.history import History, require_tags
+from conveyor_sim.protocols.opcua.limits import LIMITS, Limits
+from conveyor_sim.protocols.opcua.line_events import LineEvents
+from conveyor_sim.protocols.opcua.methods import Methods, add_methods
+from conveyor_sim.protocols.opcua.nodes import INDEX, NAMESPACE, Nodes
+from conveyor_sim.protocols.opcua.packml import PackMl
+from conveyor_sim.protocols.opcua.passwords import checked
+from conveyor_sim.protocols.opcua.published_limits import publish
+from conveyor_sim.protocols.opcua.requests import Client, Requests, reader
+from conveyor_sim.protocols.opcua.session import SafeServer
+from conveyor_sim.protocols.opcua.transport import BoundedServer
+from conveyor_sim.protocols.opcua.tree import add_line
+from conveyor_sim.protocols.opcua.updates import Updates
+from conveyor_sim.protocols.opcua.weihenstephan import Weihenstephan
+from conveyor_sim.protocols.quotas import QUOTA, Places, Quota
+from conveyor_sim.protocols.source import OPCUA, TagSource
+from conveyor_sim.protocols.users import Logins, LoginService, User
+
+POLICIES = [
+    ua.SecurityPolicyType.NoSecurity,
+    ua.SecurityPolicyType.Basic256Sha256_Sign,
+    ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+    ua.SecurityPolicyType.Aes128Sha256RsaOaep_SignAndEncrypt,
+    ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
+]
+
+
+class OpcUaServer:
+    """Serves one source: a Face."""
+
+    def __init__(
+        self,
+        source: TagSource,
+        users: Mapping[str, User] | None = None,
+        *,
+        anonymous: bool = True,
+        stamps: Stamps = "wall",
+        certificates: Path | None = None,
+        history: Sequence[str] = (),
+        host: str = HERE,
+        port: int = 0,
+        limits: Limits = LIMITS,
+        quota: Quota = QUOTA,
+        logins: LoginService | None = None,
+    ) -> None:
+        """users: who may do more than read, by name. anonymous: whether those who give no name may read.
+        stamps: what SourceTimestamp is. certificates: folder of the server's own; None: `default_folder()`.
+        history: patterns of the tags whose last values are kept. port: 0 for any that is free.
+        limits: of each client. quota: places of the connections. logins: checks passwords, in place of `users`.
+
+        Raises FaceError for a pattern that no tag fits.
+        """
+        require_tags(history, source.about.tags)
+        self._source, self._anonymous, self._stamps = source, anonymous, stamps
+        self._logins = logins or Logins(users or {})
+        self._certificates, self._history = certificates, history
+        self._at = host, port
+        self._limits, self._quota = limits, quota
+        self._requests = Requests(source)
+        self._server: BoundedServer | None = None
+        self._updates: Updates | None = None
+        self._following: asyncio.Task[None] | None = None
+        self._stopping: asyncio.Future[None] | None = None
+
+    @property
+    def port(self) -> int:
+        """On which it listens. RuntimeError before `start`."""
+        if self._server is None or self._server.bserver is None:
+            raise RuntimeError("the server was not started")
+        return self._server.bserver.port
+
+    @property
+    def address(self) -> str:
+        """Where clients find it."""
+        host, port = self._at
+        return f"opc.tcp://{host}:{port if self._server is None else self.port}"
+
+    def status(self) -> Status:
+        """Return connections, monitored items, and counts of requests.
+
+        Accepted requests are writes and calls. Refused ones include requests on subscriptions of other sessions, and
+        subscriptions that exceeded a budget.
+        """
+        server, requests = self._server, self._requests
+        if server is None or server.bserver is None:
+            return Status(0, 0, requests.writes, requests.refused, 0.0)
+        longest, server.longest[0] = server.longest[0], 0.0
+        left_out = 0
+        if self._updates is not None:
+            longest, self._updates.longest = max(longest, self._updates.longest), 0.0
+            left_out = self._updates.left_out
+        service = server.iserver.subscription_service
+        items = sum(len(each.monitored_item_srv) for each in service.subscriptions.values())
+        refused = requests.refused + service.ended + server.iserver.owners.refusals.count
+        return Status(len(server.bserver.clients), items, requests.writes, refused, longest, left_out)
+
+    async def start(self) -> None:
+        """Listen; that takes a second or two. Raises FaceError if it is not possible, CertificateError."""
+        for name in ("asyncua.server", "asyncua.common", "asyncua.uaprotocol", "asyncua.crypto"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+        host, port = self._at
+        require_free(OPCUA, host, port)
+        with _without_collection():
+            server = await self._empty()
+            updates = await self._fill(server)
+            await updates.bring_present()
+        try:
+            await server.listen(host, port)
+        except OSError as error:  # it has been taken since
+            raise FaceError(f"opcua: {host}:{port} can't be listened on ({error}), expected a free port") from error
+        self._server, self._updates = server, updates
+        self._following = asyncio.create_task(updates.run())
+        self._following.add_done_callback(self._ended)
+
+    async def _empty(self) -> BoundedServer:
+        """A server with the standard's nodes, and who may come in."""
+        host, port = self._at
+        own = identity(self._certificates or default_folder())
+        internal = SafeServer(self, own.trusted, self._limits, self._logins)
+        internal.bind_condition_methods = 1
+        server = BoundedServer(internal, self._limits, Places(self._quota))
+        server.product_uri, server.name, server.manufacturer_name = NAMESPACE, "conveyor_sim", "conveyor_sim"
+        server.application_type, server._application_uri = ua.ApplicationType.Server, own.application_uri
+        await server.init()
+        await server.load_certificate(own.certificate, "der")
+        await server.load_private_key(own.key, format="pem")
+        server.set_endpoint(f"opc.tcp://{host}:{port}")
+        server.set_security_policy(POLICIES, SimpleRoleRuleset())
+        anonymous = [ua.AnonymousIdentityToken] if self._anonymous else []
+        server.set_identity_tokens([ua.UserNameIdentityToken, *anonymous])
+        return server
+
+    async def _fill(self, server: BoundedServer) -> Updates:
+        """Add the nodes of the line; what keeps them as the source is."""
+        internal, source, requests = server.iserver, self._source, self._requests
+        await publish(internal, self._limits, self._quota)
+        if await server.register_namespace(NAMESPACE) != INDEX:
+            raise FaceError(f"opcua: namespace {NAMESPACE} has another index than {INDEX}")
+        clock = Clock(source.about, self._stamps)
+        history = History(self._history, source, clock)
+        internal.history_manager.set_storage(history)
+        nodes, emitter = Nodes(internal, history), Emitter(internal)
+        add_line(nodes, source.about)
+        add_methods(nodes, source)
+        alarms, events = AlarmStates(nodes, emitter, clock), LineEvents(source, nodes, emitter, clock)
+        packml = PackMl(source, requests, clock)
+        await packml.add(server, nodes)
+        weihenstephan = Weihenstephan(source, nodes, clock)
+        internal.requests = requests
+        internal.answers = (Methods(source, requests, alarms.is_last_event).call, packml.call)
+        return Updates(source, nodes, clock, packml.follow, weihenstephan.follow, alarms.follow, events.follow)
+
+    async def stop(self) -> None:
+        """End all sessions and connections."""
+        server, self._server = self._server, None
+        following, self._following = self._following, None
+        if following is not None:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
+        if server is not None:
+            await server.stop()
+
+    def _ended(self, following: asyncio.Task[None]) -> None:
+        """Rather no server than one that shows what is stale."""
+        if not following.cancelled() and (error := following.exception()) is not None:
+            logging.getLogger(__name__).error("opcua: the server ends: %s", error, exc_info=error)
+            self._following = None
+            self._stopping = asyncio.ensure_future(self.stop())
+
+    def get_user(
+        self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None
+    ) -> Client | None:
+        """Who begins a session; None: nobody who may. Called by the library."""
+        if username is None:
+            return reader() if self._anonymous else None
+        result = checked.get()
+        if result is None or result.user is None or (result.name, result.password) != (username, password or ""):
+            return None
+        return Client(UserRole.User, username, result.user.kind)
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """While nodes are made: looking through the standard's 6000 again and again takes longer than making them all."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()

@@ -1,0 +1,98 @@
+"""The nodes of a line: its place in the plant, devices by their classes, and a variable for each tag."""
+
+from __future__ import annotations
+
+from asyncua import ua
+
+from conveyor_sim.line.run_state import RUN
+from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag
+from conveyor_sim.protocols.hands import is_mode
+from conveyor_sim.protocols.handshake import TARGET
+from conveyor_sim.protocols.opcua.nodes import INDEX, LINE, READ, READ_AND_WRITE, Nodes, node_id, nothing
+from conveyor_sim.protocols.opcua.values import as_variant, range_of, unit_of
+from conveyor_sim.protocols.source import About
+
+WRITTEN_BY, WRITTEN_AT = "written_by", "written_at"
+"""Below a command: who gave the value that is in force, and since when it has it from them."""
+
+VALUE_AS_TEXT = "ValueAsText"
+"""Below an enumeration whose values are not 0, 1, 2, ..."""
+
+RUN_VARIABLES: dict[str, tuple[ua.VariantType, str]] = {
+    "tick": (ua.VariantType.Int64, "Ticks since the start."),
+    "time": (ua.VariantType.Double, "Simulated time, s."),
+    "date_time": (ua.VariantType.DateTime, "Simulated time as a date, from the start_time of the scene."),
+    "reason": (ua.VariantType.String, "Why it is stopped, or whose lockstep it is."),
+    "lost": (ua.VariantType.String, "Why nothing newer comes; empty: it does."),
+}
+"""About the run, beside its state."""
+
+
+def add_line(nodes: Nodes, about: About) -> None:
+    """Add all variables of a line, with the objects that hold them."""
+    parent = ua.NodeId(ua.ObjectIds.ObjectsFolder)
+    parts = [part for part in about.where.split("/") if part]
+    for depth, part in enumerate(parts[:-1], start=1):
+        parent = nodes.folder(f"where/{'/'.join(parts[:depth])}", part, parent)
+    nodes.object(LINE, parts[-1] if parts else about.name, parent, f"The line {about.name}.")
+    for tag in about.tags:
+        if is_shown(tag):
+            _add_tag(nodes, tag)
+    run = node_id(RUN) if RUN in nodes else nodes.object(RUN, RUN, node_id(LINE), "The simulation itself.")
+    for name, (kind, description) in RUN_VARIABLES.items():
+        nodes.variable(f"{RUN}/{name}", name, run, ua.Variant(nothing(kind), kind), description)
+    first = ua.Variant(0, ua.VariantType.Int64)
+    text = "To which tick a line in lockstep is to go on: what was written before it acts as one set, with it."
+    nodes.variable(TARGET, TARGET.rpartition("/")[2], run, first, text, access=READ_AND_WRITE)
+
+
+def is_shown(tag: Tag) -> bool:
+    """Whether a tag has a variable; faults have none, they are injected by a method."""
+    return tag.role in (*SIGNALS, *COMMANDS, "run")
+
+
+def has_text(tag: Tag) -> bool:
+    """Whether the text of its value has a variable of its own."""
+    return tag.kind == "enumeration" and list(tag.texts) != list(range(len(tag.texts)))
+
+
+def _add_tag(nodes: Nodes, tag: Tag) -> None:
+    path = tag.name.split("/")
+    parent = node_id(LINE)
+    for depth in range(1, len(path)):
+        name = "/".join(path[:depth])
+        of_device = f"{tag.device}: a {tag.device_class}." if name == tag.device else name
+        parent = node_id(name) if name in nodes else nodes.object(name, path[depth - 1], parent, of_device)
+    writes = tag.role in COMMANDS
+    variable = nodes.variable(
+        tag.name,
+        path[-1],
+        parent,
+        as_variant(tag, tag.initial),
+        tag.description,
+        _type_id(tag),
+        READ_AND_WRITE if writes or is_mode(tag) else READ,
+    )
+    extension, texts = ua.VariantType.ExtensionObject, ua.VariantType.LocalizedText
+    if tag.kind in ("number", "count"):
+        nodes.property(f"{tag.name}/EURange", variable, range_of(tag), ua.ObjectIds.Range, extension)
+        nodes.property(f"{tag.name}/EngineeringUnits", variable, unit_of(tag), ua.ObjectIds.EUInformation, extension)
+    elif tag.kind == "enumeration" and not has_text(tag):
+        strings = [ua.LocalizedText(text) for text in tag.texts.values()]
+        nodes.property(f"{tag.name}/EnumStrings", variable, strings, ua.ObjectIds.LocalizedText, texts)
+    elif tag.kind == "enumeration":
+        values = [ua.EnumValueType(value, ua.LocalizedText(text)) for value, text in sorted(tag.texts.items())]
+        nodes.property(f"{tag.name}/EnumValues", variable, values, ua.ObjectIds.EnumValueType, extension)
+        text = ua.LocalizedText(tag.texts.get(int(tag.initial), ""))
+        nodes.property(f"{tag.name}/{VALUE_AS_TEXT}", variable, text, ua.ObjectIds.LocalizedText, texts)
+    if writes:
+        for name, kind in ((WRITTEN_BY, ua.VariantType.String), (WRITTEN_AT, ua.VariantType.DateTime)):
+            nodes.property(f"{tag.name}/{name}", variable, nothing(kind), kind.value, kind, INDEX)
+
+
+def _type_id(tag: Tag) -> int:
+    if tag.kind in ("number", "count"):
+        return int(ua.ObjectIds.AnalogUnitRangeType)
+    if tag.kind == "enumeration":
+        return int(ua.ObjectIds.MultiStateValueDiscreteType if has_text(tag) else ua.ObjectIds.MultiStateDiscreteType)
+    return int(ua.ObjectIds.BaseDataVariableType)

@@ -1,0 +1,156 @@
+"""`Updates`: brings what a source shows into the nodes, tick by tick, and writes only what has changed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from datetime import datetime, timezone
+
+from asyncua import ua
+
+from conveyor_sim.columns.read_back import ReadBackColumns
+from conveyor_sim.line.run_state import RUN
+from conveyor_sim.line.tag import COMMANDS, Tag
+from conveyor_sim.protocols.clock import Clock
+from conveyor_sim.protocols.handshake import TARGET, TICK
+from conveyor_sim.protocols.opcua.nodes import Nodes
+from conveyor_sim.protocols.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
+from conveyor_sim.protocols.opcua.values import as_variant, status_of
+from conveyor_sim.protocols.source import Shown, TagSource
+
+MOST_BEHIND = 200
+"""Ticks that wait to be brought in; one more, and the last of them gives way to it."""
+
+Follower = Callable[[Shown, datetime, bool], Awaitable[None]]
+"""Called after each tick that was brought in, with when that was heard, and whether it is a step back."""
+
+
+class Updates:
+    """Of one source, in one asyncio loop."""
+
+    def __init__(self, source: TagSource, nodes: Nodes, clock: Clock, *others: Follower) -> None:
+        """others: what follows the source besides."""
+        self._source, self._nodes, self._clock, self._others = source, nodes, clock, others
+        self._variables = [_Variable(tag) for tag in source.about.tags if is_shown(tag) and tag.role != "run"]
+        self._run_tag = next((tag for tag in source.about.tags if tag.name == f"{RUN}/state"), None)
+        self._commands = [tag.name for tag in source.about.tags if tag.role in COMMANDS]
+        self._waiting: deque[tuple[Shown, datetime]] = deque()
+        self._told = False
+        self._wake = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        self._last: Shown | None = None
+        self._read_back: ReadBackColumns | None = None
+        self.longest = 0.0
+        """s of wall time from a change of the source to its being in the nodes, the longest since this was set to 0."""
+        self.left_out = 0
+        """Ticks so far that were not brought in."""
+        self._written: dict[str, tuple[int, str]] = {}
+
+    async def bring_present(self) -> None:
+        """Bring in what the source shows now."""
+        await self._bring(self._source.shown, datetime.now(timezone.utc))
+
+    async def run(self) -> None:
+        """Follow the source until this is cancelled."""
+        end = self._source.listen(self._hear)
+        self._hear()
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                self._told = False
+                while self._waiting:
+                    shown, heard = self._waiting.popleft()
+                    await self._bring(shown, heard)
+                    self.longest = max(self.longest, (datetime.now(timezone.utc) - heard).total_seconds())
+                    await asyncio.sleep(0)  # clients, too
+        finally:
+            end()
+
+    def _hear(self) -> None:
+        """Called by any thread."""
+        if len(self._waiting) >= MOST_BEHIND:
+            with suppress(IndexError):
+                self._waiting.pop()
+                self.left_out += 1
+        self._waiting.append((self._source.shown, datetime.now(timezone.utc)))
+        if not self._told:
+            self._told = True
+            with suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(self._wake.set)
+
+    async def _bring(self, shown: Shown, heard: datetime) -> None:
+        last, self._last = self._last, shown
+        status = status_of(shown)
+        back = last is not None and shown.tick < last.tick
+        # Where time has stepped back, what has stayed the same would be of the future.
+        every = last is None or back or status != status_of(last)
+        stamp = self._clock.stamp(shown.tick, heard)
+        good = status == ua.StatusCodes.Good
+        for variable in self._variables:
+            value = shown.values.get(variable.tag.name)
+            if value is None:
+                continue
+            forced = good and variable.tag.name in shown.forced
+            if every or value != variable.value or forced != variable.forced:
+                variable.value, variable.forced = value, forced
+                code = ua.StatusCodes.GoodLocalOverride if forced else status
+                await self._nodes.write(variable.tag.name, as_variant(variable.tag, value), stamp, code)
+                if variable.text is not None:
+                    text = ua.Variant(ua.LocalizedText(variable.tag.texts.get(int(value), "")))
+                    await self._nodes.write(variable.text, text, stamp, code)
+        if shown.read_back is not None and (every or shown.read_back is not self._read_back):
+            self._read_back = shown.read_back
+            if every:
+                self._written.clear()
+            await self._bring_read_back(shown.read_back, stamp, status)
+        for follow in self._others:
+            await follow(shown, heard, back)
+        await self._bring_run(shown, last, stamp, every)  # at last: who sees the tick finds all else of it
+
+    async def _bring_run(self, shown: Shown, last: Shown | None, stamp: datetime, every: bool) -> None:
+        """Good even where the rest is not, as it says what has become of that; but for what nobody knows of."""
+        tick = shown.tick
+        code = ua.StatusCodes.BadNoCommunication if shown.lost else ua.StatusCodes.Good
+        if self._run_tag is not None and (last is None or every or last.run.state != shown.run.state):
+            tag, state = self._run_tag, float(shown.run.state)
+            await self._nodes.write(tag.name, as_variant(tag, state), stamp, code)
+            if has_text(tag):
+                text = ua.Variant(ua.LocalizedText(shown.run.text))
+                await self._nodes.write(f"{tag.name}/{VALUE_AS_TEXT}", text, stamp, code)
+        if last is None or every or last.run.reason != shown.run.reason:
+            reason = ua.Variant(shown.run.reason, ua.VariantType.String)
+            await self._nodes.write(f"{RUN}/reason", reason, stamp, code)
+        if last is None or every or last.lost != shown.lost:
+            await self._nodes.write(f"{RUN}/lost", ua.Variant(shown.lost, ua.VariantType.String), stamp)
+        if last is None or every or last.tick != tick:
+            now = self._clock.simulated(tick)
+            for name in (TICK, TARGET):
+                await self._nodes.write(name, ua.Variant(tick, ua.VariantType.Int64), stamp, code)
+            seconds = tick * self._source.about.tick
+            await self._nodes.write(f"{RUN}/time", ua.Variant(seconds, ua.VariantType.Double), stamp, code)
+            await self._nodes.write(f"{RUN}/date_time", ua.Variant(now, ua.VariantType.DateTime), stamp, code)
+
+    async def _bring_read_back(self, columns: ReadBackColumns, stamp: datetime, status: int) -> None:
+        rows = zip(self._commands, columns.since.tolist(), columns.writer.tolist(), strict=True)
+        for name, since, writer in rows:
+            kind, by = columns.writer_kinds[writer], columns.writers[writer]
+            row = (since, by if by == kind or kind == "line" else f"{kind} {by}")
+            if self._written.get(name) != row:
+                self._written[name] = row
+                who = ua.Variant(row[1], ua.VariantType.String)
+                at = ua.Variant(self._clock.simulated(since), ua.VariantType.DateTime)
+                await self._nodes.write(f"{name}/{WRITTEN_BY}", who, stamp, status)
+                await self._nodes.write(f"{name}/{WRITTEN_AT}", at, stamp, status)
+
+
+class _Variable:
+    """A tag, and what was written of it last."""
+
+    def __init__(self, tag: Tag) -> None:
+        self.tag = tag
+        self.text = f"{tag.name}/{VALUE_AS_TEXT}" if has_text(tag) else None
+        self.value = tag.initial
+        self.forced = False

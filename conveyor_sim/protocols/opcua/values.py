@@ -1,0 +1,60 @@
+"""Values of tags as OPC UA has them: types, units, status codes."""
+
+from __future__ import annotations
+
+import math
+
+from asyncua import ua
+
+from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
+from conveyor_sim.line.tag import Tag
+from conveyor_sim.protocols.source import Shown
+
+_WHOLE = {ua.VariantType.UInt32: (0, 2**32 - 1), ua.VariantType.Int32: (-(2**31), 2**31 - 1)}
+
+_UNITS_URI = "http://www.opcfoundation.org/UA/units/un/cefact"
+
+
+def type_of(tag: Tag) -> ua.VariantType:
+    """Which type a tag has; counts are of 32 bits, which all clients know."""
+    if tag.kind == "bool":
+        return ua.VariantType.Boolean
+    if tag.kind == "number":
+        return ua.VariantType.Double
+    return ua.VariantType.Int32 if tag.low < 0.0 else ua.VariantType.UInt32
+
+
+def as_variant(tag: Tag, value: float) -> ua.Variant:
+    """A value of a tag; what its type can't hold becomes the nearest that it can, and 0 if it is not a number."""
+    kind = type_of(tag)
+    if kind is ua.VariantType.Boolean:
+        return ua.Variant(value != 0.0, kind)
+    if kind is ua.VariantType.Double:
+        return ua.Variant(float(value), kind)
+    low, high = _WHOLE[kind]
+    whole = 0 if math.isnan(value) else int(min(float(high), max(float(low), value)))
+    return ua.Variant(whole, kind)
+
+
+def range_of(tag: Tag) -> ua.Range:
+    """EURange (OPC 10000-8, 5.3.2)."""
+    low, high = _WHOLE.get(type_of(tag), (-math.inf, math.inf))
+    return ua.Range(max(tag.low, low), min(tag.high, high))
+
+
+def unit_of(tag: Tag) -> ua.EUInformation:
+    """EngineeringUnits: the characters of the UNECE code, base 256 (OPC 10000-8, 5.6.4.4)."""
+    number = int.from_bytes(tag.unece.code.encode("ascii"), "big")
+    shown = "" if tag.unit == "1" else tag.unit
+    return ua.EUInformation(_UNITS_URI, number, ua.LocalizedText(shown), ua.LocalizedText(tag.unece.name))
+
+
+def status_of(shown: Shown) -> int:
+    """Of all values of a line; those of signals that are forced are `GoodLocalOverride` where this is Good."""
+    if shown.lost:
+        return ua.StatusCodes.BadNoCommunication
+    if shown.run.state in (ENDED, STOPPED):
+        return ua.StatusCodes.BadOutOfService
+    if shown.run.state == PAUSED:
+        return ua.StatusCodes.UncertainLastUsableValue
+    return ua.StatusCodes.Good

@@ -1,0 +1,219 @@
+"""`Feed`: what the pages that show a line are sent, made once for all of them.
+
+Messages are bytes. The first one says what follows: TEXT a JSON object, whose "kind" is begin, story, status, locked,
+reply or pong; FRAME a tick (float64), its wall time in s since 1970 (float64), both little-endian, and a block of
+`view.block.pack` that begins at the tick and holds that moment. Read by view/page/live.js.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+import time
+from contextlib import suppress
+from typing import Any
+
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.page.block import Content, block_ticks, pack
+from conveyor_sim.page.head import head
+from conveyor_sim.page.recording import text
+from conveyor_sim.protocols.view import Picture, PictureSource
+from conveyor_sim.protocols.web.line_story import LineStory
+from conveyor_sim.protocols.web.viewer import Viewer
+from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.support.printable import SENTENCE, printable
+
+TEXT, FRAME = 0, 1
+
+SHORTEST = 0.02
+"""s of wall time from one frame to the next, at least."""
+
+STORY = 0.1
+"""The same for what happened."""
+
+BLOCK = 2.0
+"""s: pieces in which a page keeps what it has received."""
+
+MOST_TOLD = 2000
+"""Events that a page is told of which has just been opened."""
+
+
+class Feed:
+    """Follows a source as long as somebody looks."""
+
+    def __init__(self, source: PictureSource, **about: Any) -> None:
+        """about: what pages are told besides, when they begin."""
+        self._source, self._about = source, about
+        self._viewers: set[Viewer] = set()
+        self._changed = asyncio.Event()
+        self._ends: list[Any] = []
+        self._task: asyncio.Task[None] | None = None
+        self._picture, self._shown = source.picture, source.shown
+        self._story = self._new_story()
+        self._told = 0.0
+        self._due = False  # whether those who look are told of something soon
+        self._heard = 0
+        self._status: dict[str, Any] = {}
+        self._frame: tuple[Any, bytes] = None, b""
+        self._head: tuple[Any, dict[str, Any]] = None, {}
+        self._failure = ""
+        self.longest = 0.0
+        """s of wall time from a tick to its frame being on its way to a page, the longest since somebody asked."""
+
+    @property
+    def viewers(self) -> int:
+        """How many look."""
+        return len(self._viewers)
+
+    def join(self, viewer: Viewer) -> None:
+        """Show it the line from now on."""
+        if self._task is None:
+            loop = asyncio.get_running_loop()
+
+            def heard() -> None:
+                with suppress(RuntimeError):  # the loop has ended
+                    loop.call_soon_threadsafe(self._changed.set)
+
+            self._ends = [self._source.watch(), self._source.listen(heard)]
+            self._picture, self._shown = self._source.picture, self._source.shown
+            self._story, (self._heard, _) = self._new_story(), self._source.events(0)
+            self._status = {}
+            self._task = asyncio.create_task(self._run())
+        self._viewers.add(viewer)
+        viewer.began = False
+        viewer.on_ready = self._changed.set
+        self._changed.set()
+
+    def leave(self, viewer: Viewer) -> None:
+        """It looks no longer."""
+        self._viewers.discard(viewer)
+        if not self._viewers:
+            self.close()
+
+    def close(self) -> None:
+        """Nobody looks any more."""
+        if self._task is not None:
+            self._task.cancel()
+            self._task = None
+        for end in self._ends:
+            end()
+        self._ends = []
+
+    async def _run(self) -> None:
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            try:
+                self._follow()
+                self._failure = ""
+            except Exception as error:  # of a damaged recording, or another version, messages may be anything
+                self._failure = printable(f"it can't be drawn: {error}", SENTENCE)
+            await asyncio.sleep(SHORTEST)
+
+    def _follow(self) -> None:
+        before, self._picture, self._shown = self._shown, self._source.picture, self._source.shown
+        if self._shown.run_id != before.run_id or self._shown.tick < before.tick:  # another run, or time has gone back
+            self._story, (self._heard, _) = self._new_story(), self._source.events(0)
+            for viewer in self._viewers:
+                viewer.began = False
+        self._look()
+        now, new = time.monotonic(), [one for one in self._viewers if not one.began or (one.lagging and one.free)]
+        if new or now > self._told + STORY:  # what happened before is in what a new one begins with
+            self._told = now
+            self._tell_all()
+        elif not self._due:
+            self._due = True
+            asyncio.get_running_loop().call_later(STORY, self._tell_later)
+        for viewer in new:
+            self._begin(viewer)
+        for viewer in self._viewers:
+            if viewer.ready and not viewer.lagging and viewer.seen != (key := self._key()):
+                viewer.seen = key
+                viewer.show(self._frame_of(key))
+                self.longest = max(self.longest, time.time() - self._picture.at)
+
+    def _begin(self, viewer: Viewer) -> None:
+        """All that a page has to know of the line as it is now."""
+        picture, line = self._picture, self._picture.line
+        if self._head[0] is not line:
+            scene = parse_scene(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+            self._head = line, head(line, scene)
+        times = {
+            "first": picture.tick,
+            "last": picture.tick,
+            "block": block_ticks(int(line.tick_ns), BLOCK),
+            "blocks": 1,
+            "stories": 1,
+        }
+        about = {**self._head[1], "times": times, "forced": picture.forced.tolist()}
+        story = self._new_story()
+        total, events = self._source.events(max(0, self._heard - MOST_TOLD))
+        story.look(self._shown, picture, events[: len(events) - (total - self._heard)])  # the others are told of later
+        viewer.begin(text_message("begin", head=about, story=story.take(), status=self._status_now(), **self._about))
+        viewer.began, viewer.seen = True, None
+
+    def _tell_later(self) -> None:
+        """Even if nothing else happens."""
+        self._due = False
+        self._changed.set()
+
+    def _look(self) -> None:
+        """Note what has happened, at the tick at which it has."""
+        self._heard, events = self._source.events(self._heard)
+        self._story.look(self._shown, self._picture, events)
+
+    def _tell_all(self) -> None:
+        """Those who look already, what has happened since the last time."""
+        self._look()
+        data = self._story.take()
+        is_new = data["events"]["at"] or any(what for name, what in data.items() if name != "events")
+        messages = [text_message("story", **data)] if is_new else []
+        status = self._status_now()
+        if status != self._status:
+            self._status = status
+            messages.append(text_message("status", status=status))
+        for viewer in self._viewers:
+            if viewer.began:
+                for message in messages:
+                    viewer.tell(message)
+
+    def _status_now(self) -> dict[str, Any]:
+        shown = self._shown
+        return {
+            "lost": shown.lost or self._failure,
+            "run": shown.run.text,
+            "reason": shown.run.reason,
+            "owner": shown.owner,
+            "viewers": len(self._viewers),
+            "servers": [{**health._asdict(), "text": health.text} for health in self._source.servers],
+        }
+
+    def _new_story(self) -> LineStory:
+        return LineStory(int(self._picture.line.tick_ns))
+
+    def _key(self) -> Any:
+        """Another one is another picture."""
+        picture = self._picture
+        return self._shown.run_id, picture.tick, *picture.drawn.values()
+
+    def _frame_of(self, key: Any) -> bytes:
+        if self._frame[0] != key:
+            self._frame = key, _packed(self._picture)
+        return self._frame[1]
+
+
+def _packed(picture: Picture) -> bytes:
+    content = Content(signals=[(picture.tick, picture.signals)])
+    drawn = {topic: decode() for topic, decode in picture.drawn.items() if topic in ("bottles", "contacts", "belts")}
+    if (message := drawn.get("bottles")) is not None:
+        content.bottles.append((int(message.tick), TOPICS["bottles"].unpack(message)))
+    if (message := drawn.get("contacts")) is not None:
+        content.contacts.append((int(message.tick), TOPICS["contacts"].unpack(message)))
+    if (message := drawn.get("belts")) is not None:
+        content.belts.append((int(message.tick), message.actual))
+    return struct.pack("<Bdd", FRAME, picture.tick, picture.at) + pack(content, picture.tick)
+
+
+def text_message(kind: str, **fields: Any) -> bytes:
+    """A message that is an object."""
+    return bytes([TEXT]) + text({"kind": kind, **fields})

@@ -1,0 +1,46 @@
+"""`LineStory`: what happens on a line that runs, as the page is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from conveyor_sim.columns.events import Event, event_columns
+from conveyor_sim.page.story import Story
+from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.view import Picture
+
+COUNTERS = 0.5
+"""s of simulated time from one entry of the counters to the next, at least."""
+
+
+class LineStory(Story):
+    """Of one run, from a moment on: at first all that is so then."""
+
+    def __init__(self, tick_ns: int) -> None:
+        super().__init__(lambda tick: tick * tick_ns * 1e-9, COUNTERS)
+        self._seen: dict[str, Any] = {}
+
+    def look(self, shown: Shown, picture: Picture, events: Sequence[Event]) -> None:
+        """Add events, and what has changed since the last call."""
+        found: dict[str, Any] = {"alarm_states": shown.alarms, "readback": shown.read_back}
+        found |= {topic: picture.drawn.get(topic) for topic in ("counters", "rail_wear")}
+        new = {topic: what for topic, what in found.items() if what is not None and what is not self._seen.get(topic)}
+        self._seen |= new
+        if (columns := event_columns(events, len(events))) is not None:
+            self.add("events", columns, shown.tick)
+        for topic, what in new.items():
+            if callable(what):
+                what = what()
+                self.add(topic, what, int(what.tick))
+            else:
+                self.add(topic, what, shown.tick)
+
+    def _readback(self, message: Any, time: float) -> None:
+        """With the ticks from which on commands are what they are, which may be before the first look."""
+        before = len(self.data["readback"])
+        super()._readback(message, time)
+        rows = self.data["readback"][before:]
+        for row in rows:
+            row[0] = self._time(int(message.since[row[1]]))
+        self.data["readback"][before:] = sorted(rows, key=lambda row: float(row[0]))

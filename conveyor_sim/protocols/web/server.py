@@ -1,0 +1,317 @@
+"""`WebServer`: a line as a page in the browser, by HTTP and one websocket for each that looks."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import ssl
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
+from typing import Any
+
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
+from conveyor_sim.page.own_host import is_own, is_same_origin
+from conveyor_sim.protocols.face import HERE, FaceError, Status, require_free
+from conveyor_sim.protocols.quotas import GUEST, QUOTA, Place, Places, Quota
+from conveyor_sim.protocols.source import WEB
+from conveyor_sim.protocols.users import Logins, LoginService, User
+from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.web.commands import NOBODY, Commands, Person
+from conveyor_sim.protocols.web.feed import Feed, text_message
+from conveyor_sim.protocols.web.viewer import Viewer
+from conveyor_sim.protocols.work import Budget
+
+MOST_CONNECTIONS = 256
+"""At once, of pages and whatever else: for one more the oldest makes room that is no page."""
+
+HANDSHAKE = 5.0
+"""s of wall time in which a client has to agree on TLS."""
+
+LONGEST_REQUEST = 16_384
+"""Bytes that a page sends at once, at most; who sends more is cut off."""
+
+SIGN_IN = 60.0
+"""Seconds that a new page has for a sign-in while guests hold all their places."""
+
+MOST_REQUESTS, RATE = 400, 200.0
+"""Of a page: at once, and a second (of wall time) for longer; who sends more is cut off. Of each frame a page says that
+it has shown it.
+"""
+
+WRONG_PASSWORD = 1.0
+"""s of wall time that a page waits for the answer to a wrong one."""
+
+HEARTBEAT = 20.0
+"""s of wall time after which a page is gone that has not answered."""
+
+CLOSING = 2.0
+"""s of wall time in which a page may say that it has heard of the end."""
+
+_LIVE = '<meta name="line" content="live">'
+"""In the page: by it the page knows that it shows a line that runs."""
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class WebServer:
+    """Serves one source: a Face."""
+
+    def __init__(
+        self,
+        source: PictureSource,
+        users: Mapping[str, User] | None = None,
+        *,
+        anonymous: bool = True,
+        secured: ssl.SSLContext | None = None,
+        host: str = HERE,
+        port: int = 0,
+        quota: Quota = QUOTA,
+        logins: LoginService | None = None,
+    ) -> None:
+        """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
+        TLS; None: plain, which is for this machine only. port: 0 for any that is free. quota: places of the pages.
+        logins: checks passwords, in place of `users`.
+        """
+        self._places = Places(quota)
+        self._logins, self._anonymous, self._secured = logins or Logins(dict(users or {})), anonymous, secured
+        self._at = host, port
+        self._commands = Commands(source)
+        self._feed = Feed(
+            source, users=self._logins.has_users, takes=source.takes_inputs, controls=sorted(self._commands.controls)
+        )
+        self._files = page_files()
+        self._runner: web.AppRunner | None = None
+        self._listening: asyncio.Server | None = None
+        self._sockets: set[web.WebSocketResponse] = set()
+        self._pages: set[asyncio.BaseProtocol] = set()
+        self._closing: set[asyncio.Task[bool]] = set()
+        self._password = asyncio.Lock()
+
+    @property
+    def port(self) -> int:
+        """On which it listens. RuntimeError before `start`."""
+        if self._listening is None:
+            raise RuntimeError("the server was not started")
+        return int(self._listening.sockets[0].getsockname()[1])
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        host, port = self._at
+        where = f"[{host}]" if ":" in host else host
+        return f"{self._scheme}://{where}:{port if self._listening is None else self.port}/"
+
+    @property
+    def _scheme(self) -> str:
+        return "https" if self._secured else "http"
+
+    def status(self) -> Status:
+        """Pages that look; what was passed on to the line for them, and what was not."""
+        longest, self._feed.longest = self._feed.longest, 0.0
+        return Status(len(self._sockets), 0, self._commands.writes, self._commands.refused, longest)
+
+    async def start(self) -> None:
+        """Listen. Raises FaceError if that is not possible."""
+        for name in ("aiohttp.server", "aiohttp.web", "aiohttp.access"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # it logs whatever clients send
+        host, port = self._at
+        require_free(WEB, host, port)
+        app = web.Application(client_max_size=LONGEST_REQUEST, middlewares=[self._guard])
+        app.router.add_get("/live", self._live)
+        app.router.add_get("/{path:.*}", self._file)
+        runner = web.AppRunner(
+            app, handle_signals=False, access_log=None, keepalive_timeout=HEARTBEAT, shutdown_timeout=1.0
+        )
+        await runner.setup()
+        patience = None if self._secured is None else HANDSHAKE
+        try:
+            self._listening = await asyncio.get_running_loop().create_server(
+                self._connection, host, port, ssl=self._secured, ssl_handshake_timeout=patience
+            )
+        except OSError as error:
+            await runner.cleanup()
+            raise FaceError(
+                f"web: {host}:{port} can't be listened on ({error.strerror}), expected a free port"
+            ) from error
+        self._runner = runner
+
+    async def stop(self) -> None:
+        """End all connections."""
+        runner, self._runner = self._runner, None
+        if self._listening is not None:
+            self._listening.close()
+            self._listening = None
+        ends = (socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends") for socket in self._sockets)
+        await asyncio.gather(*ends, return_exceptions=True)
+        self._feed.close()
+        if runner is not None:
+            await runner.cleanup()
+
+    def _connection(self) -> asyncio.Protocol:
+        """Of one more client."""
+        assert self._runner is not None and self._runner.server is not None
+        asyncio.get_running_loop().call_soon(self._make_room)  # then those that come with it are known
+        return self._runner.server()
+
+    def _make_room(self) -> None:
+        """Have those go that hold a connection open for longest, and are no page, rather than those who come."""
+        known = [] if self._runner is None or self._runner.server is None else self._runner.server.connections
+        ways = {one: way for one in known if (way := one.transport) is not None and not way.is_closing()}
+        others = [way for one, way in ways.items() if one not in self._pages]
+        for way in others[: max(0, len(ways) - MOST_CONNECTIONS)]:
+            way.abort()
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse a request for another host name while only this machine is served."""
+        if self._at[0] == HERE and not is_own(request.headers.getall("Host", []), self._scheme):
+            return web.Response(status=403, text=f"expected to be asked for as {HERE}", headers=HEADERS)
+        return await handler(request)
+
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        path = request.match_info["path"] or "index.html"
+        kind = self._files.get(path)
+        if kind is None:
+            return web.Response(status=404, text="there is no such file", headers=HEADERS)
+        content = (PAGE / path).read_text(encoding="utf-8")
+        if path == "index.html":
+            content = content.replace("<!--policy-->", _LIVE)
+        return web.Response(text=content, content_type=kind, charset="utf-8", headers=HEADERS)
+
+    async def _live(self, request: web.Request) -> web.StreamResponse:
+        headers = request.headers
+        if not is_same_origin(headers.getall("Origin", []), headers.getall("Host", []), self._scheme):
+            return web.Response(status=403, text="expected a page of this server", headers=HEADERS)
+        socket = web.WebSocketResponse(
+            heartbeat=HEARTBEAT, max_msg_size=LONGEST_REQUEST, compress=False, timeout=CLOSING, autoping=False
+        )
+        place = self._places.take(request.remote or "", partial(self._end, socket))
+        if place is None:
+            return web.Response(status=503, text="users hold all places for pages", headers=HEADERS)
+        self._sockets.add(socket)
+        self._pages.add(request.protocol)
+        viewer = Viewer(socket)
+        sending = None
+        try:
+            await socket.prepare(request)
+            sending = asyncio.create_task(viewer.send())
+            await self._answer_all(socket, viewer, place)
+        except ConnectionError:
+            pass
+        finally:
+            self._places.leave(place)
+            self._sockets.discard(socket)
+            self._pages.discard(request.protocol)
+            self._feed.leave(viewer)
+            if sending is not None:
+                sending.cancel()
+                await asyncio.gather(sending, return_exceptions=True)
+        return socket
+
+    def _end(self, socket: web.WebSocketResponse) -> None:
+        """Close a page because another one needs its place."""
+        closing = asyncio.create_task(
+            socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=b"another page needs the place")
+        )
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
+
+    def _expire(self, socket: web.WebSocketResponse, place: Place) -> None:
+        """Close a page that got no place as a guest, and whose user has not signed in."""
+        if place.stage < GUEST and not self._places.admit_guest(place):
+            self._end(socket)
+
+    def _sign_out(self, socket: web.WebSocketResponse, place: Place) -> None:
+        """Make a page a guest, if it had a user."""
+        if place.user:
+            self._places.leave_user(place)
+            self._expire(socket, place)
+
+    async def _answer_all(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
+        """Answer a page until its connection ends. place: of the page."""
+        expiry = None
+        if not self._places.admit_guest(place):
+            expiry = asyncio.get_running_loop().call_later(SIGN_IN, self._expire, socket, place)
+        try:
+            await self._answer_requests(socket, viewer, place)
+        finally:
+            if expiry is not None:
+                expiry.cancel()
+
+    async def _answer_requests(self, socket: web.WebSocketResponse, viewer: Viewer, place: Place) -> None:
+        person, origin = NOBODY, place.address
+        if self._anonymous:
+            self._feed.join(viewer)
+        else:
+            viewer.tell(text_message("locked"))
+        budget = Budget(RATE, MOST_REQUESTS)
+        async for message in socket:
+            is_allowed = budget.spend(1.0)
+            if is_allowed and message.type in (WSMsgType.PING, WSMsgType.PONG):  # of which there can be too many, too
+                if message.type is WSMsgType.PING:
+                    await socket.pong(message.data)
+                continue
+            request = _request(message.data) if message.type is WSMsgType.TEXT and is_allowed else None
+            if request is None:
+                reason = "expected an object in JSON" if is_allowed else "too many requests"
+                await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason.encode())
+                break
+            if request.get("do") != "ping":  # a hidden page pings, and shows no frames
+                place.touch()
+            match request.get("do"):
+                case "saw":
+                    viewer.saw()
+                case "ping":
+                    sent = request.get("sent")
+                    viewer.tell(
+                        text_message("pong", sent=sent if isinstance(sent, (int, float)) else 0.0, now=time.time())
+                    )
+                case "sign_in":
+                    person = await self._sign_in(request, origin)
+                    refused = "" if person.name else "name or password are wrong"
+                    if person.name and not self._places.admit_user(place, person.name):
+                        refused, person = f"{person.name} has too many pages open", NOBODY
+                    if not person.name:
+                        self._sign_out(socket, place)
+                    viewer.tell(_reply(request, refused, person))
+                    if not self._anonymous and person.name:
+                        self._feed.join(viewer)
+                case "sign_out":
+                    person = NOBODY
+                    self._sign_out(socket, place)
+                    viewer.tell(_reply(request, "", person))
+                    if not self._anonymous:
+                        self._feed.leave(viewer)
+                        viewer.tell(text_message("locked"))
+                case _:
+                    viewer.tell(_reply(request, self._commands.do(person, request), person))
+
+    async def _sign_in(self, request: Mapping[str, Any], origin: str) -> Person:
+        name, password = request.get("name"), request.get("password")
+        user = None
+        if isinstance(name, str) and isinstance(password, str):
+            async with self._password:  # one at a time: it takes a processor for as long as that is
+                user = await asyncio.to_thread(self._logins.enter, name, password, origin, time.monotonic())
+        if user is None or not isinstance(name, str):
+            await asyncio.sleep(WRONG_PASSWORD)
+            return NOBODY
+        return Person(name, user.role, user.kind)
+
+
+def _request(data: str) -> dict[str, Any] | None:
+    """What a page asks for; None: that is none."""
+    try:
+        request = json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+    return request if isinstance(request, dict) else None
+
+
+def _reply(request: Mapping[str, Any], refused: str, person: Person) -> bytes:
+    number = request.get("id")
+    who = {"name": person.name, "role": person.role}
+    return text_message("reply", id=number if isinstance(number, int) else None, refused=refused, person=who)

@@ -1,0 +1,1 @@
+"""Reports of recordings: summary, figures, production, explanations of effects."""

@@ -1,0 +1,88 @@
+"""The pictures of a run, drawn by processes beside this one, which writes them."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.report.figures.files import PNG_AND_SVG, Picture, write
+
+CODE = """
+import sys
+sys.path[:] = {path!r}
+from conveyor_sim.support.garbage import collected_later
+with collected_later():
+    from conveyor_sim.report.figures.aside import child, get_ready
+    get_ready()
+child()
+"""
+
+
+class Drawing(AbstractContextManager["Drawing"]):
+    """A process that draws, and ends with the context. Without matplotlib nothing is drawn.
+
+    `get_ready` while there is nothing to draw yet, `begin` once there is a recording, then `pictures`.
+    """
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def get_ready(self) -> None:
+        """Have all loaded that drawing needs, which takes about a second of a core, if that was not done before."""
+        if self._process is not None or find_spec("matplotlib") is None:
+            return
+        # A session of its own: Ctrl-C at the terminal is this process's affair.
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", CODE.format(path=sys.path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # it forks, which goes well without threads
+        )
+
+    def begin(
+        self,
+        bag: Path,
+        times: Sequence[float] | None = None,
+        bottles: Sequence[int] | None = None,
+        suffixes: Sequence[str] = PNG_AND_SVG,
+    ) -> None:
+        """Have a recording read and drawn (as `plot.plot_bag` would) while this process does something else."""
+        self.get_ready()
+        if self._process is not None:
+            assert self._process.stdin is not None
+            with suppress(BrokenPipeError):  # it has ended, so there will be no answer
+                pickle.dump((bag, times, bottles, suffixes), self._process.stdin)
+                self._process.stdin.flush()
+
+    def pictures(self, folder: Path) -> list[Path]:
+        """Wait for the pictures and write them, each whole or not at all; returns the files.
+
+        Raises ConveyorError if there is nothing to draw, or they can't be written.
+        """
+        if self._process is None:
+            return []
+        assert self._process.stdout is not None
+        try:
+            drawn: dict[str, Picture] | str = pickle.load(self._process.stdout)
+        except (EOFError, pickle.UnpicklingError):
+            raise ConveyorError("the process that draws has ended early") from None
+        if isinstance(drawn, str):
+            raise ConveyorError(drawn)
+        return [file for name, picture in drawn.items() for file in write(picture, folder / name)]
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is left running, not even what it has forked."""
+        if self._process is not None:
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            with suppress(BrokenPipeError), self._process:
+                pass

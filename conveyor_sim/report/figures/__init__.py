@@ -1,0 +1,1 @@
+"""Figures of scenes and recordings; the drawing style that all figures share."""

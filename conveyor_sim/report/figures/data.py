@@ -1,0 +1,220 @@
+"""What the drawing functions take: plain arrays and shapes, wherever they come from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.columns.damage import RailWearColumns
+from conveyor_sim.scene.geometry import BeltShape, RailShape, belt_shapes, initial_bottles, rail_shapes
+from conveyor_sim.scene.marks import marks_of
+from conveyor_sim.scene.moving import moving_shapes
+from conveyor_sim.scene.parts.device_part import Look, Mark
+
+if TYPE_CHECKING:
+    from conveyor_sim.scene import Scene
+
+Floats = NDArray[np.float64]
+_OUTLINE_POINTS = 96
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What stands still: belts with their speeds in the scene (m/s) and rails, in listing order; marks of devices."""
+
+    belts: tuple[BeltShape, ...]
+    speeds: Floats
+    rails: tuple[RailShape, ...]
+    marks: tuple[Mark, ...] = ()
+
+    @classmethod
+    def of(cls, scene: Scene) -> Plant:
+        """The plant that `scene` describes."""
+        return cls(
+            belts=tuple(belt_shapes(scene)),
+            speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
+            rails=(*rail_shapes(scene), *(shape.shape(shape.first) for shape in moving_shapes(scene))),
+            marks=tuple(marks_of(scene)),
+        )
+
+    def drawn_as(self, look: Look) -> list[Mark]:
+        """The marks of one look."""
+        return [mark for mark in self.marks if mark.look == look]
+
+    def with_moving(self, moving: Sequence[RailShape]) -> Plant:
+        """The same with the rails that move, the last ones, somewhere else."""
+        return replace(self, rails=(*self.rails[: len(self.rails) - len(moving)], *moving))
+
+    def belt_outline(self, index: int) -> Floats:
+        """Outline (k, 2) of belt `index`, m."""
+        return np.asarray(self.belts[index].outline(_OUTLINE_POINTS), dtype=np.float64)
+
+    def rail_line(self, index: int) -> Floats:
+        """Course (k, 2) of rail `index`, m."""
+        return np.asarray(self.rails[index].outline(_OUTLINE_POINTS), dtype=np.float64)
+
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Smallest box (x0, y0, x1, y1) in m around belts, rails and marks."""
+        parts = [self.belt_outline(i) for i in range(len(self.belts))]
+        parts += [self.rail_line(i) for i in range(len(self.rails))]
+        parts += [mark.points for mark in self.marks]
+        return box_around(np.concatenate(parts)) if parts else (math.inf, math.inf, -math.inf, -math.inf)
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Closed contacts as lines (n, 2, 2) in m, from the bottle's axis to the other's, or to the point on the rail.
+
+    `force` (n,) is the normal force in N.
+    """
+
+    lines: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
+    force: Floats = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The line at one instant: `time` in s; columns (n,) of bottles in m, rad, m/s; the belts' speeds in m/s.
+
+    `contacts` is None if none were recorded, which is not the same as none being closed.
+    """
+
+    time: float
+    x: Floats
+    y: Floats
+    theta: Floats
+    radius: Floats
+    speed: Floats
+    belt_speeds: Floats
+    contacts: Contacts | None = None
+    moving: tuple[RailShape, ...] = ()
+    """Gates, pushers and diverters; none: they are as at first."""
+
+    @classmethod
+    def start_of(cls, scene: Scene) -> Frame:
+        """The initial bottles of `scene`, all belts at their speeds in the scene."""
+        born = list(initial_bottles(scene))
+        state = np.array([row[1:] for row in born], dtype=np.float64).reshape(len(born), 6)
+        return cls(
+            time=0.0,
+            x=state[:, 0],
+            y=state[:, 1],
+            theta=state[:, 2],
+            radius=np.array([scene.bottle_types[row[0]].radius for row in born], dtype=np.float64),
+            speed=np.hypot(state[:, 3], state[:, 4]),
+            belt_speeds=np.array([belt.speed for belt in scene.belts.values()], dtype=np.float64),
+        )
+
+    def within(self, box: tuple[float, float, float, float]) -> Frame:
+        """The same instant, of the bottles that reach into `box` (x0, y0, x1, y1) and the contacts that start in it."""
+        x0, y0, x1, y1 = box
+        keep = (
+            (self.x + self.radius >= x0)
+            & (self.x - self.radius <= x1)
+            & (self.y + self.radius >= y0)
+            & (self.y - self.radius <= y1)
+        )
+        contacts = self.contacts
+        if contacts is not None:
+            start = contacts.lines[:, 0]
+            inside = (start[:, 0] >= x0) & (start[:, 0] <= x1) & (start[:, 1] >= y0) & (start[:, 1] <= y1)
+            contacts = Contacts(contacts.lines[inside], contacts.force[inside])
+        return Frame(
+            self.time,
+            self.x[keep],
+            self.y[keep],
+            self.theta[keep],
+            self.radius[keep],
+            self.speed[keep],
+            self.belt_speeds,
+            contacts,
+        )
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Velocity of one bottle over time: `time` s, `vx` and `vy` m/s, `belt` the index of its belt (-1 on the floor).
+
+    `born` is its place in the order in which bottles were fed, from 1; 0 if the line started with it.
+    """
+
+    bottle: int
+    born: int
+    time: Floats
+    vx: Floats
+    vy: Floats
+    belt: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Flow:
+    """How bottles move through the line: `time` (n,) s; `fed`, `removed`, `present` (n,) counts since the start.
+
+    `on_belt` (n, belts) counts the bottles on each belt; `entered` (n, belts) counts since the start how often a
+    bottle came onto it.
+    """
+
+    time: Floats
+    fed: NDArray[np.int64]
+    removed: NDArray[np.int64]
+    present: NDArray[np.int64]
+    on_belt: NDArray[np.int64]
+    entered: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PeakForce:
+    """Peak contact force (N) over the bottles, of the interval that ends at `time` (n,) s: largest and 99th percentile.
+
+    `bottle` (n,) is the id of the bottle with the largest, -1 where there is no bottle.
+    """
+
+    time: Floats
+    largest: Floats
+    percentile_99: Floats
+    bottle: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The energy ledger over time (s), J, each (n,): as in conveyor_msgs/Ledger; `belts` (n, belts) is their work."""
+
+    time: Floats
+    kinetic: Floats
+    elastic: Floats
+    springs: Floats
+    fed: Floats
+    removed: Floats
+    belts: Floats
+    base_friction: Floats
+    contact_friction: Floats
+    damping: Floats
+    residual: Floats
+    turnover: Floats
+    rails: Floats
+    """(n,), work of all rails that move."""
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What rails had borne at the end of a recording, and the worst that each bottle ever bore."""
+
+    time: float
+    """s, of the last output."""
+    wear: RailWearColumns
+    bottles: int
+    worst: dict[str, Floats]
+    """By quantity (`DamageColumns`), one entry a bottle for which it is known."""
+    limits: dict[str, float]
+    """Those of the scene."""
+
+
+def box_around(points: Floats) -> tuple[float, float, float, float]:
+    """Smallest box (x0, y0, x1, y1) around points (k, 2)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

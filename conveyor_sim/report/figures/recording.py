@@ -1,0 +1,308 @@
+"""What the pictures need of a bag, in a few passes over it that hold no more than the pictures show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.bag.forced import forced_signals
+from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.reader import Bag
+from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
+from conveyor_sim.columns.damage import DamageColumns, RailWearColumns
+from conveyor_sim.columns.ledger import Ledger
+from conveyor_sim.errors import BagError, ConveyorError
+from conveyor_sim.report.figures.data import Contacts, Damage, Energy, Floats, Flow, Frame, PeakForce, Plant, Velocity
+from conveyor_sim.scene import Scene, parse_overrides, parse_scene
+from conveyor_sim.scene.geometry import RailShape, initial_bottles
+from conveyor_sim.scene.moving import moving_shapes
+
+Integers = NDArray[np.int64]
+
+_DEFAULT_PARTS: Final = (0.25, 0.5, 0.75, 1.0)
+_DEFAULT_FED: Final = (1, 50)  # the paper's Figs. 8 and 9
+_BOTTLE_BOTTLE: Final = 0
+
+
+@dataclass(frozen=True)
+class _Summary:
+    """One pass over all Bottles: `ticks` (n,), and `ids` of all bottles ever seen, ascending."""
+
+    ticks: Integers
+    ids: Integers
+    flow: Flow
+    peak_force: PeakForce
+
+
+class Recording:
+    """A bag as the pictures see it.
+
+    Raises BagError if it holds no Bottles, and SceneError if its scene can't be read by this version.
+    """
+
+    def __init__(self, bag: Bag) -> None:
+        self._bag = bag
+        if not bag.counts.get("bottles"):
+            raise BagError(f"{bag.path}: no message of topic bottles, expected at least one to draw")
+        self.scene = _scene(bag)
+        self.plant = Plant.of(self.scene)
+        self.belts: tuple[str, ...] = tuple(bag.line.belts)
+        self._initial = len(list(initial_bottles(self.scene)))
+
+    @property
+    def flow(self) -> Flow:
+        """Bottles fed, on each belt and removed, at every recorded Bottles."""
+        return self._summary.flow
+
+    @property
+    def peak_force(self) -> PeakForce:
+        """Peak contact force over the bottles, at every recorded Bottles."""
+        return self._summary.peak_force
+
+    @cached_property
+    def forced(self) -> tuple[str, ...]:
+        """Names of the signals that were forced at any time, in the order in which they were."""
+        return forced_signals(self._bag)
+
+    @property
+    def energy(self) -> Energy | None:
+        """The energy ledger, at every recorded one; None if there is none."""
+        frames = list(self._bag.read("ledger"))
+        if not frames:
+            return None
+        values = {
+            field.name: np.array([getattr(frame.data, field.name) for frame in frames], dtype=np.float64)
+            for field in fields(Ledger)
+        }
+        # The last entry is the floor's.
+        belts = values.pop("belt_work")[:, :-1]
+        rails = values.pop("rail_work").sum(axis=1)
+        time = np.array([frame.time for frame in frames], dtype=np.float64)
+        return Energy(time=time, belts=belts, rails=rails, **values)
+
+    @property
+    def damage(self) -> Damage | None:
+        """What was borne up to the last recorded Damage; None if there is none."""
+        known = [field.name for field in fields(DamageColumns) if field.name not in ("id", "type", "x", "y")]
+        worst: dict[str, dict[int, float]] = {name: {} for name in known}
+        ids: set[int] = set()
+        time = None
+        for frame in self._bag.read("damage"):
+            time = frame.time
+            ids.update(frame.data.id.tolist())
+            for name, by_bottle in worst.items():
+                values = getattr(frame.data, name)
+                there = np.isfinite(values)
+                for bottle, value in zip(frame.data.id[there].tolist(), values[there].tolist(), strict=True):
+                    by_bottle[bottle] = max(value, by_bottle.get(bottle, 0.0))
+        if time is None:
+            return None
+        wear: RailWearColumns | None = None
+        for last in self._bag.read("rail_wear"):
+            wear = last.data
+        none = np.zeros(0)
+        limits = {name: limit for name in known if (limit := getattr(self.scene.limits, name)) is not None}
+        return Damage(
+            time=time,
+            wear=wear or RailWearColumns(np.zeros(0, np.uint32), none, none, none, none, none),
+            bottles=len(ids),
+            worst={name: np.array(list(by_bottle.values())) for name, by_bottle in worst.items()},
+            limits=limits,
+        )
+
+    def frames(self, times: Sequence[float] | None) -> list[Frame]:
+        """The line at the recorded instants nearest to `times` (s), in ascending order, each once.
+
+        Default: a quarter, half, three quarters and the end of the recording.
+        Raises ConveyorError if a time is outside it.
+        """
+        ticks = self._drawable_ticks
+        seconds = self._seconds(ticks)
+        if times is None:
+            times = [float(seconds[0] + part * (seconds[-1] - seconds[0])) for part in _DEFAULT_PARTS]
+        for time in times:
+            if not seconds[0] - self._tick <= time <= seconds[-1] + self._tick:
+                raise ConveyorError(
+                    f"{self._bag.path}: time {time:g} s given, "
+                    f"expected one within the recording, {seconds[0]:g} to {seconds[-1]:g} s"
+                )
+        chosen = np.unique([ticks[int(np.argmin(np.abs(seconds - time)))] for time in times])
+        wanted = set(chosen.tolist())
+        contacts = {f.tick: f.data for f in self._bag.read("contacts", wanted)} if self._has_contacts else {}
+        return [self._frame(f.tick, f.data, contacts.get(f.tick)) for f in self._bag.read("bottles", wanted)]
+
+    def velocities(self, bottles: Sequence[int] | None) -> list[Velocity]:
+        """Velocities of some bottles by id; default: the 1st and the 50th fed, or the last if there are fewer.
+
+        Raises ConveyorError if a bottle was never recorded.
+        """
+        ids = self._summary.ids
+        if bottles is None:
+            fed = ids[ids >= self._initial] if (ids >= self._initial).any() else ids
+            bottles = list(dict.fromkeys(int(fed[min(place, len(fed)) - 1]) for place in _DEFAULT_FED if len(fed)))
+        for bottle in bottles:
+            if bottle not in ids:
+                known = f"{ids[0]} to {ids[-1]}" if len(ids) else "none"
+                raise ConveyorError(
+                    f"{self._bag.path}: bottle {bottle} given, expected the id of a recorded one: {known}"
+                )
+        series = self._bag.bottle_series(bottles)
+        return [
+            Velocity(
+                bottle=bottle,
+                born=max(0, bottle - self._initial + 1),
+                time=series[bottle].time,
+                vx=series[bottle].vx,
+                vy=series[bottle].vy,
+                belt=series[bottle].belt.astype(np.int64),
+            )
+            for bottle in bottles
+        ]
+
+    def _frame(self, tick: int, bottles: BottleColumns, contacts: ContactColumns | None) -> Frame:
+        return Frame(
+            time=self._bag.time(tick),
+            x=bottles.x,
+            y=bottles.y,
+            theta=bottles.theta,
+            radius=np.asarray(self._bag.line.type_radius)[bottles.type],
+            speed=np.hypot(bottles.vx, bottles.vy),
+            belt_speeds=self._belt_speeds(tick),
+            contacts=None if contacts is None else contact_lines(bottles, contacts),
+            moving=self._moving(tick),
+        )
+
+    @cached_property
+    def _tick(self) -> float:
+        return float(self._bag.line.tick_ns * 1e-9)
+
+    def _seconds(self, ticks: Integers) -> Floats:
+        return np.asarray(ticks * self._tick, dtype=np.float64)
+
+    @cached_property
+    def _has_contacts(self) -> bool:
+        return bool(self._bag.counts.get("contacts"))
+
+    @cached_property
+    def _drawable_ticks(self) -> Integers:
+        """Ticks at which there are bottles and, if contacts were recorded, contacts too."""
+        ticks = self._summary.ticks
+        if not self._has_contacts:
+            return ticks
+        both = np.intersect1d(ticks, self._bag.ticks("contacts"))
+        return both if len(both) else ticks
+
+    @cached_property
+    def _belt_records(self) -> tuple[Integers, Floats]:
+        frames = [(frame.tick, frame.data.actual) for frame in self._bag.belts()]
+        speeds = np.array([speeds for _, speeds in frames], dtype=np.float64).reshape(len(frames), len(self.belts))
+        return np.array([tick for tick, _ in frames], dtype=np.int64), speeds
+
+    def _belt_speeds(self, tick: int) -> Floats:
+        """Actual speeds (belts,) m/s as last recorded up to `tick`; those of the scene before."""
+        ticks, speeds = self._belt_records
+        last = int(np.searchsorted(ticks, tick, side="right")) - 1
+        return self.plant.speeds if last < 0 else speeds[last]
+
+    @cached_property
+    def _position_records(self) -> tuple[Integers, Floats]:
+        """Ticks (n,) and positions (n, movers), m or rad, of the recorded process images."""
+        shapes = moving_shapes(self.scene)
+        names = list(self._bag.line.signal_names)
+        columns = [names.index(f"{shape.name}/position") for shape in shapes]
+        frames = list(self._bag.messages("signals")) if shapes else []
+        found = [to_image(frame.data).truth[columns] for frame in frames]
+        shares = np.array(found, dtype=np.float64).reshape(len(frames), len(shapes))
+        ticks = np.array([frame.tick for frame in frames], dtype=np.int64)
+        return ticks, shares * np.array([shape.stroke for shape in shapes])
+
+    def _moving(self, tick: int) -> tuple[RailShape, ...]:
+        """Rails that move where they were last recorded up to `tick`; none before, when they are as at first."""
+        ticks, positions = self._position_records
+        last = int(np.searchsorted(ticks, tick, side="right")) - 1
+        if last < 0:
+            return ()
+        shapes = moving_shapes(self.scene)
+        return tuple(shape.shape(float(at)) for shape, at in zip(shapes, positions[last], strict=True))
+
+    @cached_property
+    def _summary(self) -> _Summary:
+        ticks: list[int] = []
+        counts: list[tuple[int, int, int]] = []
+        on_belt: list[Integers] = []
+        entered: list[Integers] = []
+        forces: list[tuple[float, float, int]] = []
+        seen = np.empty(0, dtype=np.int64)
+        before: tuple[Integers, Integers] | None = None
+        for frame in self._bag.bottles():
+            ids, belt = frame.data.id.astype(np.int64), frame.data.belt.astype(np.int64)
+            if before is None:
+                # What stands on a belt at the start has not come onto it, except what was fed at once.
+                standing = ids < self._initial
+                before = ids[standing], belt[standing]
+            seen = np.union1d(seen, ids)
+            ticks.append(frame.tick)
+            counts.append((int(np.count_nonzero(seen >= self._initial)), len(seen) - len(ids), len(ids)))
+            on_belt.append(np.bincount(belt[belt >= 0], minlength=len(self.belts)))
+            entered.append(entries(*before, ids, belt, len(self.belts)))
+            forces.append(_peak(ids, frame.data.peak_force))
+            before = ids, belt
+        tick_array = np.array(ticks, dtype=np.int64)
+        time = self._seconds(tick_array)
+        count_array = np.array(counts, dtype=np.int64)
+        flow = Flow(
+            time=time,
+            fed=count_array[:, 0],
+            removed=count_array[:, 1],
+            present=count_array[:, 2],
+            on_belt=np.array(on_belt, dtype=np.int64),
+            entered=np.cumsum(np.array(entered, dtype=np.int64), axis=0),
+        )
+        force = np.array(forces, dtype=np.float64)
+        peak = PeakForce(time, force[:, 0], force[:, 1], force[:, 2].astype(np.int64))
+        return _Summary(tick_array, seen, flow, peak)
+
+
+def contact_lines(bottles: BottleColumns, contacts: ContactColumns) -> Contacts:
+    """Lines (n, 2, 2) from axis to axis, or from axis to the point on the rail, with their normal forces.
+
+    A bottle that is not among `bottles` counts as lying at the point of contact.
+    """
+    point = np.stack([contacts.x, contacts.y], axis=1)
+    lines = np.stack([_axes(bottles, contacts.a, point), point], axis=1)
+    between_bottles = contacts.kind == _BOTTLE_BOTTLE
+    lines[between_bottles, 1] = _axes(bottles, contacts.b[between_bottles], point[between_bottles])
+    return Contacts(lines, np.asarray(contacts.normal_force, dtype=np.float64))
+
+
+def entries(ids_before: Integers, belt_before: Integers, ids: Integers, belt: Integers, belts: int) -> Integers:
+    """Bottles (belts,) that are on a belt now and were not on it before; both sets of ids ascend."""
+    came = belt >= 0
+    if len(ids_before):
+        at = np.searchsorted(ids_before, ids).clip(max=len(ids_before) - 1)
+        came &= ~((ids_before[at] == ids) & (belt_before[at] == belt))
+    return np.bincount(belt[came], minlength=belts)
+
+
+def _axes(bottles: BottleColumns, ids: NDArray[np.uint64], otherwise: Floats) -> Floats:
+    if not len(bottles.id):
+        return otherwise
+    at = np.searchsorted(bottles.id, ids).clip(max=len(bottles.id) - 1)
+    axis = np.stack([bottles.x[at], bottles.y[at]], axis=1)
+    return np.where((bottles.id[at] == ids)[:, None], axis, otherwise)
+
+
+def _peak(ids: Integers, peak_force: Floats) -> tuple[float, float, int]:
+    if not len(ids):
+        return 0.0, 0.0, -1
+    return float(peak_force.max()), float(np.percentile(peak_force, 99.0)), int(ids[np.argmax(peak_force)])
+
+
+def _scene(bag: Bag) -> Scene:
+    """The scene that was run, from the recorded text and what was changed when it was loaded."""
+    return parse_scene(bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides))

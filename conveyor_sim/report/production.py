@@ -1,0 +1,122 @@
+"""How a recorded line produced, read from its bag."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.bag.forced import forced_signals
+from conveyor_sim.bag.reader import Bag, Frame, open_bag
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.columns.counters import CounterColumns
+from conveyor_sim.errors import BagError
+from conveyor_sim.report.alarm_figures import AlarmTally
+from conveyor_sim.report.periods import Period
+from conveyor_sim.report.production_record import Production
+from conveyor_sim.support.printable import printable
+
+CATEGORY, REASON = "category", "stop_reason"
+"""Ends of the signals whose changes are events, and of the columns of counters that say how they were at first."""
+
+NO_REASON = "none"
+"""What the latter says where nothing has stopped a machine yet."""
+
+
+def read_production(path: Path) -> Production:
+    """Read a recording. Raises BagError for one without the topics `counters` and `events`."""
+    with open_bag(path) as bag, bag.sense():
+        for topic in ("counters", "events"):
+            _require(bag, topic)
+        frames = list(bag.read("counters"))
+        if not frames:
+            raise BagError(
+                f"{path}: its topic counters holds no message, expected one at least: "
+                "its line counts nothing, or its scene has outputs: {counters: 0}"
+            )
+        counters, end = frames[-1].data, frames[-1].time
+        follower, alarms = _Follower(frames[0]), AlarmTally()
+        for frame in bag.read("events"):
+            end = max(end, frame.time)
+            columns = frame.data
+            changes = zip(columns.at, columns.kind, columns.name, columns.text, strict=True)
+            for at, kind, name, text in changes:
+                alarms.event(bag.time(int(at)), kind, printable(name))
+                if kind == "machine_state":
+                    follower.take(bag.time(int(at)), name, printable(text))
+        for frame in bag.read("alarm_states") if bag.types.get("alarm_states") == TOPICS["alarm_states"].type else ():
+            alarms.states = frame.data
+        good, resets = _accumulated(frames)
+        return Production(
+            printable(bag.line.scene_name),
+            frames[0].time,
+            end,
+            counters,
+            resets,
+            follower.finished(end),
+            alarms.figures(end - frames[0].time, int(bag.line.tick_ns) * 1e-9),
+            np.array([frame.time for frame in frames]),
+            good,
+            forced_signals(bag),
+        )
+
+
+def _require(bag: Bag, topic: str) -> None:
+    expected, found = TOPICS[topic].type, bag.types.get(topic)
+    if found is None:
+        raise BagError(
+            f"{bag.path}: holds no topic {topic}, expected a recording with it: "
+            "this one was made by an earlier version, or with chosen topics"
+        )
+    if found != expected:
+        raise BagError(f"{bag.path}: its topic {topic} is of type {printable(found)}, expected {expected}")
+
+
+def _accumulated(frames: Sequence[Frame[CounterColumns]]) -> tuple[NDArray[np.float64], int]:
+    """Good bottles of the line (n,) as if it had never been reset, and how often it was."""
+    made = np.array([float(frame.data.good[-1]) for frame in frames])
+    reset = np.diff([int(frame.data.since[-1]) for frame in frames], prepend=int(frames[0].data.since[-1])) != 0
+    lost = np.where(reset, np.roll(made, 1), 0.0)
+    return made + np.cumsum(lost) - made[0], int(reset.sum())
+
+
+class _Follower:
+    """Makes periods of changes of category and reason."""
+
+    def __init__(self, first: Frame[CounterColumns]) -> None:
+        names = zip(first.data.name, first.data.category, first.data.stop_reason, strict=True)
+        self._since: dict[str, float] = {}
+        self._now: dict[str, dict[str, str]] = {}
+        """By machine, the category and the reason."""
+        for name, category, reason in names:
+            if category:
+                self._since[name] = first.time
+                self._now[name] = {CATEGORY: printable(category), REASON: printable(reason)}
+        self._done: dict[str, list[Period]] = {name: [] for name in self._now}
+
+    def take(self, time: float, signal: str, text: str) -> None:
+        """A signal has changed at a time (s), to what a text says."""
+        machine, _, which = signal.rpartition("/")
+        if which in self._now.get(machine, ()) and time >= self._since[machine]:
+            self._end(machine, time)
+            self._now[machine][which] = text
+
+    def finished(self, end: float) -> dict[str, list[Period]]:
+        """All periods by machine, the last ones up to an end (s)."""
+        for machine in self._now:
+            self._end(machine, end)
+        return self._done
+
+    def _end(self, machine: str, time: float) -> None:
+        begin, now = self._since[machine], self._now[machine]
+        if time > begin:
+            # A machine that runs or waits still shows why it last stood; one that has not been started, no reason.
+            reasonless = now[CATEGORY] in ("running", "starved", "blocked") or now[REASON] == NO_REASON
+            reason = "" if reasonless else now[REASON]
+            done, period = self._done[machine], Period(machine, begin, time, now[CATEGORY], reason)
+            if done and done[-1][3:] == period[3:]:  # only the reason of a wait has changed
+                period = done.pop()._replace(end=time)
+            done.append(period)
+            self._since[machine] = time

@@ -1,0 +1,205 @@
+"""A run summed up while its bag goes by."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.reader import Bag, open_bag
+from conveyor_sim.bag.recorded_scene import recorded_scene
+from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.columns.bottles import BottleColumns
+from conveyor_sim.columns.itinerary import Itinerary
+from conveyor_sim.columns.ledger import Ledger
+from conveyor_sim.errors import SceneError
+from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.inputs import ARRIVAL
+from conveyor_sim.line.tag import Adds
+from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.physics.model.remedies import StepLimit, step_limit
+from conveyor_sim.physics.model.step_choice import choose_steps
+from conveyor_sim.report.alarm_figures import AlarmTally
+from conveyor_sim.report.load_history import LoadHistory
+from conveyor_sim.report.summary import BeltFlow, Energy, Loop, Summary
+from conveyor_sim.run.force_check import PressWatch, achieved, pressed
+from conveyor_sim.run.speed import TopicCount
+from conveyor_sim.scene import parse_overrides, parse_scene
+from conveyor_sim.support.printable import SENTENCE, printable
+
+GUARD_TEXTS = 3
+SUMMED = ("bottles", "signals", "ledger", "damage", "damage_events", "outcomes", "guard", "events", "alarm_states")
+TAKEN = {TOPICS[name].type: TOPICS[name] for name in SUMMED}
+"""What is summed up, by message type: the topics may have been renamed."""
+
+
+def summarize(path: str | Path, wall: float | None = None) -> Summary:
+    """Sums a bag up in one pass; wall: how long the run took, s, if known. Raises BagError if it can't be read."""
+    with open_bag(path) as bag, bag.sense():
+        return _Tally(bag).summary(wall)
+
+
+class _Tally:
+    """Counts while a bag goes by."""
+
+    def __init__(self, bag: Bag) -> None:
+        self._bag = bag
+        self._topics: dict[str, list[int]] = {topic: [0, 0] for topic in bag.counts}
+        self._last_tick = 0
+        self._itinerary = Itinerary(len(bag.line.belts))
+        self._forces: list[NDArray[np.float64]] = []
+        self._unknown = False
+        self._bottles: BottleColumns | None = None
+        self._signals: NDArray[np.float64] | None = None
+        self._ledger: Ledger | None = None
+        self._outcomes: Counter[bool] = Counter()
+        self._occasions = 0
+        self._guard: list[tuple[str, str]] = []
+        self._borne: LoadHistory | None = None
+        self._passed: list[tuple[str, str]] = []
+        self._alarms = AlarmTally()
+        self._pressing = PressWatch()
+        for topic, _, data in bag.raw():
+            self._topics[topic][0] += 1
+            self._topics[topic][1] += len(data)
+            if (row := TAKEN.get(bag.types[topic])) is not None:
+                self._take(row.name, bag.decode(topic, data))
+
+    def _take(self, topic: str, message: Any) -> None:
+        self._last_tick, read = max(self._last_tick, int(message.tick)), TOPICS[topic].unpack(message)
+        if topic == "bottles":
+            self._bottles = read
+            time = self._bag.time(message.tick)
+            self._itinerary.take(time, read)
+            self._pressing.take(time, read.id, read.impulse)
+            self._forces.append(read.peak_force[read.peak_force > 0.0])
+            self._unknown = self._unknown or bool(np.isnan(read.peak_force).any())
+        elif topic == "signals":
+            self._signals = to_image(message).truth
+        elif topic == "guard":
+            self._guard.append((printable(message.kind), printable(message.text, SENTENCE)))
+        elif topic == "damage":
+            self._borne = (self._borne or LoadHistory()).with_more(read)
+        elif topic == "damage_events":
+            self._passed.append((printable(message.kind), printable(message.text, SENTENCE)))
+        elif topic == "ledger":
+            self._ledger = read
+        elif topic == "events":
+            for at, kind, name in zip(read.at, read.kind, read.name, strict=True):
+                self._occasions += kind == "command_refused"
+                self._alarms.event(self._bag.time(int(at)), kind, printable(name))
+        elif topic == "alarm_states":
+            self._alarms.states = read
+        else:
+            self._outcomes[bool(message.accepted)] += 1
+            self._occasions += message.source == ARRIVAL  # which the line knows nothing of
+
+    def summary(self, wall: float | None) -> Summary:
+        forces = np.concatenate(self._forces) if self._forces else np.zeros(0)
+        belt = np.zeros(0, dtype=np.int32) if self._bottles is None else self._bottles.belt
+        peak = None if self._unknown else float(forces.max(initial=0.0))
+        line, model = self._bag.line, _model(self._bag.line)
+        roles = None if model is None else _roles(line, model)
+        seconds = self._bag.time(max(0, self._last_tick - int(line.tick)))
+        return Summary(
+            scene=printable(line.scene_name),
+            bag=printable(self._bag.path, SENTENCE),
+            simulated=seconds,
+            wall=wall,
+            fed=self._counted(roles, "fed"),
+            removed=self._counted(roles, "removed", "rejected"),
+            rejected=self._counted(roles, "rejected"),
+            present=len(belt),
+            on_floor=int(np.count_nonzero(belt < 0)),
+            belts=self._belts(belt),
+            loop=self._loop(),
+            peak_force=peak,
+            peak_force_99=None if self._unknown else float(np.percentile(forces, 99.0)) if len(forces) else 0.0,
+            setting=printable(f"{line.integrator}, dt = {line.dt * 1e6:.4g} us: {line.dt_reason}", SENTENCE),
+            predicted=None if model is None else model.prediction.sentence,
+            limit=_step_limit(line),
+            achieved=None if model is None else achieved(model, peak),
+            pressed=None if model is None else pressed(model, self._pressing.load),
+            guard=dict(Counter(kind for kind, _ in self._guard)),
+            guard_texts=[text for _, text in self._guard[:GUARD_TEXTS]],
+            energy=None if self._ledger is None else _energy(self._ledger, line.belts, line.rails),
+            borne=self._borne,
+            damage_events=dict(Counter(kind for kind, _ in self._passed)),
+            damage_texts=[text for _, text in self._passed[:GUARD_TEXTS]],
+            alarms=self._alarms.figures(seconds, int(line.tick_ns) * 1e-9) if "events" in self._bag.counts else None,
+            commands=self._outcomes.total(),
+            refused=self._outcomes[False],
+            occasions=self._occasions if "events" in self._bag.counts else None,
+            topics={printable(topic): TopicCount(*counts) for topic, counts in self._topics.items()},
+        )
+
+    def _counted(self, roles: dict[str, Adds] | None, *wanted: Adds) -> int | None:
+        """The sum at the end of the signals that add to something."""
+        if roles is None:
+            return None
+        names = self._bag.line.signal_names
+        chosen = [index for index, name in enumerate(names) if roles.get(name) in wanted]
+        if not chosen:
+            return 0
+        return None if self._signals is None else int(self._signals[chosen].sum())
+
+    def _belts(self, belt: NDArray[np.int32]) -> dict[str, BeltFlow]:
+        flows = {}
+        for index, name in enumerate(self._bag.line.belts):
+            rates = self._itinerary.per_minute(self._itinerary.entries[index])
+            flows[name] = BeltFlow(int(np.count_nonzero(belt == index)), *rates)
+        return flows
+
+    def _loop(self) -> Loop | None:
+        returns = self._itinerary.returns
+        index = max(range(len(returns)), key=lambda belt: len(returns[belt]), default=None)
+        if index is None or not returns[index]:
+            return None
+        rates = self._itinerary.per_minute(returns[index])
+        return Loop(self._bag.line.belts[index], len(returns[index]), *rates)
+
+
+def _energy(ledger: Ledger, belts: list[str], rails: list[str]) -> Energy:
+    moving = rails[len(rails) - ledger.rail_work.size :]
+    return Energy(
+        # The last entry is the floor's.
+        belts=dict(zip(belts, ledger.belt_work[:-1].tolist(), strict=True)),
+        fed=ledger.fed,
+        removed=ledger.removed,
+        stored=ledger.kinetic + ledger.elastic + ledger.springs,
+        base_friction=ledger.base_friction,
+        contact_friction=ledger.contact_friction,
+        damping=ledger.damping,
+        residual=ledger.residual,
+        turnover=ledger.turnover,
+        rails=dict(zip(moving, ledger.rail_work.tolist(), strict=True)),
+    )
+
+
+def _roles(line: Any, model: Model) -> dict[str, Adds]:
+    """What the signals of a recorded scene add to, by name."""
+    devices = build_devices(recorded_scene(line, line.scene_name), model)
+    return {signal.name: signal.adds_to for device in devices for signal in device.signals}
+
+
+def _model(line: Any) -> Model | None:
+    """The model of a recorded scene in the steps that it ran with; None if this version refuses the scene."""
+    try:
+        return build_model(recorded_scene(line, line.scene_name))
+    except SceneError:
+        return None
+
+
+def _step_limit(line: Any) -> StepLimit | None:
+    """What sets the steps of a recorded scene; None if this version would choose others than were recorded."""
+    try:
+        scene = parse_scene(line.scene_text, line.scene_name, parse_overrides(line.overrides))
+        choice = choose_steps(scene)
+    except SceneError:
+        return None
+    same = (scene.accuracy.integrator, choice.steps) == (line.integrator, line.steps_per_tick)
+    return step_limit(scene, choice) if same else None

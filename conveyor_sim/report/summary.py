@@ -1,0 +1,150 @@
+"""What a run amounts to: the same for the node and for a run without ROS."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.physics.model.remedies import StepLimit
+from conveyor_sim.report.alarm_figures import AlarmFigures
+from conveyor_sim.report.load_history import LoadHistory
+from conveyor_sim.run.force_check import ForceCheck, Pressed
+from conveyor_sim.run.speed import TopicCount
+
+FILE_NAME = "summary.json"
+
+
+@dataclass(frozen=True)
+class BeltFlow:
+    """One belt: what is on it, and how often a bottle came onto it (seen from one recorded Bottles to the next)."""
+
+    bottles: int
+    """On it at the end."""
+    per_minute: float
+    """Bottles that came onto it, per simulated minute, over the whole run."""
+    per_minute_second_half: float
+    """The same over the second half, when the line has filled."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed loop, seen from the belt to which bottles return most often.
+
+    A bottle has returned when it comes onto a belt that it had left, with at least two other belts in between.
+    """
+
+    belt: str
+    returns: int
+    per_minute: float
+    per_minute_second_half: float
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The energy ledger at the end (`conveyor_sim.columns.ledger`), J."""
+
+    belts: dict[str, float]
+    """Work done by each belt."""
+    fed: float
+    removed: float
+    stored: float
+    """In motion, contacts and tangential springs."""
+    base_friction: float
+    contact_friction: float
+    damping: float
+    residual: float
+    turnover: float
+    rails: dict[str, float]
+    """Work done by each rail that moves."""
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        share = self.residual / self.turnover if self.turnover else 0.0
+        rails = f", {sum(self.rails.values()):.4g} J from rails that move" if self.rails else ""
+        return (
+            f"{sum(self.belts.values()):.4g} J from belts{rails}; {self.base_friction:.4g} J lost under bottles, "
+            f"{self.contact_friction:.4g} J in friction at contacts, {self.damping:.4g} J in damping; "
+            f"residual {100.0 * share:.2g} % of a turnover of {self.turnover:.4g} J"
+        )
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The end-of-run account. Quantities that were not recorded are None."""
+
+    scene: str
+    bag: str
+    simulated: float
+    """s"""
+    wall: float | None
+    """s"""
+    fed: int | None
+    """By infeeds, sources and spills; None if this version refuses the recorded scene, or no signals were recorded."""
+    removed: int | None
+    """By outfeeds, sinks and rejects."""
+    rejected: int | None
+    """By rejects."""
+    present: int
+    """Bottles on the line at the end."""
+    on_floor: int
+    """Of them, on no belt."""
+    belts: dict[str, BeltFlow]
+    loop: Loop | None
+    """None if no bottle came back."""
+    peak_force: float | None
+    """N, the largest normal contact force of the run (accumulated every step); None if the scene has no peaks."""
+    peak_force_99: float | None
+    """N, 99th percentile over bottles and output intervals with a contact of the peak force in the interval."""
+    setting: str
+    """Integrator and time step, and why."""
+    predicted: str | None
+    """The errors to expect; None if this version refuses the recorded scene."""
+    limit: StepLimit | None
+    """What sets the number of steps, and what would lower it; None if this version would choose another number."""
+    achieved: ForceCheck | None
+    """What the peak force says; None if it or the prediction is not known."""
+    pressed: Pressed | None
+    """What pressed for long; None if it is not known, or no bound on the time step rests on it."""
+    guard: dict[str, int]
+    """How often the guard said something, by kind (`GuardEvent.kind`)."""
+    guard_texts: list[str]
+    """What it said, the first times."""
+    energy: Energy | None
+    """None if no energy ledger was recorded."""
+    borne: LoadHistory | None
+    """Loads on the bottles; None if it was not recorded."""
+    damage_events: dict[str, int]
+    """How often a limit was passed, by limit."""
+    damage_texts: list[str]
+    """What was said of it, the first times."""
+    alarms: AlarmFigures | None
+    """None if events were not recorded."""
+    commands: int
+    refused: int
+    """Of the commands."""
+    occasions: int | None
+    """On how many occasions: what a controller has no control of counts once until hands change, however long it goes
+    on commanding it; None if events were not recorded.
+    """
+    topics: dict[str, TopicCount]
+
+    @property
+    def real_time_factor(self) -> float | None:
+        """Simulated over wall time."""
+        return self.simulated / self.wall if self.wall else None
+
+
+def write_summary(summary: Summary, folder: Path) -> Path:
+    """Writes summary.json into the folder; returns its path. Raises ConveyorError if it can't be written."""
+    file = folder / FILE_NAME
+    content = {**asdict(replace(summary, limit=None)), "real_time_factor": summary.real_time_factor}
+    del content["limit"]
+    content["steps"] = [] if summary.limit is None else summary.limit.lines
+    try:
+        file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConveyorError(f"{file}: can't be written ({error.strerror})") from error
+    return file

@@ -1,0 +1,1 @@
+"""Running a scene: the stepping thread, wall time, controllers, lockstep and playback."""

@@ -1,0 +1,182 @@
+"""The kernels of a scene, compiled by a process of its own.
+
+The compiler can't be interrupted, and it holds up every other thread. A process can be ended at any time; it leaves its
+kernels in the cache, from which this process loads them in less than a second.
+"""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import BinaryIO
+
+from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS
+from conveyor_sim.engine.compiler.kernel_folder import NotCached, cached_only
+from conveyor_sim.physics.model import Model, build_model
+from conveyor_sim.scene import Scene
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.garbage import collected_later
+
+BASE_SECONDS, EFFECT_SECONDS = 3.0, 0.75
+"""s of a core to compile, and for each effect that is on: a fit to scenes of 5 to 14 effects, measured in 2026."""
+
+# As it ends, Python looks through all objects for garbage: numba's are so many that it takes half a second.
+atexit.register(gc.freeze)
+
+CODE = "import sys; sys.path[:] = {path!r}; from conveyor_sim.run.compilation import child; child()"
+
+
+def compile_kernels(scene: Scene) -> None:
+    """Have numba compile the kernels that a scene needs, or read them from its cache; nothing of it stays but that."""
+    rehearsal = Simulation(scene)
+    rehearsal.advance(1)
+    rehearsal.bottles()
+    rehearsal.contacts()
+    rehearsal.ledger()
+    rehearsal.signals()
+    rehearsal.rehearse()
+
+
+class Cancelled(Exception):
+    """The kernels are not wanted any more."""
+
+
+def seconds_to_compile(model: Model) -> float:
+    """How long compiling will take, roughly, s of wall time; longer where other processes want the cores."""
+    cores = len(os.sched_getaffinity(0))
+    crowd = max(1.0, (os.getloadavg()[0] + 1.0) / cores)
+    return crowd * (BASE_SECONDS + EFFECT_SECONDS * sum(effect.on for effect in model.effects))
+
+
+def time_to_compile(scene: Scene) -> str:
+    """Return one sentence with the expected time that the kernels of a scene take to compile."""
+    return compiling(seconds_to_compile(build_model(scene)))
+
+
+def compiling(seconds: float) -> str:
+    """Return one sentence about kernels that take `seconds` to compile."""
+    kept = "" if KERNELS.path is None else "; the next start finds them in the cache"
+    return f"compiling the kernels for this kind of scene, about {seconds:.0f} s{kept}"
+
+
+class Compilation:
+    """Gets the kernels that a scene needs into this process: from the cache, or else compiled."""
+
+    def __init__(self, scene: Scene, say: Callable[[str], object]) -> None:
+        """say: called with a sentence if something has to be compiled."""
+        self._scene = scene
+        self._say = say
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._cancelled = self._compiles = False
+        self._began = time.monotonic()
+        self._expected = seconds_to_compile(build_model(scene))
+
+    @property
+    def progress(self) -> str:
+        """What is under way."""
+        if not self._compiles:
+            return "loading the kernels"
+        return f"compiling the kernels, {time.monotonic() - self._began:.0f} s of about {self._expected:.0f} s"
+
+    def run(self) -> None:
+        """Return once the kernels are here; interrupted by Ctrl-C in the main thread within a moment.
+
+        Raises Cancelled, and SimulationError if the scene does not get through its first tick.
+        """
+        KERNELS.before_read = self._require_wanted
+        try:
+            if not self._load():
+                self._compiles = True
+                self._say(compiling(self._expected))
+                self._compile_aside()
+                if not self._load():
+                    self._say("the process that compiles has ended early; compiling in this one")
+                    compile_kernels(self._scene)
+        finally:
+            KERNELS.before_read = None
+            KERNELS.received.clear()
+
+    def cancel(self) -> None:
+        """From any thread: have run() end within a moment."""
+        with self._lock:
+            self._cancelled = True
+            if self._process is not None:
+                self._process.kill()
+
+    def _require_wanted(self) -> None:
+        if self._cancelled:
+            raise Cancelled
+
+    def _load(self) -> bool:
+        """Take the kernels from the cache, if all are there."""
+        try:
+            with cached_only(), collected_later():
+                compile_kernels(self._scene)
+        except NotCached:
+            return False
+        return True
+
+    def _compile_aside(self) -> None:
+        """Have the kernels compiled; what goes wrong in that is found again by compiling in this process."""
+        with self._lock:
+            if self._cancelled:
+                return
+            try:
+                # A session of its own: Ctrl-C at the terminal is this process's affair.
+                self._process = subprocess.Popen(
+                    [sys.executable, "-c", CODE.format(path=sys.path)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    start_new_session=True,
+                )
+            except OSError:
+                return
+        # It may end at any time, even before it has read what to do or in the midst of a kernel that it sends.
+        with suppress(BrokenPipeError, EOFError, pickle.UnpicklingError), self._process as process:
+            assert process.stdin is not None and process.stdout is not None
+            try:
+                pickle.dump((ENGINE_HASH, KERNELS.path, pickle.dumps(self._scene)), process.stdin)
+                process.stdin.flush()
+                while True:
+                    name, content = pickle.load(process.stdout)
+                    KERNELS.received[name] = content
+            finally:
+                process.kill()
+
+
+def child() -> None:
+    """Compile for the parent: the scene comes on the standard input; kernels that can't be cached go back."""
+    task, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever else is printed
+    try:
+        engine, folder, scene = pickle.load(task)
+    except EOFError:  # the parent was interrupted before it could say
+        return
+    if engine != ENGINE_HASH:  # the sources have changed in between
+        return
+    threading.Thread(target=_end_with_parent, args=(task,), daemon=True).start()
+
+    def send(name: str, content: bytes) -> None:
+        pickle.dump((name, content), answers)
+        answers.flush()
+
+    KERNELS.use(folder)
+    KERNELS.send = send
+    with suppress(Exception):  # the parent finds it, too
+        compile_kernels(pickle.loads(scene))
+    os._exit(0)  # without waiting for what nobody needs any more
+
+
+def _end_with_parent(task: BinaryIO) -> None:
+    """The input ends when the parent closes it or dies."""
+    task.read()
+    os._exit(1)

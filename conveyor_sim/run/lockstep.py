@@ -1,0 +1,169 @@
+"""The lockstep protocol: one owner advances the simulation to absolute ticks, and may repeat a request safely.
+
+A request says everything (who, to which tick, with which commands), so the same request again can only mean that its
+answer was lost: it gets the stored answer. Anything else that does not lead on from the present tick is refused, with
+the reason. No rule looks at wall time.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from conveyor_sim.columns.image import Image
+from conveyor_sim.errors import ConveyorError
+from conveyor_sim.line.inputs import DECLARE, SET, CommandOutcome, Input
+from conveyor_sim.support.printable import MOST, printable
+
+if TYPE_CHECKING:
+    from conveyor_sim.simulation import Simulation
+
+
+LOCKSTEP = "lockstep"
+"""Source of its commands."""
+
+
+def inputs_of(
+    source: str,
+    writer: str,
+    alarm_ids: Sequence[str],
+    alarms: Sequence[str],
+    names: Sequence[str],
+    values: Sequence[float],
+) -> tuple[Input, Input]:
+    """What a message of a controller gives the line: alarms that it declares, then commands; either may be empty."""
+    declared = Input(source, writer, "controller", DECLARE, tuple(alarm_ids), (), tuple(alarms))
+    return declared, Input(source, writer, "controller", SET, tuple(names), tuple(values))
+
+
+def is_empty(given: Input) -> bool:
+    """Whether there is nothing in it."""
+    return not (given.names or given.values or given.texts)
+
+
+class Refused(ConveyorError):
+    """What was asked can't be done now; the text is the reason."""
+
+
+@dataclass(frozen=True)
+class LockstepRequest:
+    """What a controller asks: as Lockstep.srv."""
+
+    run_id: str
+    target_tick: int
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    release: bool
+    sim_run_id: str = ""
+    alarm_ids: tuple[str, ...] = ()
+    alarms: tuple[str, ...] = ()
+    released: tuple[str, ...] = ()
+
+    def same_as(self, other: LockstepRequest | None) -> bool:
+        """Equal bit for bit, so that a request with a NaN is equal to its own repetition."""
+        return other is not None and self._key() == other._key()
+
+    @property
+    def inputs(self) -> list[Input]:
+        """What it gives the line: alarms that it declares, then its commands; neither where there is none."""
+        given = inputs_of(LOCKSTEP, self.run_id, self.alarm_ids, self.alarms, self.names, self.values)
+        return [one for one in given if not is_empty(one)]
+
+    def _key(self) -> tuple[object, ...]:
+        bits = struct.pack(f"<{len(self.values)}d", *self.values)
+        return (
+            self.run_id,
+            self.target_tick,
+            self.names,
+            bits,
+            self.release,
+            self.sim_run_id,
+            self.alarm_ids,
+            self.alarms,
+            self.released,
+        )
+
+
+@dataclass(frozen=True)
+class LockstepAnswer:
+    """What the simulation was at the target tick."""
+
+    sim_run_id: str
+    tick: int
+    stamp_ns: int
+    signals: Image
+    state_hash: int
+    outcomes: tuple[CommandOutcome, ...]  # since the last answer
+
+    @staticmethod
+    def of(simulation: Simulation, run: str, outcomes: tuple[CommandOutcome, ...] = ()) -> LockstepAnswer:
+        """What a simulation is now, in a run (Line.run_id)."""
+        return LockstepAnswer(
+            run, simulation.tick, simulation.stamp_ns, simulation.line.signals(), simulation.state_hash(), outcomes
+        )
+
+
+class Lockstep:
+    """Who owns the simulation, and the answer to the last request that was accepted."""
+
+    def __init__(self, max_ticks: int) -> None:
+        """`max_ticks`: the longest advance that one request may ask for."""
+        self._max_ticks = max_ticks
+        self._owner = ""
+        self._last: LockstepRequest | None = None
+        self._answer: Future[LockstepAnswer] | None = None
+
+    @property
+    def owner(self) -> str:
+        """The run_id that owns the simulation, empty if none does."""
+        return self._owner
+
+    def repeated(self, request: LockstepRequest) -> Future[LockstepAnswer] | None:
+        """The answer, given or still to come, if this is the last accepted request once more."""
+        return self._answer if request.same_as(self._last) else None
+
+    def accept(self, request: LockstepRequest, run: str, tick: int, last_tick: int) -> Future[LockstepAnswer]:
+        """Take a new request; its answer is to be set later. run: the simulation's run id (Line.run_id), which is at
+        `tick` and ends at `last_tick`.
+
+        Raises Refused.
+        """
+        reason = self._refusal(request, run, tick, last_tick)
+        if reason:
+            raise Refused(reason)
+        self._owner = "" if request.release else request.run_id
+        self._last = request
+        self._answer = Future()
+        return self._answer
+
+    def clear(self) -> None:
+        """Forget the owner and its last request: the simulation was reset."""
+        self._owner, self._last, self._answer = "", None, None
+
+    def _refusal(self, request: LockstepRequest, run: str, tick: int, last_tick: int) -> str:
+        if not request.run_id:
+            return "run_id is empty; expected the caller's name for its run"
+        if len(request.run_id) > MOST:
+            return f"run_id is {len(request.run_id)} characters long, expected at most {MOST}"
+        if request.sim_run_id not in ("", run):
+            return (
+                f"sim_run_id {printable(request.sim_run_id)} given, but the simulation is in run {run}: it was reset, "
+                "or a checkpoint was loaded"
+            )
+        if self._owner and request.run_id != self._owner:
+            return f"the simulation is owned by run '{printable(self._owner)}'; expected its release, or a reset"
+        if self._answer is not None and not self._answer.done():
+            return f"the advance to tick {self._last.target_tick if self._last else tick} is still under way"
+        if request.target_tick <= tick:
+            return f"stale: target_tick {request.target_tick} given, expected more than the present tick {tick}"
+        if request.target_tick > last_tick:
+            return f"target_tick {request.target_tick} given, but the run ends at tick {last_tick}"
+        if request.target_tick - tick > self._max_ticks:
+            return (
+                f"target_tick {request.target_tick} is {request.target_tick - tick} ticks away, "
+                f"expected at most {self._max_ticks} (parameter lockstep_max_ticks)"
+            )
+        return ""

@@ -1,0 +1,104 @@
+"""One run of a scene, from tick 0 or a checkpoint to its end: the simulation, what it publishes and what it records."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from pathlib import Path
+
+from conveyor_sim.bag.outputs import Outputs, Sink
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.errors import SimulationError
+from conveyor_sim.line.commands import shown
+from conveyor_sim.line.inputs import CommandOutcome, Input
+from conveyor_sim.run.force_check import PeakWatch, achieved
+from conveyor_sim.run.stopped import keep_stopped
+from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.printable import SENTENCE, printable
+
+
+class Session:
+    """A simulation with its sinks. Not for several threads: whoever steps it owns it."""
+
+    def __init__(self, simulation: Simulation, sink: Sink, bag: Path | None, frame_id: str, distro: str) -> None:
+        """Starts the run from where `simulation` is; `bag` is the folder to record to, if any.
+
+        Raises BagError if the folder can't be written; nothing has been published then.
+        """
+        self.run_id = uuid.uuid4().hex
+        self.bag = bag
+        self._sink = sink
+        self._frame_id = frame_id
+        self.wall = 0.0  # s of wall time from the start of the first tick to the end of the last one
+        self._first_tick_at: float | None = None
+        self.simulation = simulation
+        self._began = simulation.time
+        keep_start = simulation.save if simulation.tick > 0 else None
+        self._recorder = Recorder(bag, distro=distro, start=keep_start) if bag else None
+        sinks = [sink] if self._recorder is None else [self._recorder, sink]
+        self.outputs = Outputs(self.simulation, sinks, frame_id=frame_id, run_id=self.run_id)
+        self.outputs.start()
+        self._peaks = PeakWatch(self.simulation)
+        self._last_outcomes: list[CommandOutcome] = []
+
+    @property
+    def last_tick(self) -> int:
+        """The tick at which the run ends."""
+        return self.simulation.scene.duration_ticks
+
+    def tick(self) -> list[CommandOutcome]:
+        """Advance by one tick and write what is due; what became of the commands. Raises SimulationError, BagError."""
+        if self._first_tick_at is None:
+            self._first_tick_at = time.monotonic()
+        try:
+            self.simulation.advance(1)
+        except SimulationError as error:
+            self._last_outcomes = self.outputs.after_failure()
+            raise keep_stopped(self.simulation, self.bag, error) from error
+        outcomes = self.outputs.after_tick()
+        self._peaks.after_tick()
+        self.wall = time.monotonic() - self._first_tick_at
+        return outcomes
+
+    @property
+    def account(self) -> str:
+        """How fast the run was, and what its forces say of its accuracy, in one line."""
+        simulation = self.simulation
+        simulated = simulation.time - self._began
+        account = f"{simulated:g} s simulated in {self.wall:.2f} s"
+        if self.wall > 0.0:
+            account += f", {simulated / self.wall:.3g} x real time"
+        reached = achieved(simulation.model, self._peaks.force)
+        return account if reached is None else f"{account}; {reached.sentence}"
+
+    @property
+    def to_bag(self) -> str:
+        """Where it is recorded to, as the end of a sentence; empty: it is not."""
+        return f", recorded to {self.bag}" if self.bag else ""
+
+    def take_last_outcomes(self) -> list[CommandOutcome]:
+        """What became of the commands of a tick that failed."""
+        outcomes, self._last_outcomes = self._last_outcomes, []
+        return outcomes
+
+    def tell(self, outcome: CommandOutcome) -> None:
+        """Write an outcome that no tick brought. Raises BagError."""
+        self.outputs.tell(outcome)
+
+    def refuse(self, given: Input, reason: str) -> None:
+        """Tell those who listen that an input came too late to be applied; the recording is closed by then."""
+        kept = given._replace(names=shown(given.names))
+        self.outputs.tell(CommandOutcome(self.simulation.tick, kept, False, printable(reason, SENTENCE)))
+
+    def flush(self) -> None:
+        """Hand what was recorded to the operating system. Raises BagError."""
+        if self._recorder is not None:
+            self._recorder.flush()
+
+    def close(self) -> None:
+        """End the recording; nothing more is recorded. Raises BagError if it can't be completed."""
+        if self._recorder is not None:
+            recorder, self._recorder = self._recorder, None
+            # Outcomes of commands that come too late are still published.
+            self.outputs = Outputs(self.simulation, [self._sink], frame_id=self._frame_id, run_id=self.run_id)
+            recorder.close()

@@ -1,0 +1,58 @@
+"""What the pictures of a study show, without what they are drawn with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from conveyor_sim.report.figures.data import Floats
+
+
+@dataclass(frozen=True)
+class Response:
+    """A metric over the levels of one parameter. n levels."""
+
+    parameter: str
+    metric: str
+    """With its unit, as an axis shows it."""
+    levels: Sequence[Any]
+    """(n,), numbers in rising order, or texts."""
+    mean: Floats
+    """(n,), NaN where no run has finished."""
+    half_width: Floats
+    """(n,), of the confidence interval, NaN where it is not known."""
+    label: str = ""
+    """What a line stands for, where there are several."""
+    scattered: bool = False
+    """Whether levels are those of single points that lie anywhere: no line joins them."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """A metric over two parameters. n by m levels."""
+
+    parameters: tuple[str, str]
+    metric: str
+    levels: tuple[Sequence[Any], Sequence[Any]]
+    mean: Floats
+    """(n, m), NaN where no run has finished."""
+
+
+@dataclass(frozen=True)
+class Indices:
+    """Shares of a metric's variance, by parameter. k parameters."""
+
+    metric: str
+    parameters: Sequence[str]
+    first: Floats
+    """(k,), by the parameter alone."""
+    first_half_width: Floats
+    total: Floats
+    """(k,), with all interactions."""
+    total_half_width: Floats
+
+
+def level_text(level: Any) -> str:
+    """A level of a parameter on an axis or in a legend."""
+    return f"{level:.4g}" if isinstance(level, float) else str(level)

@@ -1,1 +1,0 @@
-"""The page on which one sees a line: a recording packed for it, as one file or piece by piece; `page/` is the page."""

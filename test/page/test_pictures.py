@@ -1,0 +1,72 @@
+"""The page still looks as in the pictures of docs/, by eye: downsampled, for every machine has other fonts."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from page.conftest import opened_page
+from page.states import STATES
+from page.test_page import settled
+from PIL import Image
+
+from conveyor_sim.page.one_file import Failure, write_page
+
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
+BLOCK = 20
+"""px of a block that one colour stands for: about a word."""
+OFF = 30.0
+"""Of 255, in the mean over the colours: such a block looks different."""
+ALLOWED = 0.06
+"""Share of blocks that may. In other fonts (serif, monospaced, a fifth larger) 0.04 do, for words shift by a block;
+between two of the states at least 0.1."""
+
+
+def blocks(picture: Image.Image) -> np.ndarray:
+    """The mean colours (rows, columns, 3) of its blocks."""
+    width, height = picture.width // BLOCK, picture.height // BLOCK
+    pixels = np.asarray(picture.convert("RGB"), dtype=np.float64)[: height * BLOCK, : width * BLOCK]
+    return pixels.reshape(height, BLOCK, width, BLOCK, 3).mean(axis=(1, 3))
+
+
+def different(one: np.ndarray, other: np.ndarray) -> float:
+    """The share of blocks that look different."""
+    return float((np.abs(one - other).mean(axis=2) > OFF).mean())
+
+
+@pytest.fixture(scope="module")
+def pages(bag: Path, other_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
+    folder = tmp_path_factory.mktemp("states")
+    failure = Failure(22.0, "always: no more than 20 bottles")
+    return {
+        "line": write_page(bag, folder / "line.html"),
+        "failed": write_page(bag, folder / "failed.html", failures=[failure]),
+        "pair": write_page(bag, folder / "pair.html", other=other_bag),
+    }
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_a_state_looks_as_in_its_picture(browser: Any, pages: Mapping[str, Path], name: str) -> None:
+    state = STATES[name]
+    with opened_page(browser, pages[state.of], state.size) as page:
+        if state.of == "pair":
+            page.wait_for_selector("body[data-compared]")
+        state.reach(page)
+        settled(page)
+        shot = Image.open(io.BytesIO(page.screenshot()))
+    known = Image.open(IMAGES / f"{name}.webp")
+    assert shot.size == known.size
+    share = different(blocks(shot), blocks(known))
+    assert share <= ALLOWED, (
+        f"{share:.1%} of {name} differs; `python docs/studies/view_pictures.py {name}` makes it anew"
+    )
+
+
+def test_states_are_told_apart() -> None:
+    found = [blocks(Image.open(IMAGES / f"{name}.webp")) for name, state in STATES.items() if state.size == (1280, 720)]
+    pairs = [different(one, other) for i, one in enumerate(found) for other in found[:i]]
+    assert len(pairs) == 3 and min(pairs) > 1.5 * ALLOWED

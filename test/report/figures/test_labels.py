@@ -1,0 +1,55 @@
+"""Names stand beside what they name and never on each other."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+
+from conveyor_sim.report.figures.data import Plant
+from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, rail_labels
+from conveyor_sim.report.figures.plant import draw_plant
+
+
+def test_belts_carry_name_and_speed(plant: Plant) -> None:
+    texts = [label.text for label in belt_labels(plant, plant.speeds)]
+    assert texts[:3] == ["feeder\n0.8 m/s", "table\n0.2 m/s", "slope\n-0.5 m/s"]
+
+
+def test_rails_of_curved_belts_are_not_named_again(plant: Plant) -> None:
+    assert [label.text for label in rail_labels(plant)] == ["top", "bottom"]
+
+
+def test_infeeds_and_outfeeds_are_named(plant: Plant) -> None:
+    assert [label.text for label in mark_labels(plant)] == ["infeed inlet", "outfeed reject"]
+
+
+def test_labels_are_inside_the_axes_apart_and_near_their_anchors(ax: Axes, plant: Plant) -> None:
+    draw_plant(ax, plant, plant.speeds, Normalize(0.0, 1.0), 0.1)
+    ax.set_xlim(-3.5, 6.0)
+    ax.set_ylim(-2.0, 4.0)
+    labels = mark_labels(plant) + belt_labels(plant, plant.speeds) + rail_labels(plant)
+    place(ax, labels, plant)
+    frame = ax.get_window_extent()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert [text.get_text() for text in ax.texts] == [label.text for label in labels]
+    for box, label in zip(boxes, labels, strict=True):
+        assert frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
+        anchors = ax.transData.transform(label.anchors)
+        nearest = np.hypot(*(anchors - (0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1))).T).min()
+        assert nearest < 0.5 * np.hypot(box.width, box.height) + 10.0
+    for one, other in combinations(boxes, 2):
+        assert not one.overlaps(other)
+
+
+def test_the_name_of_a_belt_is_not_written_on_another_belt(ax: Axes, plant: Plant) -> None:
+    draw_plant(ax, plant, plant.speeds, Normalize(0.0, 1.0), 0.1)
+    ax.set_xlim(-3.5, 6.0)
+    ax.set_ylim(-2.0, 4.0)
+    place(ax, belt_labels(plant, plant.speeds), plant)
+    areas = next(c for c in ax.collections if c.get_gid() == "belts").get_paths()
+    for text in ax.texts:
+        centre = text.get_position()
+        assert not any(area.contains_point(centre) for area in areas)

@@ -1,0 +1,249 @@
+"""What a run amounts to, counted from its bag."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bag.editing import edited
+from bag.small_line import SMALL_LINE, record
+from rich.console import Console
+
+from conveyor_sim.bag.outputs import Outputs
+from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.recorder import Recorder
+from conveyor_sim.line.authority import AUTOMATIC, MANUAL
+from conveyor_sim.line.inputs import MODE, Input
+from conveyor_sim.physics.model import build_model
+from conveyor_sim.physics.model.remedies import step_limit
+from conveyor_sim.report.summarize import summarize
+from conveyor_sim.report.summary import Summary, write_summary
+from conveyor_sim.report.summary_table import render
+from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.simulation import Simulation
+
+TICKS = 100
+
+THREE_BELTS = """
+name: ring
+duration: 0.6
+tick: 0.01
+base:
+  - {between: [glass, belt], friction: 0.4}
+bottle_types:
+  plain: {radius: 0.05, mass: 0.1, material: glass}
+belts:
+  a: {kind: straight, start: [0, 0], angle: 0, length: 1, width: 0.3, material: belt}
+  b: {kind: straight, start: [1, 0], angle: 0, length: 1, width: 0.3, material: belt}
+  c: {kind: straight, start: [2, 0], angle: 0, length: 1, width: 0.3, material: belt}
+bottles:
+  - {type: plain, position: [0.5, 0.15]}
+outputs: {bottles: 100, signals: 0}
+"""
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small line."""
+    folder = tmp_path_factory.mktemp("summary") / "small"
+    record(load_scene(SMALL_LINE), folder, TICKS)
+    return folder
+
+
+def shown(summary: Summary) -> str:
+    """As on a terminal."""
+    console = Console(width=200)
+    with console.capture() as captured:
+        console.print(render(summary))
+    return captured.get()
+
+
+def test_counts_are_those_of_the_simulation(tmp_path: Path) -> None:
+    simulation = record(load_scene(SMALL_LINE), tmp_path / "bag", TICKS)
+    summary = summarize(tmp_path / "bag", wall=0.5)
+    assert summary.simulated == pytest.approx(1.0)
+    assert summary.real_time_factor == pytest.approx(2.0)
+    assert summary.fed == simulation.counts.fed > 0
+    assert summary.removed == simulation.counts.removed > 0
+    assert summary.present == simulation.counts.present
+    on_belts = sum(flow.bottles for flow in summary.belts.values())
+    assert on_belts + summary.on_floor == summary.present
+    assert (summary.commands, summary.refused) == (5, 2)
+
+
+def test_a_long_hold_is_one_occasion(tmp_path: Path) -> None:
+    """A controller commands a belt in every scan that an operator holds, twice; a bad value beside that is a third."""
+    simulation = Simulation(load_scene(SMALL_LINE))
+    speed, device = "belts/straight/cmd_speed", "belts/straight"
+    with Recorder(tmp_path / "bag") as recorder:
+        outputs = Outputs(simulation, [recorder], run_id="run")
+        outputs.start()
+        for tick in range(60):
+            if tick % 20 == 0:
+                mode = MANUAL if tick % 40 == 0 else AUTOMATIC
+                simulation.give(Input("operate", "Jo", "operator", MODE, (device,), (float(mode),)))
+            simulation.command((speed,), (1e9 if tick == 30 else 0.2,))
+            simulation.advance()
+            outputs.after_tick()
+    summary = summarize(tmp_path / "bag")
+    assert (summary.commands, summary.refused, summary.occasions) == (63, 41, 3)
+    assert "63 recorded, 41 refused on 3 occasions" in shown(summary)
+
+
+def test_forces_are_of_all_recorded_peaks(bag: Path) -> None:
+    with open_bag(bag) as opened:
+        peaks = np.concatenate([frame.data.peak_force for frame in opened.bottles()])
+    summary = summarize(bag)
+    assert summary.peak_force == peaks.max() > 0.0
+    assert summary.peak_force_99 == np.percentile(peaks[peaks > 0.0], 99.0)
+
+
+def test_the_prediction_is_told_with_what_was_reached(bag: Path) -> None:
+    summary = summarize(bag)
+    model = build_model(load_scene(SMALL_LINE))
+    assert summary.setting == f"leapfrog, dt = 100 us: {model.dt_reason}"
+    assert summary.predicted == model.prediction.sentence
+    assert summary.achieved is not None
+    assert summary.achieved.peak_force == summary.peak_force
+    assert summary.achieved.expected_force == model.prediction.force
+
+
+def test_a_recording_is_told_the_errors_of_the_steps_it_ran_with(bag: Path, tmp_path: Path) -> None:
+    def lengthen(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.integrator, message.steps_per_tick = "leapfrog", 20
+
+    ran = {"accuracy": {"integrator": "leapfrog", "per_tick": 20}}
+    summary = summarize(edited(bag, tmp_path / "older", lengthen))
+    assert summary.predicted == build_model(load_scene(SMALL_LINE, ran)).prediction.sentence
+    assert summary.predicted != summarize(bag).predicted
+    assert summary.limit is None
+
+
+def test_a_recording_that_this_version_refuses_has_no_prediction(bag: Path, tmp_path: Path) -> None:
+    def wrong(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.integrator = "half_explicit_euler"
+
+    summary = summarize(edited(bag, tmp_path / "foreign", wrong))
+    assert summary.predicted is None
+    assert summary.achieved is None
+    assert summary.peak_force is not None
+    assert (summary.fed, summary.removed, summary.rejected) == (None, None, None)
+    assert "not known fed, not known removed, " in shown(summary)
+
+
+def test_what_sets_the_steps_is_told(bag: Path, tmp_path: Path) -> None:
+    expected = step_limit(load_scene(SMALL_LINE))
+    assert expected.lines != []
+    summary = summarize(bag)
+    assert summary.limit == expected
+    assert json.loads(write_summary(summary, tmp_path).read_text())["steps"] == expected.lines
+
+
+def test_foreign_text_in_a_recording_is_told_in_printable_words(bag: Path, tmp_path: Path) -> None:
+    def forge(topic: str, message: Any) -> None:
+        if topic == "line":
+            message.scene_name = "plant\nguard  nothing to report\x1b[2J" + "x" * 5000
+            message.dt_reason = "\r\x1b]0;title\x07" + "y" * 5_000_000
+
+    summary = summarize(edited(bag, tmp_path / "forged", forge))
+    assert summary.scene.isprintable() and len(summary.scene) == 200
+    assert summary.setting.isprintable() and len(summary.setting) == 2000
+
+
+def test_messages_and_bytes_are_counted_by_topic(bag: Path) -> None:
+    with open_bag(bag) as opened:
+        sizes = [len(data) for topic, _, data in opened.raw() if topic == "contacts"]
+    count = summarize(bag).topics["contacts"]
+    assert (count.messages, count.bytes) == (len(sizes), sum(sizes))
+
+
+def ring(scene: Scene, tmp_path: Path, belt_of: Any) -> Path:
+    """A recording of one bottle in which `belt_of(tick)` says on which belt it is."""
+    record(scene, tmp_path / "still", 60)
+
+    def move(topic: str, message: Any) -> None:
+        if topic == "bottles":
+            message.belt = np.array([belt_of(message.tick)], dtype=np.int32)
+
+    return edited(tmp_path / "still", tmp_path / "moving", move)
+
+
+def test_rounds_of_a_loop_are_counted_where_bottles_return(tmp_path: Path) -> None:
+    """Once round in 15 ticks: it comes back to `a` at ticks 15, 30, 45 and 60, the last two in the second half."""
+    summary = summarize(ring(parse_scene(THREE_BELTS), tmp_path, lambda tick: tick // 5 % 3))
+    assert summary.loop is not None
+    assert (summary.loop.belt, summary.loop.returns) == ("a", 4)
+    assert summary.loop.per_minute == pytest.approx(400.0)
+    assert summary.loop.per_minute_second_half == pytest.approx(400.0)
+    assert summary.belts["b"].per_minute == pytest.approx(400.0)
+    assert summary.fed == 0
+
+
+def test_to_and_fro_between_two_belts_is_no_loop(tmp_path: Path) -> None:
+    summary = summarize(ring(parse_scene(THREE_BELTS), tmp_path, lambda tick: tick // 5 % 2))
+    assert summary.loop is None
+    assert summary.belts["a"].per_minute == pytest.approx(600.0)
+
+
+def test_bottles_of_machines_count_too(tmp_path: Path) -> None:
+    """A source and a sink; sums go by what a signal counts, not by its name."""
+    buffer_lane = Path(__file__).parents[2] / "config" / "scenarios" / "buffer_lane.yaml"
+    simulation = record(load_scene(buffer_lane, {"duration": 5.0}), tmp_path / "bag", 500)
+    summary = summarize(tmp_path / "bag")
+    assert (summary.fed, summary.removed) == (simulation.counts.fed, simulation.counts.removed)
+    assert min(simulation.counts.fed, simulation.counts.removed) > 5
+    assert summary.rejected == 0
+
+
+def test_what_was_not_recorded_is_not_made_up(tmp_path: Path) -> None:
+    record(load_scene(SMALL_LINE, {"outputs": {"signals": 0}}), tmp_path / "bag", 10)
+    summary = summarize(tmp_path / "bag")
+    assert summary.fed is None
+    assert "not recorded fed, not recorded removed, " in shown(summary)
+    assert summary.energy is None
+    assert summary.wall is None
+    assert summary.real_time_factor is None
+
+
+def test_the_energy_ledger_is_told_with_the_work_of_each_belt(tmp_path: Path) -> None:
+    simulation = record(load_scene(SMALL_LINE, {"outputs": {"ledger": 20}}), tmp_path / "bag", TICKS)
+    ledger, summary = simulation.ledger(), summarize(tmp_path / "bag")
+    assert ledger is not None and summary.energy is not None
+    assert summary.energy.belts == dict(zip(["straight", "turn"], ledger.belt_work.tolist(), strict=False))
+    assert summary.energy.belts["straight"] > 0.0
+    came = sum(summary.energy.belts.values()) + summary.energy.fed + summary.energy.residual
+    dissipated = summary.energy.base_friction + summary.energy.contact_friction + summary.energy.damping
+    assert came - dissipated - summary.energy.removed == pytest.approx(summary.energy.stored)
+    text = shown(summary)
+    assert f"% of a turnover of {ledger.turnover:.4g} J" in text
+    assert f"{ledger.belt_work[0]:.4g}" in text
+    assert json.loads(write_summary(summary, tmp_path).read_text())["energy"]["residual"] == ledger.residual
+
+
+def test_summary_is_written_as_json(bag: Path, tmp_path: Path) -> None:
+    summary = summarize(bag, wall=2.0)
+    content = json.loads(write_summary(summary, tmp_path).read_text())
+    assert content["real_time_factor"] == pytest.approx(0.5)
+    assert content["topics"]["bottles"]["messages"] == 51
+    assert content["belts"].keys() == {"straight", "turn"}
+
+
+def test_summary_can_be_read_on_a_terminal(bag: Path) -> None:
+    summary = summarize(bag, wall=2.0)
+    text = shown(summary)
+    bottles = f"{summary.fed} fed, {summary.removed} removed, {summary.present} present"
+    for words in (
+        "small_line",
+        "peak force of impacts",
+        "peak force",
+        "real-time factor",
+        "0.50",
+        bottles,
+        "straight",
+        "signals",
+        "2 refused",
+    ):
+        assert words in text
