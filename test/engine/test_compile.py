@@ -61,7 +61,12 @@ def copied(tmp_path: Path) -> Path:
 def python(folder: Path, code: str, **variables: str) -> list[str]:
     """Output of a new interpreter that imports from a folder, with its cache there unless said otherwise."""
     kept = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
-    environment = {**kept, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache"), **variables}
+    environment = {
+        **kept,
+        "PYTHONPATH": os.pathsep.join([str(folder), *kept.get("PYTHONPATH", "").split(os.pathsep)]),
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        **variables,
+    }
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True, check=True
     )

@@ -10,6 +10,7 @@ from typing import Any
 
 import numba
 import pytest
+from numba_source import relies_on
 
 from conveyor_sim.engine.compiler.kernel_folder import CHECKSUM, MAGIC, KernelFolder, NotCached, cached_only, checksum
 from conveyor_sim.engine.compiler.numba_internals.kernel_cache import KernelCache
@@ -158,6 +159,7 @@ def test_what_is_not_cached_is_not_compiled_where_that_is_not_wanted(file: Path)
     assert counts(compiled(file.parent)) == (0, 1)
 
 
+@relies_on("core/runtime/nrt.py: _Runtime.initialize", "core/caching.py: _Cache")
 def test_a_process_that_loads_a_kernel_needs_no_compiler_and_can_compile_another(tmp_path: Path) -> None:
     """A start that finds all kernels does without numba's tables of what it can compile."""
     program = tmp_path / "loading.py"
