@@ -23,7 +23,7 @@ from typing import IO
 from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
-from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.hosting.server_kinds import FACES
 
 CASE = "attacked"
 CORES = 2

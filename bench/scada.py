@@ -25,12 +25,12 @@ from conveyor_sim.columns.events import Event
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag, count
-from conveyor_sim.protocols.face import Settings
-from conveyor_sim.protocols.faces import FACES
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.serving import Serving
-from conveyor_sim.protocols.source import About, Control, Listeners, Shown
+from conveyor_sim.protocols.hosting.server_kinds import FACES
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.tags.scene_messages import Task
+from conveyor_sim.protocols.tags.scene_provider import SceneSource
+from conveyor_sim.protocols.tags.tag_provider import About, Control, Listeners, Shown
 from conveyor_sim.scene import load_scene
 
 CASE, TICKS = "faces", "ticks"

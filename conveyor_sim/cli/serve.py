@@ -15,11 +15,11 @@ from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.support.garbage import collected_later
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.bag_source import BagSource
-    from conveyor_sim.protocols.face import Settings, Stamps
-    from conveyor_sim.protocols.faces import Kind
-    from conveyor_sim.protocols.scene_source import SceneSource
-    from conveyor_sim.protocols.serving import Serving
+    from conveyor_sim.protocols.hosting.server_kinds import Kind
+    from conveyor_sim.protocols.hosting.serving import Serving
+    from conveyor_sim.protocols.server.interface import Settings, Stamps
+    from conveyor_sim.protocols.tags.bag_provider import BagSource
+    from conveyor_sim.protocols.tags.scene_provider import SceneSource
     from conveyor_sim.ros.node_source import NodeSource
 
     Source = SceneSource | BagSource | NodeSource
@@ -122,11 +122,11 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
     port. Ctrl-C ends it.
     """
     with collected_later():
-        from conveyor_sim.protocols.face import Settings
-        from conveyor_sim.protocols.faces import FACES
-        from conveyor_sim.protocols.limit_options import limit_settings
-        from conveyor_sim.protocols.server_child import ServerChild
-        from conveyor_sim.protocols.serving import Serving
+        from conveyor_sim.protocols.hosting.limit_options import limit_settings
+        from conveyor_sim.protocols.hosting.server_child import ServerChild
+        from conveyor_sim.protocols.hosting.server_kinds import FACES
+        from conveyor_sim.protocols.hosting.serving import Serving
+        from conveyor_sim.protocols.server.interface import Settings
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     chosen: list[tuple[Kind, Any]] = [(kind, place) for kind in FACES if (place := given[kind.name]) is not None]
@@ -224,8 +224,8 @@ def scene_source(
     """
     from conveyor_sim.bag.folder import require_recordable
     from conveyor_sim.bag.recorder import run_folder
-    from conveyor_sim.protocols.scene_messages import Task
-    from conveyor_sim.protocols.scene_source import SceneSource
+    from conveyor_sim.protocols.tags.scene_messages import Task
+    from conveyor_sim.protocols.tags.scene_provider import SceneSource
     from conveyor_sim.scene import load_scene
     from conveyor_sim.support.resources import scene_path
     from conveyor_sim.support.stop_request import StopRequest
@@ -251,7 +251,7 @@ def scene_source(
 
 
 def _bag(path: Path, console: Console, speed: float, loop: bool) -> BagSource:
-    from conveyor_sim.protocols.bag_source import BagSource
+    from conveyor_sim.protocols.tags.bag_provider import BagSource
 
     return BagSource(path, console.print, speed=speed, loop=loop)
 

@@ -19,8 +19,8 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.protocols.source import MOST_WAITING, Control
-from conveyor_sim.protocols.view import DRAWN, HEARD, View, ViewError, decoded
+from conveyor_sim.protocols.tags.line_mirror import DRAWN, HEARD, View, ViewError, decoded
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros
 from conveyor_sim.ros.direct import Aside, WaitSet, take_message
 from conveyor_sim.ros.publishers import message_class, ros_qos

@@ -9,15 +9,15 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.face import Face, Stamps
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
-from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.server.interface import Face, Stamps
 from conveyor_sim.support.modbus_rows import Row
 
 if TYPE_CHECKING:
     from conveyor_sim.protocols.modbus.server import ModbusServer
     from conveyor_sim.protocols.opcua.server import OpcUaServer
-    from conveyor_sim.protocols.users import Role
+    from conveyor_sim.protocols.server.users import Role
     from conveyor_sim.testing.scenario import Scenario
 
 MODBUS_MISSING = "pymodbus is not installed: pip install 'conveyor_sim[scada]'"
@@ -85,7 +85,7 @@ class OpcUaFaces(_Faces, AbstractContextManager["OpcUaFaces"]):
         FaceError if there is no port, ImportError without asyncua.
         """
         from conveyor_sim.protocols.opcua.server import OpcUaServer
-        from conveyor_sim.protocols.users import new_user
+        from conveyor_sim.protocols.server.users import new_user
 
         known = {name: new_user(role, password) for name, (role, password) in (users or {}).items()}
         server = OpcUaServer(line.source(), known, stamps=stamps, certificates=Path(self._folder.name) / "own")

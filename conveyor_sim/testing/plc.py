@@ -1,6 +1,6 @@
 """`AttachedPlc`: a soft PLC as the controller of a line under test, as a client of a server that the test runs.
 
-It goes in lockstep by two tags (protocols/handshake.py), so the test has the same bits however fast the PLC is.
+It goes in lockstep by two tags (protocols/tags/handshake.py), so the test has the same bits however fast the PLC is.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
 from conveyor_sim.line.inputs import SET
-from conveyor_sim.protocols.face import Face
-from conveyor_sim.protocols.handshake import TARGET, HandshakeSource
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TagSource
+from conveyor_sim.protocols.server.interface import Face
+from conveyor_sim.protocols.tags.handshake import TARGET, HandshakeSource
+from conveyor_sim.protocols.tags.tag_provider import TagSource
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.child_process import Process
 from conveyor_sim.support.modbus_rows import Row
@@ -125,7 +125,7 @@ def modbus(rows: Sequence[Row] | None, port: int) -> Callable[[TagSource, Path],
 def opcua(password: str, port: int) -> Callable[[TagSource, Path], Face]:
     """What makes the server of an OPC UA client. Raises ImportError without asyncua."""
     from conveyor_sim.protocols.opcua.server import OpcUaServer
-    from conveyor_sim.protocols.users import new_user
+    from conveyor_sim.protocols.server.users import new_user
 
     users = {USER: new_user("controller", password)}
     return lambda source, folder: OpcUaServer(source, users, port=port, certificates=folder / "certificates")

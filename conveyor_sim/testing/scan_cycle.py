@@ -24,8 +24,8 @@ from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing.conditions import Present
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.face import Face
-    from conveyor_sim.protocols.source import TagSource
+    from conveyor_sim.protocols.server.interface import Face
+    from conveyor_sim.protocols.tags.tag_provider import TagSource
     from conveyor_sim.ros.attached import AttachedNode
     from conveyor_sim.testing.plc import AttachedPlc
     from conveyor_sim.testing.plc_server import ServedPlc

@@ -18,7 +18,7 @@ from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
-from conveyor_sim.protocols.source import FACES, TickSource
+from conveyor_sim.protocols.tags.tag_provider import FACES, TickSource
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.modbus_rows import Row

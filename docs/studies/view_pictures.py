@@ -20,9 +20,9 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import sync_playwright
 
 from conveyor_sim.page.one_file import Failure, write_page
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.users import keep_user, new_user
+from conveyor_sim.protocols.server.users import keep_user, new_user
+from conveyor_sim.protocols.tags.scene_messages import Task
+from conveyor_sim.protocols.tags.scene_provider import SceneSource
 from conveyor_sim.run.runner import run_scene
 from conveyor_sim.scene import load_scene
 from conveyor_sim.support.resources import scene_path

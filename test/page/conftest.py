@@ -14,9 +14,9 @@ from page.live_line import PASSWORD, PEOPLE, Live
 from protocols.waiting import PATIENCE
 
 from conveyor_sim.page.one_file import Failure, write_page
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.users import keep_user, new_user
+from conveyor_sim.protocols.server.users import keep_user, new_user
+from conveyor_sim.protocols.tags.scene_messages import Task
+from conveyor_sim.protocols.tags.scene_provider import SceneSource
 from conveyor_sim.scene import load_scene
 
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")

@@ -9,10 +9,10 @@ from typing import Any
 from page.pixels import settled
 from protocols.waiting import until
 
-from conveyor_sim.protocols.face import Settings
-from conveyor_sim.protocols.faces import FACES
-from conveyor_sim.protocols.serving import Serving
-from conveyor_sim.protocols.users import Role
+from conveyor_sim.protocols.hosting.server_kinds import FACES
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.server.users import Role
 
 WEB = next(kind for kind in FACES if kind.name == "web")
 PEOPLE: dict[str, Role] = {"vic": "viewer", "jo": "operator", "tess": "test"}

@@ -21,10 +21,10 @@ pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install con
 
 from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeError
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.quotas import QUOTA, share_of_guests
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.server.quotas import QUOTA, share_of_guests
 from conveyor_sim.protocols.web import feed, server
 from conveyor_sim.protocols.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer
 from conveyor_sim.protocols.web.tls import server_context

@@ -28,11 +28,11 @@ from protocols.waiting import until
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.protocols.bag_source import BagSource
-from conveyor_sim.protocols.face import Settings
-from conveyor_sim.protocols.scene_messages import Task
-from conveyor_sim.protocols.scene_source import SceneSource
-from conveyor_sim.protocols.serving import Serving
+from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.tags.bag_provider import BagSource
+from conveyor_sim.protocols.tags.scene_messages import Task
+from conveyor_sim.protocols.tags.scene_provider import SceneSource
 from conveyor_sim.scene import load_scene
 
 pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import pytest
 
-from conveyor_sim.protocols.source import TickSource
-from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.tags.line_mirror import PictureSource
+from conveyor_sim.protocols.tags.tag_provider import TickSource
 from conveyor_sim.protocols.web.commands import Commands, Person
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation

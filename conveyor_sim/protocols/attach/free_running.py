@@ -21,9 +21,9 @@ from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.attach.link import Link, LinkError
 from conveyor_sim.protocols.attach.links import all_of, link
 from conveyor_sim.protocols.attach.tag_map import TagMap, read_tag_map
-from conveyor_sim.protocols.face import Face, Status
-from conveyor_sim.protocols.faces import Kind
-from conveyor_sim.protocols.source import PLC, Shown, TagSource
+from conveyor_sim.protocols.hosting.server_kinds import Kind
+from conveyor_sim.protocols.server.interface import Face, Status
+from conveyor_sim.protocols.tags.tag_provider import PLC, Shown, TagSource
 from conveyor_sim.support.printable import SENTENCE, printable
 
 AGAIN = 1.0

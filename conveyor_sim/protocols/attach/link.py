@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.server.interface import FaceError
 
 PATIENCE = 5.0
 """s of wall time that a PLC has for each request."""

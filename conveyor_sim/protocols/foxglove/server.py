@@ -21,8 +21,8 @@ from conveyor_sim.bag.markers import bottles_markers, plant_markers
 from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
-from conveyor_sim.protocols.face import FaceError, Status
-from conveyor_sim.protocols.view import DRAWN, HEARD, PictureSource
+from conveyor_sim.protocols.server.interface import FaceError, Status
+from conveyor_sim.protocols.tags.line_mirror import DRAWN, HEARD, PictureSource
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.scene.geometry import belt_shapes, rail_shapes
 from conveyor_sim.scene.marks import marks_of

@@ -28,13 +28,13 @@ from conveyor_sim.line.authority import MAY
 from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
 from conveyor_sim.line.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS
-from conveyor_sim.protocols.face import HERE, FaceError, Status, require_free
-from conveyor_sim.protocols.hands import objection, refused_for_good
-from conveyor_sim.protocols.handshake import MAY_GO_ON, TARGET, TICK
-from conveyor_sim.protocols.holding import Holding, HoldingService
 from conveyor_sim.protocols.modbus.address_map import SET_MODE
-from conveyor_sim.protocols.quotas import GUEST, QUOTA, Place, Places, Quota
-from conveyor_sim.protocols.source import MODBUS, TagSource
+from conveyor_sim.protocols.server.interface import HERE, FaceError, Status, require_free
+from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, Place, Places, Quota
+from conveyor_sim.protocols.tags.control_mode import objection, refused_for_good
+from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET, TICK
+from conveyor_sim.protocols.tags.holding import Holding, HoldingService
+from conveyor_sim.protocols.tags.tag_provider import MODBUS, TagSource
 from conveyor_sim.support.modbus_rows import Row, Table, decode, encode
 
 MOST_UNREAD = 64 * 1024

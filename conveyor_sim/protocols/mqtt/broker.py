@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.source import About
+from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.tags.tag_provider import About
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
 

@@ -17,9 +17,6 @@ from types import MappingProxyType
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import FaceError, Stamps, Status
-from conveyor_sim.protocols.holding import HoldingService
 from conveyor_sim.protocols.mqtt.birth_numbers import BirthNumbers
 from conveyor_sim.protocols.mqtt.broker import Broker
 from conveyor_sim.protocols.mqtt.commands import SILENCE, Commands
@@ -27,7 +24,10 @@ from conveyor_sim.protocols.mqtt.hosts import PrimaryHost
 from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics
 from conveyor_sim.protocols.mqtt.link import MOST_BYTES, NEWEST, OLDEST, Link, LinkError, Message, TooNewError
 from conveyor_sim.protocols.mqtt.session import BETWEEN, Names, Session, death
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.server.interface import FaceError, Stamps, Status
+from conveyor_sim.protocols.tags.holding import HoldingService
+from conveyor_sim.protocols.tags.tag_provider import Shown, TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 MOST_BEHIND = 200
 """Ticks that wait to be sent; one more, and the last of them gives way to it."""

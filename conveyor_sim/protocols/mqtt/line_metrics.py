@@ -9,9 +9,6 @@ from typing import Any, NamedTuple
 
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.line.tag import COMMANDS, SIGNALS, Tag, count, seconds
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.hands import is_mode
-from conveyor_sim.protocols.handshake import TICK
 from conveyor_sim.protocols.mqtt.payload import (
     BOOLEAN,
     DOUBLE,
@@ -26,7 +23,10 @@ from conveyor_sim.protocols.mqtt.payload import (
     add_property,
     whole,
 )
-from conveyor_sim.protocols.source import About, Shown
+from conveyor_sim.protocols.tags.control_mode import is_mode
+from conveyor_sim.protocols.tags.handshake import TICK
+from conveyor_sim.protocols.tags.tag_provider import About, Shown
+from conveyor_sim.protocols.tags.tick_clock import Clock
 from conveyor_sim.support.rounded_limit import at_limit
 
 FORCED = "forced"

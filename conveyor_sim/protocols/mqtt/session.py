@@ -11,7 +11,7 @@ from conveyor_sim.protocols.mqtt.commands import REBIRTH, Commands
 from conveyor_sim.protocols.mqtt.line_metrics import LineMetrics, is_there, milliseconds
 from conveyor_sim.protocols.mqtt.link import Link
 from conveyor_sim.protocols.mqtt.payload import BOOLEAN, INT32, INT64, STRING, Payload, add_metric, add_property
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import Shown
 
 NAMESPACE = "spBv1.0"
 DEVICE = "line"

@@ -13,8 +13,8 @@ from conveyor_sim.protocols.opcua.browsing import Views
 from conveyor_sim.protocols.opcua.filters import filter_units
 from conveyor_sim.protocols.opcua.items import CHANGE_UNITS, size_of
 from conveyor_sim.protocols.opcua.limits import Limits
-from conveyor_sim.protocols.quotas import share_of_guests
-from conveyor_sim.protocols.work import Budget
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.quotas import share_of_guests
 
 Codes = ua.StatusCodes
 

@@ -13,12 +13,12 @@ from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import NEVER, WAITING, AlarmState
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.methods import ALARM_METHODS, ALARM_STATES, add_alarm_methods
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id, nothing
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import Shown
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 MOST_OBJECTS = 4000
 """One for each alarm that there ever was; those that come after so many have events, and no object."""

@@ -15,13 +15,13 @@ from asyncua.server.history import HistoryStorageInterface
 
 from conveyor_sim.errors import BagError
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import FaceError
 from conveyor_sim.protocols.opcua.nodes import NEVER, name_of
 from conveyor_sim.protocols.opcua.tree import is_shown
 from conveyor_sim.protocols.opcua.values import as_variant
-from conveyor_sim.protocols.past import Past
-from conveyor_sim.protocols.source import TagSource
+from conveyor_sim.protocols.server.interface import FaceError
+from conveyor_sim.protocols.tags.tag_history import Past
+from conveyor_sim.protocols.tags.tag_provider import TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 from conveyor_sim.support.printable import printable
 
 MOST_VALUES = 10_000

@@ -11,10 +11,10 @@ from asyncua import Node, ua
 from asyncua.common.events import get_event_obj_from_type_node
 
 from conveyor_sim.columns.events import Event
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, node_id
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import Shown, TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 TYPE = "LineEventType"
 

@@ -16,7 +16,7 @@ from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
-from conveyor_sim.protocols.source import Control, TagSource
+from conveyor_sim.protocols.tags.tag_provider import Control, TagSource
 
 ALARM_STATES = "alarm_states"
 """Id of the object that holds an object for each alarm."""

@@ -18,13 +18,13 @@ from asyncua.crypto.permission_rules import User
 from conveyor_sim.line.inputs import MODE, SET
 from conveyor_sim.line.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin
 from conveyor_sim.protocols.opcua.packml_admin import NAME as ADMIN
 from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import Shown, TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 from conveyor_sim.support.rounded_limit import at_limit, single
 
 NODESET = Path(__file__).parent / "nodesets" / "Opc.Ua.PackML.NodeSet2.xml"

@@ -14,10 +14,10 @@ from asyncua.common.copy_node_util import _copy_node
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.line.alarms.alarm import WAITING, AlarmState
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import NEVER, node_id
 from conveyor_sim.protocols.opcua.values import unit_of
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import Shown
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 NAME = "Admin"
 

@@ -6,7 +6,7 @@ from asyncua import ua
 from asyncua.server.internal_server import InternalServer
 
 from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
-from conveyor_sim.protocols.quotas import Quota
+from conveyor_sim.protocols.server.quotas import Quota
 
 _CAPABILITIES = "Server_ServerCapabilities_"
 

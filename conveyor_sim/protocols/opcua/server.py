@@ -13,9 +13,6 @@ from typing import Any
 from asyncua import ua
 from asyncua.crypto.permission_rules import SimpleRoleRuleset, UserRole
 
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.face import HERE, FaceError, Stamps, Status, require_free
-from conveyor_sim.protocols.opcua.certificates import default_folder, identity
 from conveyor_sim.protocols.opcua.conditions import AlarmStates
 from conveyor_sim.protocols.opcua.emitter import Emitter
 from conveyor_sim.protocols.opcua.history import History, require_tags
@@ -32,9 +29,12 @@ from conveyor_sim.protocols.opcua.transport import BoundedServer
 from conveyor_sim.protocols.opcua.tree import add_line
 from conveyor_sim.protocols.opcua.updates import Updates
 from conveyor_sim.protocols.opcua.weihenstephan import Weihenstephan
-from conveyor_sim.protocols.quotas import QUOTA, Places, Quota
-from conveyor_sim.protocols.source import OPCUA, TagSource
-from conveyor_sim.protocols.users import Logins, LoginService, User
+from conveyor_sim.protocols.server.certificates import default_folder, identity
+from conveyor_sim.protocols.server.interface import HERE, FaceError, Stamps, Status, require_free
+from conveyor_sim.protocols.server.quotas import QUOTA, Places, Quota
+from conveyor_sim.protocols.server.users import Logins, LoginService, User
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 POLICIES = [
     ua.SecurityPolicyType.NoSecurity,

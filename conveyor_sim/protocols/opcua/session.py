@@ -32,7 +32,7 @@ from conveyor_sim.protocols.opcua.requests import Codes, Requests
 from conveyor_sim.protocols.opcua.subscriptions import Subscriptions
 from conveyor_sim.protocols.opcua.transport import Connection, channel
 from conveyor_sim.protocols.opcua.well_formed import WellFormedSession, require_url
-from conveyor_sim.protocols.users import LoginService
+from conveyor_sim.protocols.server.users import LoginService
 
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 10.0, 60_000.0
 """ms, at which clients are sent what has changed."""

@@ -20,8 +20,8 @@ from asyncua.server.subscription_service import SubscriptionService
 
 from conveyor_sim.protocols.opcua.items import Items, size_of
 from conveyor_sim.protocols.opcua.limits import Limits
-from conveyor_sim.protocols.quotas import share_of_guests
-from conveyor_sim.protocols.work import Budget
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.quotas import share_of_guests
 
 Codes = ua.StatusCodes
 

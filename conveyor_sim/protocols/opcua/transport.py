@@ -16,8 +16,8 @@ from asyncua.ua.ua_binary import header_from_binary, uatcp_to_binary
 from conveyor_sim.protocols.opcua.client_certificates import without_issuers
 from conveyor_sim.protocols.opcua.limits import Limits
 from conveyor_sim.protocols.opcua.processor import CHUNK, ConnectionLimits, Processor
-from conveyor_sim.protocols.quotas import GREETED, OPENED, Place, Places
-from conveyor_sim.protocols.work import Budget
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.quotas import GREETED, OPENED, Place, Places
 
 ACTIVATION = 30.0
 """s that a connection has for beginning a session, and may stay without one."""

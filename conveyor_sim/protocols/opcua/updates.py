@@ -13,12 +13,12 @@ from asyncua import ua
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.clock import Clock
-from conveyor_sim.protocols.handshake import TARGET, TICK
 from conveyor_sim.protocols.opcua.nodes import Nodes
 from conveyor_sim.protocols.opcua.tree import VALUE_AS_TEXT, WRITTEN_AT, WRITTEN_BY, has_text, is_shown
 from conveyor_sim.protocols.opcua.values import as_variant, status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.handshake import TARGET, TICK
+from conveyor_sim.protocols.tags.tag_provider import Shown, TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 MOST_BEHIND = 200
 """Ticks that wait to be brought in; one more, and the last of them gives way to it."""

@@ -8,7 +8,7 @@ from asyncua import ua
 
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.source import Shown
+from conveyor_sim.protocols.tags.tag_provider import Shown
 
 _WHOLE = {ua.VariantType.UInt32: (0, 2**32 - 1), ua.VariantType.Int32: (-(2**31), 2**31 - 1)}
 

@@ -12,10 +12,10 @@ from asyncua import ua
 
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.line.weihenstephan import DATA_POINTS, data_points, names_of
-from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.opcua.nodes import Nodes, node_id
 from conveyor_sim.protocols.opcua.values import status_of
-from conveyor_sim.protocols.source import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import Shown, TagSource
+from conveyor_sim.protocols.tags.tick_clock import Clock
 
 NAME = "Weihenstephan"
 """Of the object below a machine."""

@@ -13,10 +13,10 @@ from conveyor_sim.line.authority import MAY, unauthorized
 from conveyor_sim.line.inputs import DECLARE, SET, Input, WriterKind
 from conveyor_sim.line.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
-from conveyor_sim.protocols.hands import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
-from conveyor_sim.protocols.source import WEB
-from conveyor_sim.protocols.users import Role
-from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.server.users import Role
+from conveyor_sim.protocols.tags.control_mode import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good
+from conveyor_sim.protocols.tags.line_mirror import PictureSource
+from conveyor_sim.protocols.tags.tag_provider import WEB
 
 OPERATIONS = tuple(operation for operation in MAY if operation != DECLARE)
 

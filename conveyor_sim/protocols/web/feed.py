@@ -17,7 +17,7 @@ from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.page.block import Content, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.recording import text
-from conveyor_sim.protocols.view import Picture, PictureSource
+from conveyor_sim.protocols.tags.line_mirror import Picture, PictureSource
 from conveyor_sim.protocols.web.line_story import LineStory
 from conveyor_sim.protocols.web.viewer import Viewer
 from conveyor_sim.scene import parse_overrides, parse_scene

@@ -7,8 +7,8 @@ from typing import Any
 
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.page.story import Story
-from conveyor_sim.protocols.source import Shown
-from conveyor_sim.protocols.view import Picture
+from conveyor_sim.protocols.tags.line_mirror import Picture
+from conveyor_sim.protocols.tags.tag_provider import Shown
 
 COUNTERS = 0.5
 """s of simulated time from one entry of the counters to the next, at least."""

@@ -15,15 +15,15 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from conveyor_sim.page.bundle import HEADERS, PAGE, page_files
 from conveyor_sim.page.own_host import is_own, is_same_origin
-from conveyor_sim.protocols.face import HERE, FaceError, Status, require_free
-from conveyor_sim.protocols.quotas import GUEST, QUOTA, Place, Places, Quota
-from conveyor_sim.protocols.source import WEB
-from conveyor_sim.protocols.users import Logins, LoginService, User
-from conveyor_sim.protocols.view import PictureSource
+from conveyor_sim.protocols.server.budget import Budget
+from conveyor_sim.protocols.server.interface import HERE, FaceError, Status, require_free
+from conveyor_sim.protocols.server.quotas import GUEST, QUOTA, Place, Places, Quota
+from conveyor_sim.protocols.server.users import Logins, LoginService, User
+from conveyor_sim.protocols.tags.line_mirror import PictureSource
+from conveyor_sim.protocols.tags.tag_provider import WEB
 from conveyor_sim.protocols.web.commands import NOBODY, Commands, Person
 from conveyor_sim.protocols.web.feed import Feed, text_message
 from conveyor_sim.protocols.web.viewer import Viewer
-from conveyor_sim.protocols.work import Budget
 
 MOST_CONNECTIONS = 256
 """At once, of pages and whatever else: for one more the oldest makes room that is no page."""

@@ -7,8 +7,8 @@ import ssl
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-from conveyor_sim.protocols.face import FaceError
-from conveyor_sim.protocols.opcua.certificates import KEY, default_folder, identity
+from conveyor_sim.protocols.server.certificates import KEY, default_folder, identity
+from conveyor_sim.protocols.server.interface import FaceError
 
 CHAIN = "certificate.pem"
 """In a folder, beside KEY: what an authority has signed, and the certificates that lead there."""

@@ -30,12 +30,12 @@ from conveyor_sim.bag.messages import Header, line_message
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.line.inputs import DISOWN, OWN
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import HANDSHAKE
-from conveyor_sim.protocols.quotas import QUOTA
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import MOST_WAITING, Control
-from conveyor_sim.protocols.view import View
+from conveyor_sim.protocols.server.interface import FaceError
+from conveyor_sim.protocols.server.quotas import QUOTA
+from conveyor_sim.protocols.tags.line_mirror import View
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 
 pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install conveyor-sim[scada]")
 

@@ -17,8 +17,8 @@ import pytest
 from protocols.waiting import PATIENCE, until
 
 from conveyor_sim.line.run_state import RUNNING, RunState
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TickSource
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.tags.tag_provider import TickSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

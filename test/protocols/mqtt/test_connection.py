@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import pytest
 from protocols.waiting import until
 
-from conveyor_sim.protocols.face import FaceError, Settings
-from conveyor_sim.protocols.faces import FACES
+from conveyor_sim.protocols.hosting.server_kinds import FACES
+from conveyor_sim.protocols.hosting.serving import Serving
 from conveyor_sim.protocols.mqtt import link
 from conveyor_sim.protocols.mqtt.broker import PASSWORD, broker_of
-from conveyor_sim.protocols.serving import Serving
-from conveyor_sim.protocols.source import About
+from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.tags.tag_provider import About
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from test.protocols.mqtt.kit import SCENE, SETPOINT, Stepped

@@ -17,11 +17,11 @@ from asyncua import ua
 from asyncua.sync import Client, SyncNode
 
 from conveyor_sim.line.run_state import RUNNING, RunState
-from conveyor_sim.protocols.face import Stamps
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import TickSource
-from conveyor_sim.protocols.users import User, new_user
+from conveyor_sim.protocols.server.interface import Stamps
+from conveyor_sim.protocols.server.users import User, new_user
+from conveyor_sim.protocols.tags.tag_provider import TickSource
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 

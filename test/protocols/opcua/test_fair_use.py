@@ -11,8 +11,8 @@ from asyncua.ua.ua_binary import struct_from_binary
 from protocols.waiting import alone
 
 from conveyor_sim.protocols.opcua.limits import Limits
-from conveyor_sim.protocols.quotas import Quota, share_of_guests
-from conveyor_sim.protocols.users import Logins
+from conveyor_sim.protocols.server.quotas import Quota, share_of_guests
+from conveyor_sim.protocols.server.users import Logins
 from test.protocols.opcua.conftest import PASSWORD, Line, Serve, refused
 from test.protocols.opcua.limit_clients import (
     TICK,

@@ -13,14 +13,14 @@ from asyncua import Client as AsyncClient
 from asyncua import ua
 from protocols.waiting import alone
 
-from conveyor_sim.protocols.face import FaceError
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua import session, transport
 from conveyor_sim.protocols.opcua.limits import Limits
 from conveyor_sim.protocols.opcua.processor import CHUNK
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.quotas import QUOTA
-from conveyor_sim.protocols.server_thread import ServerThread
-from conveyor_sim.protocols.source import MOST_WAITING
+from conveyor_sim.protocols.server.interface import FaceError
+from conveyor_sim.protocols.server.quotas import QUOTA
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING
 from test.protocols.opcua.conftest import PASSWORD, PATIENCE
 
 if TYPE_CHECKING:

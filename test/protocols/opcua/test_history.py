@@ -9,9 +9,9 @@ from asyncua import ua
 from asyncua.sync import Client
 from protocols.waiting import until
 
-from conveyor_sim.protocols.bag_source import BagSource
+from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.opcua.server import OpcUaServer
-from conveyor_sim.protocols.server_thread import ServerThread
+from conveyor_sim.protocols.tags.bag_provider import BagSource
 from conveyor_sim.testing.scenario import Scenario
 from test.protocols.opcua.conftest import PATIENCE, refused
 

@@ -10,7 +10,7 @@ import pytest
 from asyncua import Client, ua
 
 from conveyor_sim.protocols.opcua.limits import PUBLISHED, UNSUPPORTED, Limits
-from conveyor_sim.protocols.quotas import QUOTA
+from conveyor_sim.protocols.server.quotas import QUOTA
 from test.protocols.opcua.conftest import HISTORY, Line, Serve
 from test.protocols.opcua.limit_clients import TICK, Codes, code_of, connected, item, items_of, large_node
 
