@@ -27,7 +27,7 @@ from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag, count
 from conveyor_sim.protocols.hosting.server_kinds import FACES
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.tags.scene_messages import Task
 from conveyor_sim.protocols.tags.scene_provider import SceneSource
 from conveyor_sim.protocols.tags.tag_provider import About, Control, Listeners, Shown

@@ -37,7 +37,7 @@ def attach(scene: str, url: str, tags: Path, user: str, period: float, **of_scen
     with collected_later():
         from conveyor_sim.protocols.attach.free_running import of_plc
         from conveyor_sim.protocols.hosting.serving import Serving
-        from conveyor_sim.protocols.server.interface import Settings
+        from conveyor_sim.protocols.hosting.settings import Settings
 
     console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
     password = click.prompt("password", hide_input=True, err=True) if user else ""

@@ -17,7 +17,8 @@ from conveyor_sim.support.garbage import collected_later
 if TYPE_CHECKING:
     from conveyor_sim.protocols.hosting.server_kinds import Kind
     from conveyor_sim.protocols.hosting.serving import Serving
-    from conveyor_sim.protocols.server.interface import Settings, Stamps
+    from conveyor_sim.protocols.hosting.settings import Settings
+    from conveyor_sim.protocols.server.interface import Stamps
     from conveyor_sim.protocols.tags.bag_provider import BagSource
     from conveyor_sim.protocols.tags.scene_provider import SceneSource
     from conveyor_sim.ros.node_source import NodeSource

@@ -11,7 +11,7 @@ from protocols.waiting import until
 
 from conveyor_sim.protocols.hosting.server_kinds import FACES
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.server.users import Role
 
 WEB = next(kind for kind in FACES if kind.name == "web")

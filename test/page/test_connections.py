@@ -23,7 +23,8 @@ from aiohttp import ClientSession, WSCloseCode, WSMsgType, WSServerHandshakeErro
 
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.server.interface import FaceError
 from conveyor_sim.protocols.server.quotas import QUOTA, share_of_guests
 from conveyor_sim.protocols.web import feed, server
 from conveyor_sim.protocols.web.server import LONGEST_REQUEST, MOST_CONNECTIONS, MOST_REQUESTS, WebServer

@@ -29,7 +29,7 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.tags.bag_provider import BagSource
 from conveyor_sim.protocols.tags.scene_messages import Task
 from conveyor_sim.protocols.tags.scene_provider import SceneSource

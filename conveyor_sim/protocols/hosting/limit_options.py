@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.server.interface import FaceError
 from conveyor_sim.support.printable import printable
 
 _FIELDS: Mapping[str, tuple[str, ...]] = {

@@ -32,7 +32,8 @@ from conveyor_sim.protocols.hosting.server_messages import (
     Started,
     What,
 )
-from conveyor_sim.protocols.server.interface import FaceError, Health, Settings, Status
+from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.server.interface import FaceError, Health, Status
 from conveyor_sim.protocols.server.users import Logins
 from conveyor_sim.protocols.tags.holding import Holding
 from conveyor_sim.protocols.tags.line_mirror import PictureSource

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.hosting.shared_state import Shared
-from conveyor_sim.protocols.server.interface import HERE, Face, FaceError, Settings, require_free
+from conveyor_sim.protocols.server.interface import HERE, Face, FaceError, require_free
 from conveyor_sim.protocols.tags.tag_provider import MODBUS, MQTT, OPCUA, WEB, TagSource
+
+if TYPE_CHECKING:
+    from conveyor_sim.protocols.mqtt.broker import Broker
 
 _HERE = "conveyor_sim.protocols"
 
@@ -57,9 +61,7 @@ class Kind:
     def require_place(self, place: Any, settings: Settings) -> None:
         """Raises FaceError if it can't be on what its option says: before anything has been compiled for it."""
         if self.name == MQTT:
-            from conveyor_sim.protocols.mqtt.broker import broker_of
-
-            broker_of(place, settings).require_reachable()
+            _broker(place, settings).require_reachable()
         else:
             require_free(self.name, settings.host, place)
 
@@ -105,11 +107,21 @@ def _opcua(source: TagSource, port: int, settings: Settings, shared: Shared) -> 
 
 
 def _mqtt(source: TagSource, url: str, settings: Settings, shared: Shared) -> Face:
-    from conveyor_sim.protocols.mqtt.broker import broker_of
     from conveyor_sim.protocols.mqtt.edge_node import EdgeNode
 
-    broker, writes = broker_of(url, settings), _mqtt_writes(settings)
+    broker, writes = _broker(url, settings), _mqtt_writes(settings)
     return EdgeNode(source, broker, writes, settings.stamps, holding=shared.holding, before=shared.counts)
+
+
+def _broker(url: str, settings: Settings) -> Broker:
+    from conveyor_sim.protocols.mqtt.broker import broker_of
+
+    return broker_of(
+        url,
+        authority=settings.mqtt_ca,
+        password_file=settings.mqtt_password_file,
+        primary_host=settings.mqtt_primary_host,
+    )
 
 
 def _mqtt_writes(settings: Settings) -> WriterKind | None:

@@ -9,7 +9,8 @@ from typing import Any, Literal, NamedTuple
 
 from conveyor_sim.columns.events import Event
 from conveyor_sim.line.run_state import RunState
-from conveyor_sim.protocols.server.interface import Health, Settings, Status
+from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.server.interface import Health, Status
 from conveyor_sim.protocols.tags.tag_provider import Control
 
 LIFE_SIGN = 0.5

@@ -10,8 +10,9 @@ from typing import Any
 from conveyor_sim.protocols.hosting.server_child import ServerChild
 from conveyor_sim.protocols.hosting.server_host import ServerHost
 from conveyor_sim.protocols.hosting.server_kinds import Kind
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.hosting.thread_host import ThreadHost
-from conveyor_sim.protocols.server.interface import HERE, Health, Settings, Status
+from conveyor_sim.protocols.server.interface import HERE, Health, Status
 from conveyor_sim.protocols.server.users import Logins, read_users
 from conveyor_sim.protocols.tags.line_mirror import View
 from conveyor_sim.protocols.tags.tag_provider import TagSource

@@ -12,8 +12,9 @@ from typing import Any
 from conveyor_sim.protocols.hosting.loop_lag import beat
 from conveyor_sim.protocols.hosting.server_kinds import Kind
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.hosting.shared_state import Shared
-from conveyor_sim.protocols.server.interface import Face, Health, Settings, Status
+from conveyor_sim.protocols.server.interface import Face, Health, Status
 from conveyor_sim.protocols.server.users import Logins
 from conveyor_sim.protocols.tags.holding import Holding
 from conveyor_sim.protocols.tags.tag_provider import TagSource

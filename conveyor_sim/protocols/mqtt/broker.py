@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.server.interface import FaceError
 from conveyor_sim.protocols.tags.tag_provider import About
 from conveyor_sim.support.files import MB, FileError, read_file
 from conveyor_sim.support.printable import printable
@@ -78,8 +78,13 @@ class Broker:
             raise FaceError(f"{self.address}: can't be reached ({_reason(error)}), expected an MQTT broker") from error
 
 
-def broker_of(url: str, settings: Settings) -> Broker:
-    """The one that a URL and the settings of the face name. Raises FaceError, with what was given and expected."""
+def broker_of(
+    url: str, *, authority: Path | None = None, password_file: Path | None = None, primary_host: str = ""
+) -> Broker:
+    """Return the broker at `url`. The other parameters are the fields of `Broker` and the file of its password.
+
+    Raises FaceError.
+    """
     given = f"mqtt: {printable(url)} given"
     try:
         parts = urlsplit(url)
@@ -94,16 +99,16 @@ def broker_of(url: str, settings: Settings) -> Broker:
         )
     if parts.scheme not in _PORTS or not parts.hostname or parts.query or parts.fragment or len(names) > 2:
         raise FaceError(f"{given}, {EXPECTED}")
-    for name in (*names, settings.mqtt_primary_host or "none"):
+    for name in (*names, primary_host or "none"):
         if not _ID.fullmatch(name) or name == "STATE":
             raise FaceError(f"mqtt: {printable(name)} given as a name, expected letters, digits, or any of _ . : -")
     secured = parts.scheme == "mqtts"
-    if settings.mqtt_ca is not None and not secured:
+    if authority is not None and not secured:
         raise FaceError(f"--mqtt-ca: given with {parts.scheme}://, expected mqtts://")
     user = unquote(parts.username or "")
-    if settings.mqtt_password_file is not None and not user:
+    if password_file is not None and not user:
         raise FaceError("--mqtt-password-file: given without a user, expected mqtt://USER@HOST")
-    password = _password(settings.mqtt_password_file) if user else ""
+    password = _password(password_file) if user else ""
     group, node = (*names, "", "")[:2]
     return Broker(
         parts.hostname,
@@ -111,10 +116,10 @@ def broker_of(url: str, settings: Settings) -> Broker:
         secured,
         user,
         password,
-        settings.mqtt_ca,
+        authority,
         group,
         node,
-        settings.mqtt_primary_host,
+        primary_host,
     )
 
 

@@ -20,7 +20,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.protocols.hosting.server_kinds import FACES
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.server.interface import FaceError
 from conveyor_sim.protocols.tags.bag_provider import BagSource
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")

@@ -24,7 +24,7 @@ from protocols.waiting import PATIENCE, until
 
 from bench.scada import CHANGING, CLIENTS, EVERY, KINDS, TICK, Counting
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.hosting.settings import Settings
 
 ROOT = Path(__file__).parents[3]
 CHANGES = 200

@@ -18,9 +18,10 @@ from protocols.waiting import until
 
 from conveyor_sim.protocols.hosting.server_kinds import FACES
 from conveyor_sim.protocols.hosting.serving import Serving
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.mqtt import link
 from conveyor_sim.protocols.mqtt.broker import PASSWORD, broker_of
-from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.server.interface import FaceError
 from conveyor_sim.protocols.tags.tag_provider import About
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
@@ -235,23 +236,23 @@ def test_by_tls_only_to_a_broker_that_is_known(mosquitto: Callable[..., Mosquitt
         ("mqtt://host/a+b", {}, "mqtt: a+b given as a name, expected letters, digits, or any of _ . : -"),
         ("mqtt://host/STATE", {}, "mqtt: STATE given as a name"),
         ("mqtt://jo:sesame@host", {}, "mqtt: a password given in the URL, where all users of this machine see it"),
-        ("mqtt://host", {"mqtt_primary_host": "a/b"}, "mqtt: a/b given as a name"),
-        ("mqtt://host", {"mqtt_ca": Path("ca.pem")}, "--mqtt-ca: given with mqtt://, expected mqtts://"),
-        ("mqtt://host", {"mqtt_password_file": Path("word")}, "--mqtt-password-file: given without a user"),
-        ("mqtt://jo@host", {"mqtt_password_file": Path("/none")}, "/none: no such file, expected a file with the pass"),
+        ("mqtt://host", {"primary_host": "a/b"}, "mqtt: a/b given as a name"),
+        ("mqtt://host", {"authority": Path("ca.pem")}, "--mqtt-ca: given with mqtt://, expected mqtts://"),
+        ("mqtt://host", {"password_file": Path("word")}, "--mqtt-password-file: given without a user"),
+        ("mqtt://jo@host", {"password_file": Path("/none")}, "/none: no such file, expected a file with the pass"),
     ],
 )
 def test_what_can_not_be_is_one_sentence(url: str, settings: dict[str, object], sentence: str) -> None:
     with pytest.raises(FaceError) as caught:
-        broker_of(url, Settings(**settings))  # type: ignore[arg-type]
+        broker_of(url, **settings)  # type: ignore[arg-type]
     assert sentence in str(caught.value) and "sesame" not in str(caught.value)
 
 
 def test_the_group_is_the_place_of_the_line_and_the_node_its_name() -> None:
     about = About("zoned_line", "hall2/cell1/line7", 0.01, "2026-01-01T00:00:00Z", ())
-    assert broker_of("mqtt://host", Settings()).named(about) == ("hall2:cell1:line7", "zoned_line")
-    assert broker_of("mqtt://host/plant", Settings()).named(about) == ("plant", "zoned_line")
-    assert broker_of("mqtt://host/plant/a", Settings()).named(about) == ("plant", "a")
+    assert broker_of("mqtt://host").named(about) == ("hall2:cell1:line7", "zoned_line")
+    assert broker_of("mqtt://host/plant").named(about) == ("plant", "zoned_line")
+    assert broker_of("mqtt://host/plant/a").named(about) == ("plant", "a")
     nowhere = About("zoned_line", "", 0.01, "2026-01-01T00:00:00Z", ())
-    assert broker_of("mqtts://host/", Settings()).named(nowhere) == ("zoned_line", "zoned_line")
-    assert broker_of("mqtts://host/", Settings()).port == 8883
+    assert broker_of("mqtts://host/").named(nowhere) == ("zoned_line", "zoned_line")
+    assert broker_of("mqtts://host/").port == 8883

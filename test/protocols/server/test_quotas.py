@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.protocols.hosting.limit_options import limit_names, limit_settings
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.opcua.limits import Limits
 from conveyor_sim.protocols.server.budget import Budget
-from conveyor_sim.protocols.server.interface import FaceError, Settings
+from conveyor_sim.protocols.server.interface import FaceError
 from conveyor_sim.protocols.server.quotas import GREETED, GUEST, OPENED, Place, Places, Quota, share_of_guests
 
 HERE, THERE = "10.0.0.1", "10.0.0.2"

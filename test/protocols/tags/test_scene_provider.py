@@ -24,7 +24,7 @@ from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPE
 from conveyor_sim.protocols.hosting.frames import MOST_FRAMES, Frames
 from conveyor_sim.protocols.hosting.remote_provider import Calls, RemoteSource
 from conveyor_sim.protocols.hosting.server_messages import ServerTask
-from conveyor_sim.protocols.server.interface import Settings
+from conveyor_sim.protocols.hosting.settings import Settings
 from conveyor_sim.protocols.tags.line_mirror import decoded
 from conveyor_sim.protocols.tags.scene_messages import Task
 from conveyor_sim.protocols.tags.scene_provider import SceneSource
