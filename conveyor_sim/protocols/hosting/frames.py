@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from conveyor_sim.protocols.hosting.server_messages import LIFE_SIGN, LineFrame
 from conveyor_sim.protocols.server.interface import Health
-from conveyor_sim.protocols.tags.line_mirror import DRAWN, PictureSource
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import MOST_EVENTS
 
 MOST_FRAMES, MOST_BYTES = 100, 16 * 1024 * 1024
@@ -26,7 +26,7 @@ class Frames:
     to MOST_EVENTS events.
     """
 
-    def __init__(self, view: PictureSource, servers: Callable[[], tuple[Health, ...]] | None = None) -> None:
+    def __init__(self, view: DrawableProvider, servers: Callable[[], tuple[Health, ...]] | None = None) -> None:
         """Collect from now on; the first frame holds everything that the view shows.
 
         servers: returns the health of all protocol servers, which frames then carry every HEALTH seconds.
@@ -63,11 +63,13 @@ class Frames:
         return frame
 
     def watch(self, on: bool) -> None:
-        """Start or stop collecting the topics DRAWN as well."""
+        """Start or stop collecting the topics DRAWING_TOPICS as well."""
         with self._wake:
             self._watched = on
             if on:
-                self._states |= {topic: data for topic, data in dict(self._view.newest).items() if topic in DRAWN}
+                self._states |= {
+                    topic: data for topic, data in dict(self._view.newest).items() if topic in DRAWING_TOPICS
+                }
                 self._listen()
 
     def end(self) -> None:
@@ -112,7 +114,7 @@ class Frames:
             self._states = {topic: data for topic, data in newest.items() if topic != "events" and self._wants(topic)}
 
     def _wants(self, topic: str) -> bool:
-        return self._watched or topic not in DRAWN
+        return self._watched or topic not in DRAWING_TOPICS
 
     def _cut(self, states: dict[str, bytes], shown: int) -> LineFrame:
         view, passed, anew = self._view, tuple(self._passed), self._anew

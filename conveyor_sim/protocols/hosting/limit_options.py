@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from conveyor_sim.protocols.hosting.settings import Settings
-from conveyor_sim.protocols.server.interface import FaceError
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.server.interface import ServerError
 from conveyor_sim.support.printable import printable
 
 _FIELDS: Mapping[str, tuple[str, ...]] = {
@@ -15,7 +15,7 @@ _FIELDS: Mapping[str, tuple[str, ...]] = {
     "modbus": ("modbus_quota",),
     "web": ("web_quota",),
 }
-"""Fields of `Settings` by protocol."""
+"""Fields of `ServerSettings` by protocol."""
 
 _UNUSED = ("modbus.connections_per_user",)
 """Modbus has no users."""
@@ -25,7 +25,7 @@ _LARGEST = 1_000_000_000
 
 def limit_names() -> list[str]:
     """Return all names in the order of their declaration: "opcua.nodes_per_read"."""
-    settings = Settings()
+    settings = ServerSettings()
     names = [
         f"{protocol}.{name}"
         for protocol, fields in _FIELDS.items()
@@ -36,24 +36,24 @@ def limit_names() -> list[str]:
 
 
 def limit_settings(options: Iterable[str]) -> dict[str, Any]:
-    """Return the fields of `Settings` that options such as "opcua.connections=32" change.
+    """Return the fields of `ServerSettings` that options such as "opcua.connections=32" change.
 
-    Raises FaceError for an unknown name, a value that is no integer from 1 to 1 000 000 000, and a name given twice.
+    Raises ServerError for an unknown name, a value that is no integer from 1 to 1 000 000 000, and a name given twice.
     """
     settings: dict[str, Any] = {}
     names, seen = limit_names(), set()
     for option in options:
         name, _, text = option.partition("=")
         if name not in names:
-            raise FaceError(f"--limit: {printable(name)} given, expected one of {', '.join(names)}")
+            raise ServerError(f"--limit: {printable(name)} given, expected one of {', '.join(names)}")
         if name in seen:
-            raise FaceError(f"--limit: {name} given twice, expected once")
+            raise ServerError(f"--limit: {name} given twice, expected once")
         seen.add(name)
         if not (text.isascii() and text.isdigit()) or len(text) > 10 or not 1 <= int(text) <= _LARGEST:
-            raise FaceError(f"--limit: {name}={printable(text)} given, expected an integer from 1 to {_LARGEST}")
+            raise ServerError(f"--limit: {name}={printable(text)} given, expected an integer from 1 to {_LARGEST}")
         protocol, _, key = name.partition(".")
         for field in _FIELDS[protocol]:
-            present = settings.get(field, getattr(Settings(), field))
+            present = settings.get(field, getattr(ServerSettings(), field))
             if key in asdict(present):
                 settings[field] = replace(present, **{key: int(text)})
     return settings

@@ -1,4 +1,4 @@
-"""`RemoteSource`: the line as the process of a protocol server sees it; its parent has the line, logins and ownership.
+"""`RemoteTagProvider`: the line in the process of a protocol server. The parent has the line, logins and ownership.
 
 The parent decides on `give`, `control` and logins. The protocol server waits for the answer, because its client must
 get the reason for a refusal. An answer takes well below a millisecond: it comes from a thread of the parent that never
@@ -20,14 +20,20 @@ from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
-from conveyor_sim.protocols.hosting.server_messages import Answer, Call, LineFrame, ServerTask, What
+from conveyor_sim.protocols.hosting.server_messages import (
+    LineFrame,
+    ParentAnswer,
+    ParentCall,
+    ParentService,
+    ServerTask,
+)
 from conveyor_sim.protocols.server.users import User
-from conveyor_sim.protocols.tags.line_mirror import DRAWN, HEARD, View
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror
 from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.support.printable import SENTENCE, printable
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.tags.tag_history import Past
+    from conveyor_sim.protocols.tags.tag_history import TagHistory
 
 PATIENCE, LOGIN_PATIENCE = 1.0, 3.0
 """s of wall time that the parent has for an answer; checking a password takes about 0.05 s of processor time."""
@@ -42,7 +48,7 @@ class NoAnswerError(ConveyorError):
     """A request that the parent did not answer in time."""
 
 
-class Calls:
+class ParentCalls:
     """Requests to the parent. From any thread, several at a time."""
 
     def __init__(self, pipe: Connection) -> None:
@@ -53,12 +59,12 @@ class Calls:
         self._room = select.poll()
         self._room.register(pipe.fileno(), select.POLLOUT)
 
-    def ask(self, what: What, *arguments: Any, patience: float = PATIENCE) -> Any:
+    def ask(self, what: ParentService, *arguments: Any, patience: float = PATIENCE) -> Any:
         """Return the parent's answer. Raises NoAnswerError if none comes within `patience` seconds."""
         number = next(self._numbers)
         answer = self._waiting[number] = SimpleQueue()
         try:
-            if not self.send(Call(number, what, arguments, time.monotonic() + patience)):
+            if not self.send(ParentCall(number, what, arguments, time.monotonic() + patience)):
                 raise NoAnswerError("the process that has the line does not take requests")
             return answer.get(timeout=patience)
         except Empty:
@@ -66,9 +72,9 @@ class Calls:
         finally:
             del self._waiting[number]
 
-    def tell(self, what: What, *arguments: Any) -> None:
+    def tell(self, what: ParentService, *arguments: Any) -> None:
         """Send a request that needs no answer."""
-        self.send(Call(0, what, arguments, float("inf")))
+        self.send(ParentCall(0, what, arguments, float("inf")))
 
     def send(self, message: Any) -> bool:
         """Send any message; return False if it was dropped because the parent has not read for long."""
@@ -78,16 +84,16 @@ class Calls:
             self._pipe.send(message)
         return True
 
-    def take(self, answer: Answer) -> None:
+    def take(self, answer: ParentAnswer) -> None:
         """Pass an answer to the thread that waits for it. Called by the thread that reads the pipe."""
         if (waiting := self._waiting.get(answer.number)) is not None:
             waiting.put(answer.value)
 
 
-class RemoteSource(View):
+class RemoteTagProvider(LineMirror):
     """The line by the frames that the parent sends; one thread applies them."""
 
-    def __init__(self, task: ServerTask, calls: Calls, decode: Decode, past: Past | None) -> None:
+    def __init__(self, task: ServerTask, calls: ParentCalls, decode: Decode, past: TagHistory | None) -> None:
         """decode: decodes the message of a topic. past: history of the recording that is played back, if it is one."""
         super().__init__()
         self._task, self._calls, self._decode, self._past = task, calls, decode, past
@@ -99,7 +105,7 @@ class RemoteSource(View):
         return self._task.controls
 
     @property
-    def past(self) -> Past | None:
+    def past(self) -> TagHistory | None:
         """History of a recording; None otherwise."""
         return self._past
 
@@ -111,7 +117,7 @@ class RemoteSource(View):
         """Control the run, through the parent. Return the reason for a refusal, "" if it was accepted."""
         return self._ask("control", what, value, by)
 
-    def _ask(self, what: What, *arguments: Any) -> str:
+    def _ask(self, what: ParentService, *arguments: Any) -> str:
         try:
             return str(self._calls.ask(what, *arguments))
         except NoAnswerError as error:
@@ -131,11 +137,11 @@ class RemoteSource(View):
     def _apply(self, frame: LineFrame) -> None:
         if frame.anew:
             self.forget()
-        for topic in HEARD:
+        for topic in STATE_TOPICS:
             if (data := frame.states.get(topic)) is not None:
                 self.take(topic, self._decode(topic, data))
                 self.pass_on(topic, data)
-        for topic in DRAWN:
+        for topic in DRAWING_TOPICS:
             if (data := frame.states.get(topic)) is not None:
                 self.keep(topic, partial(self._decode, topic, data))
                 self.pass_on(topic, data)
@@ -158,7 +164,7 @@ class RemoteSource(View):
 class RemoteLogins:
     """The parent's `Logins`."""
 
-    def __init__(self, calls: Calls, has_users: bool) -> None:
+    def __init__(self, calls: ParentCalls, has_users: bool) -> None:
         self._calls, self.has_users = calls, has_users
 
     def enter(self, name: str, password: str, origin: str, now: float) -> User | None:
@@ -173,7 +179,7 @@ class RemoteLogins:
 class RemoteHolding:
     """The parent's `Holding` of this protocol."""
 
-    def __init__(self, calls: Calls) -> None:
+    def __init__(self, calls: ParentCalls) -> None:
         self._calls = calls
 
     @property
@@ -200,7 +206,7 @@ class RemoteHolding:
         """Release the line if that had to wait for room among the inputs."""
         self._calls.tell("look")
 
-    def _ask(self, what: What, otherwise: str, *arguments: str) -> str:
+    def _ask(self, what: ParentService, otherwise: str, *arguments: str) -> str:
         try:
             return str(self._calls.ask(what, *arguments))
         except NoAnswerError:

@@ -20,23 +20,23 @@ from urllib.parse import urlsplit
 
 from conveyor_sim.protocols.hosting.frames import Frames
 from conveyor_sim.protocols.hosting.server_child import ServerChild
-from conveyor_sim.protocols.hosting.server_kinds import Kind
+from conveyor_sim.protocols.hosting.server_kinds import ServerKind
 from conveyor_sim.protocols.hosting.server_messages import (
-    Answer,
-    Beat,
-    Call,
-    End,
-    Failed,
-    Report,
+    EndRequest,
+    Heartbeat,
+    ParentAnswer,
+    ParentCall,
+    ParentService,
+    ServerFailed,
+    ServerStarted,
     ServerTask,
-    Started,
-    What,
+    StatusRequest,
 )
-from conveyor_sim.protocols.hosting.settings import Settings
-from conveyor_sim.protocols.server.interface import FaceError, Health, Status
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.server.interface import Health, ServerError, Status
 from conveyor_sim.protocols.server.users import Logins
 from conveyor_sim.protocols.tags.holding import Holding
-from conveyor_sim.protocols.tags.line_mirror import PictureSource
+from conveyor_sim.protocols.tags.line_mirror import DrawableProvider
 from conveyor_sim.protocols.tags.tag_provider import WEB
 from conveyor_sim.support.child_process import how_it_ended
 
@@ -71,10 +71,10 @@ class ServerHost:
 
     def __init__(
         self,
-        kind: Kind,
+        kind: ServerKind,
         place: Any,
-        settings: Settings,
-        view: PictureSource,
+        settings: ServerSettings,
+        view: DrawableProvider,
         logins: Logins,
         say: Callable[[str], object],
         everyone: Callable[[], tuple[Health, ...]],
@@ -112,7 +112,7 @@ class ServerHost:
         """Raise ConveyorError, in one sentence, if it can't serve."""
         self._settled.wait()
         if self._failure:
-            raise FaceError(self._failure)
+            raise ServerError(self._failure)
 
     @property
     def address(self) -> str:
@@ -128,7 +128,7 @@ class ServerHost:
         """Return its activity over all its processes, as of the last heartbeat; fresh: as of now, if it answers."""
         if fresh:
             self._reported.clear()
-            self._send(Report())
+            self._send(StatusRequest())
             self._reported.wait(FRESH)
         before, now = self._before, self._now
         latency, self._latency = self._latency, 0.0
@@ -151,7 +151,7 @@ class ServerHost:
     def end(self) -> None:
         """Ask the protocol server to close its connections and end; `join` waits for that."""
         self._ending.set()
-        self._send(End())
+        self._send(EndRequest())
 
     def join(self) -> None:
         """Return once it has ended; a process that has not done so CLOSING seconds after `end` is killed."""
@@ -263,18 +263,18 @@ class ServerHost:
             if self._ending.is_set():
                 if not ending:
                     ending = now + CLOSING
-                    self._send(End())  # again, for a process that was started meanwhile
+                    self._send(EndRequest())  # again, for a process that was started meanwhile
                 elif now > ending:
                     process.kill()
             match message:
-                case Call():
+                case ParentCall():
                     self._do(message)
-                case Beat():
+                case Heartbeat():
                     self._take_beat(message)
-                case Started():
+                case ServerStarted():
                     started = True
                     self._take_address(message.address)
-                case Failed():
+                case ServerFailed():
                     return message.reason
             if message is None:
                 self._holding.look()
@@ -283,7 +283,7 @@ class ServerHost:
                 what = f"has not answered for {STALLED:g} s" if started else f"has not started within {START:g} s"
                 return f"{name}: the protocol server {what}, and was ended"
 
-    def _take_beat(self, message: Beat) -> None:
+    def _take_beat(self, message: Heartbeat) -> None:
         self._silent = 0.0
         self._now = message.status
         self._recent.append(message.lag)
@@ -300,14 +300,14 @@ class ServerHost:
             self._place = urlsplit(address).port  # the same one after a restart
         self._settled.set()
 
-    def _do(self, call: Call) -> None:
+    def _do(self, call: ParentCall) -> None:
         """Carry out a request, and answer it if an answer is expected."""
         if call.what == "enter":
             self._passwords.submit(self._enter, call, self._pipe)
             return
         if time.monotonic() > call.deadline:
             return  # it has been refused already
-        todo: dict[What, Callable[..., Any]] = {
+        todo: dict[ParentService, Callable[..., Any]] = {
             "give": self._view.give,
             "control": self._view.control,
             "holder": lambda: self._holding.holder,
@@ -322,15 +322,15 @@ class ServerHost:
         except Exception as error:  # rather a refusal than no answer
             answer = f"{type(error).__name__}: {error}"
         if call.number:
-            self._send(Answer(call.number, answer))
+            self._send(ParentAnswer(call.number, answer))
 
-    def _enter(self, call: Call, pipe: Connection | None) -> None:
+    def _enter(self, call: ParentCall, pipe: Connection | None) -> None:
         if time.monotonic() > call.deadline:
             return
         name, password, origin = call.arguments
         user = self._logins.enter(name, password, origin, time.monotonic())
         answer = None if user is None else user._replace(salt=b"", hash=b"")  # which stay here
-        self._send(Answer(call.number, answer), pipe)
+        self._send(ParentAnswer(call.number, answer), pipe)
 
     def _watch(self, on: bool) -> None:
         if on and self._end_watch is None:

@@ -8,10 +8,10 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.hosting.settings import Settings
-from conveyor_sim.protocols.hosting.shared_state import Shared
-from conveyor_sim.protocols.server.interface import HERE, Face, FaceError, require_free
-from conveyor_sim.protocols.tags.tag_provider import MODBUS, MQTT, OPCUA, WEB, TagSource
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.hosting.shared_state import SharedState
+from conveyor_sim.protocols.server.interface import HERE, ProtocolServer, ServerError, require_free
+from conveyor_sim.protocols.tags.tag_provider import MODBUS, MQTT, OPCUA, WEB, TagProvider
 
 if TYPE_CHECKING:
     from conveyor_sim.protocols.mqtt.broker import Broker
@@ -20,7 +20,7 @@ _HERE = "conveyor_sim.protocols"
 
 
 @dataclass(frozen=True)
-class Kind:
+class ServerKind:
     """One protocol."""
 
     name: str
@@ -31,9 +31,9 @@ class Kind:
     """Without which it can't be."""
     module: str
     """Module of the protocol server, which `make` imports."""
-    make: Callable[[TagSource, Any, Settings, Shared], Face]
+    make: Callable[[TagProvider, Any, ServerSettings, SharedState], ProtocolServer]
     """A face on what its option takes, not started. Raises ConveyorError."""
-    exposes: Callable[[Settings], str]
+    exposes: Callable[[ServerSettings], str]
     """What whoever reaches the port can do, for those who let other machines reach it: a half sentence."""
     by_default: bool = True
     """Whether it is served where none is named."""
@@ -54,12 +54,12 @@ class Kind:
         return [name for name in self.libraries if not _is_here(name)]
 
     def require(self) -> None:
-        """Raises FaceError if it can't be here."""
+        """Raises ServerError if it can't be here."""
         if missing := self._missing:
-            raise FaceError(f"{self.name}: {missing[0]} is not installed: pip install 'conveyor_sim[{self.extra}]'")
+            raise ServerError(f"{self.name}: {missing[0]} is not installed: pip install 'conveyor_sim[{self.extra}]'")
 
-    def require_place(self, place: Any, settings: Settings) -> None:
-        """Raises FaceError if it can't be on what its option says: before anything has been compiled for it."""
+    def require_place(self, place: Any, settings: ServerSettings) -> None:
+        """Raises ServerError if it can't be on what its option says: before anything has been compiled for it."""
         if self.name == MQTT:
             _broker(place, settings).require_reachable()
         else:
@@ -73,7 +73,7 @@ def _is_here(library: str) -> bool:
         return False
 
 
-def _modbus(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
+def _modbus(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
     from conveyor_sim.protocols.modbus.address_map import keep_map, modbus_map
     from conveyor_sim.protocols.modbus.server import ModbusServer
 
@@ -83,13 +83,13 @@ def _modbus(source: TagSource, port: int, settings: Settings, shared: Shared) ->
     return ModbusServer(source, rows, settings.modbus_role, settings.host, port, quota, holding=holding)
 
 
-def _modbus_exposes(settings: Settings) -> str:
+def _modbus_exposes(settings: ServerSettings) -> str:
     if settings.modbus_role is None:
         return "read all, and write nothing"
     return f"read all, and write as {settings.modbus_role}, for Modbus asks nobody who they are"
 
 
-def _opcua(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
+def _opcua(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
     from conveyor_sim.protocols.opcua.server import OpcUaServer
 
     return OpcUaServer(
@@ -106,14 +106,14 @@ def _opcua(source: TagSource, port: int, settings: Settings, shared: Shared) -> 
     )
 
 
-def _mqtt(source: TagSource, url: str, settings: Settings, shared: Shared) -> Face:
+def _mqtt(source: TagProvider, url: str, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
     from conveyor_sim.protocols.mqtt.edge_node import EdgeNode
 
     broker, writes = _broker(url, settings), _mqtt_writes(settings)
     return EdgeNode(source, broker, writes, settings.stamps, holding=shared.holding, before=shared.counts)
 
 
-def _broker(url: str, settings: Settings) -> Broker:
+def _broker(url: str, settings: ServerSettings) -> Broker:
     from conveyor_sim.protocols.mqtt.broker import broker_of
 
     return broker_of(
@@ -124,24 +124,24 @@ def _broker(url: str, settings: Settings) -> Broker:
     )
 
 
-def _mqtt_writes(settings: Settings) -> WriterKind | None:
+def _mqtt_writes(settings: ServerSettings) -> WriterKind | None:
     role = settings.mqtt_role
     return None if role is None or role == "viewer" else role
 
 
-def _mqtt_exposes(settings: Settings) -> str:
+def _mqtt_exposes(settings: ServerSettings) -> str:
     if _mqtt_writes(settings) is None:
         return "read all, and write nothing"
     return f"read all, and write as {settings.mqtt_role}, for commands by Sparkplug say nothing of who gave them"
 
 
-def _web(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
-    from conveyor_sim.protocols.tags.line_mirror import View
+def _web(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
+    from conveyor_sim.protocols.tags.line_mirror import LineMirror
     from conveyor_sim.protocols.web.server import WebServer
     from conveyor_sim.protocols.web.tls import server_context
 
-    if not isinstance(source, View):
-        raise FaceError("web: the line of a test has no page, expected a scene, a recording or a node")
+    if not isinstance(source, LineMirror):
+        raise ServerError("web: the line of a test has no page, expected a scene, a recording or a node")
     secured = settings.host != HERE or settings.web_certificates is not None
     return WebServer(
         source,
@@ -154,24 +154,24 @@ def _web(source: TagSource, port: int, settings: Settings, shared: Shared) -> Fa
     )
 
 
-def _foxglove(source: TagSource, port: int, settings: Settings, shared: Shared) -> Face:
+def _foxglove(source: TagProvider, port: int, settings: ServerSettings, shared: SharedState) -> ProtocolServer:
     from conveyor_sim.protocols.foxglove.server import FoxgloveServer
-    from conveyor_sim.protocols.tags.line_mirror import View
+    from conveyor_sim.protocols.tags.line_mirror import LineMirror
 
-    if not isinstance(source, View):
-        raise FaceError("foxglove: the line of a test has no topics, expected a scene, a recording or a node")
+    if not isinstance(source, LineMirror):
+        raise ServerError("foxglove: the line of a test has no topics, expected a scene, a recording or a node")
     return FoxgloveServer(source, settings.host, port)
 
 
-def _users_can(settings: Settings) -> str:
+def _users_can(settings: ServerSettings) -> str:
     readers = "read all" if settings.anonymous else "read nothing without a name and password"
     return f"{readers}, and write only as one of the users" if settings.users else f"{readers}, and write nothing"
 
 
-FACES: tuple[Kind, ...] = (
-    Kind(OPCUA, 4840, ("asyncua",), f"{_HERE}.opcua.server", _opcua, _users_can),
-    Kind(MODBUS, 5020, ("pymodbus",), f"{_HERE}.modbus.server", _modbus, _modbus_exposes),
-    Kind(
+SERVER_KINDS: tuple[ServerKind, ...] = (
+    ServerKind(OPCUA, 4840, ("asyncua",), f"{_HERE}.opcua.server", _opcua, _users_can),
+    ServerKind(MODBUS, 5020, ("pymodbus",), f"{_HERE}.modbus.server", _modbus, _modbus_exposes),
+    ServerKind(
         MQTT,
         1883,
         ("paho", "google.protobuf"),
@@ -182,8 +182,8 @@ FACES: tuple[Kind, ...] = (
         extra="mqtt",
         whoever="whoever the broker lets in",
     ),
-    Kind(WEB, 8080, ("aiohttp",), f"{_HERE}.web.server", _web, _users_can, by_default=False),
-    Kind(
+    ServerKind(WEB, 8080, ("aiohttp",), f"{_HERE}.web.server", _web, _users_can, by_default=False),
+    ServerKind(
         "foxglove",
         8765,
         ("foxglove",),

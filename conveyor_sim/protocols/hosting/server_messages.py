@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from conveyor_sim.columns.events import Event
 from conveyor_sim.line.run_state import RunState
-from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.server.interface import Health, Status
 from conveyor_sim.protocols.tags.tag_provider import Control
 
@@ -19,8 +19,8 @@ LIFE_SIGN = 0.5
 BEAT = 0.1
 """s of wall time between two heartbeats of the event loop of a protocol server."""
 
-What = Literal["give", "control", "enter", "holder", "judged_as", "take", "leave", "look", "watch"]
-"""Requests: two of `TagSource`, one of `Logins`, five of `Holding`, one of `PictureSource`."""
+ParentService = Literal["give", "control", "enter", "holder", "judged_as", "take", "leave", "look", "watch"]
+"""Requests: two of `TagProvider`, one of `Logins`, five of `Holding`, one of `DrawableProvider`."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ServerTask:
     """Name in `faces.FACES`."""
     place: Any
     """Port, or URL of a broker."""
-    settings: Settings
+    settings: ServerSettings
     controls: frozenset[Control]
     takes_inputs: bool
     has_users: bool
@@ -67,37 +67,37 @@ class LineFrame(NamedTuple):
     """Health of all protocol servers; empty: no change."""
 
 
-class Call(NamedTuple):
+class ParentCall(NamedTuple):
     """Sent by the process: a request."""
 
     number: int
     """Number of the answer; 0: no answer is expected."""
-    what: What
+    what: ParentService
     arguments: tuple[Any, ...]
     deadline: float
     """`time.monotonic()`, which all processes share, after which the request must not be carried out."""
 
 
-class Answer(NamedTuple):
-    """Sent to the process: the answer to a `Call`."""
+class ParentAnswer(NamedTuple):
+    """Sent to the process: the answer to a `ParentCall`."""
 
     number: int
     value: Any
 
 
-class Started(NamedTuple):
+class ServerStarted(NamedTuple):
     """Sent by the process once it serves."""
 
     address: str
 
 
-class Failed(NamedTuple):
+class ServerFailed(NamedTuple):
     """Sent by the process, the last message: the sentence that says why it can't serve."""
 
     reason: str
 
 
-class Beat(NamedTuple):
+class Heartbeat(NamedTuple):
     """Sent by the event loop of the process every BEAT, and at its end."""
 
     lag: float
@@ -105,9 +105,9 @@ class Beat(NamedTuple):
     status: Status
 
 
-class Report(NamedTuple):
-    """Sent to the process: a request for a `Beat` at once."""
+class StatusRequest(NamedTuple):
+    """Sent to the process: a request for a `Heartbeat` at once."""
 
 
-class End(NamedTuple):
+class EndRequest(NamedTuple):
     """Sent to the process: a request to close all connections and end."""

@@ -17,11 +17,24 @@ from multiprocessing.connection import Connection
 
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.protocols.hosting.loop_lag import beat
-from conveyor_sim.protocols.hosting.remote_provider import SILENCE, Calls, RemoteHolding, RemoteLogins, RemoteSource
-from conveyor_sim.protocols.hosting.server_kinds import FACES
-from conveyor_sim.protocols.hosting.server_messages import Answer, Beat, End, Failed, ServerTask, Started
-from conveyor_sim.protocols.hosting.shared_state import Shared
-from conveyor_sim.protocols.server.interface import Face
+from conveyor_sim.protocols.hosting.remote_provider import (
+    SILENCE,
+    ParentCalls,
+    RemoteHolding,
+    RemoteLogins,
+    RemoteTagProvider,
+)
+from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
+from conveyor_sim.protocols.hosting.server_messages import (
+    EndRequest,
+    Heartbeat,
+    ParentAnswer,
+    ServerFailed,
+    ServerStarted,
+    ServerTask,
+)
+from conveyor_sim.protocols.hosting.shared_state import SharedState
+from conveyor_sim.protocols.server.interface import ProtocolServer
 from conveyor_sim.protocols.tags.child import die_with_parent, pipes_of_child
 from conveyor_sim.protocols.tags.line_mirror import decoded
 from conveyor_sim.support.garbage import collected_later
@@ -32,7 +45,7 @@ class _Process:
 
     def __init__(self, task: ServerTask, frames: Connection, pipe: Connection, stack: ExitStack) -> None:
         self._task, self._frames, self._pipe = task, frames, pipe
-        self._calls = Calls(pipe)
+        self._calls = ParentCalls(pipe)
         self._source = _source(task, self._calls, stack)
         self._source.apply(frames.recv())
 
@@ -45,24 +58,24 @@ class _Process:
         for name, follow in (("frames", self._apply), ("answers", self._listen)):
             threading.Thread(target=_or_end, args=(follow,), name=name, daemon=True).start()
         task, calls = self._task, self._calls
-        shared = Shared(RemoteLogins(calls, task.has_users), RemoteHolding(calls), task.counts)
-        (kind,) = (kind for kind in FACES if kind.name == task.kind)
+        shared = SharedState(RemoteLogins(calls, task.has_users), RemoteHolding(calls), task.counts)
+        (kind,) = (kind for kind in SERVER_KINDS if kind.name == task.kind)
         server = kind.make(self._source, task.place, task.settings, shared)
         await server.start()
-        calls.send(Started(server.address))
-        beating = asyncio.create_task(beat(lambda lag: calls.send(Beat(lag, server.status()))))
+        calls.send(ServerStarted(server.address))
+        beating = asyncio.create_task(beat(lambda lag: calls.send(Heartbeat(lag, server.status()))))
         reporting = asyncio.create_task(self._report_all(server))
         await self._end.wait()
         await server.stop()
         beating.cancel()
         reporting.cancel()
-        calls.send(Beat(0.0, server.status()))
+        calls.send(Heartbeat(0.0, server.status()))
 
-    async def _report_all(self, server: Face) -> None:
+    async def _report_all(self, server: ProtocolServer) -> None:
         while True:
             await self._report.wait()
             self._report.clear()
-            self._calls.send(Beat(0.0, server.status()))
+            self._calls.send(Heartbeat(0.0, server.status()))
 
     def _apply(self) -> None:
         while True:
@@ -74,22 +87,22 @@ class _Process:
     def _listen(self) -> None:
         while True:
             message = self._pipe.recv()
-            if isinstance(message, Answer):
+            if isinstance(message, ParentAnswer):
                 self._calls.take(message)
             else:
-                wanted = self._end if isinstance(message, End) else self._report
+                wanted = self._end if isinstance(message, EndRequest) else self._report
                 self._loop.call_soon_threadsafe(wanted.set)
 
 
-def _source(task: ServerTask, calls: Calls, stack: ExitStack) -> RemoteSource:
+def _source(task: ServerTask, calls: ParentCalls, stack: ExitStack) -> RemoteTagProvider:
     if task.bag is None:
-        return RemoteSource(task, calls, decoded, None)
+        return RemoteTagProvider(task, calls, decoded, None)
     from conveyor_sim.bag.reader import open_bag
-    from conveyor_sim.protocols.tags.tag_history import Past
+    from conveyor_sim.protocols.tags.tag_history import TagHistory
 
-    past = Past(task.bag)
+    past = TagHistory(task.bag)
     stack.callback(past.close)
-    return RemoteSource(task, calls, stack.enter_context(open_bag(task.bag)).decode, past)
+    return RemoteTagProvider(task, calls, stack.enter_context(open_bag(task.bag)).decode, past)
 
 
 def _or_end(follow: Callable[[], None]) -> None:
@@ -105,7 +118,7 @@ def main() -> None:
     die_with_parent()
     frames, pipe = pipes_of_child()
     with collected_later():
-        import_module(next(kind.module for kind in FACES if kind.name == sys.argv[-1]))
+        import_module(next(kind.module for kind in SERVER_KINDS if kind.name == sys.argv[-1]))
     try:
         task = pipe.recv()
     except (EOFError, OSError):  # the parent has ended before it sent the task
@@ -116,7 +129,7 @@ def main() -> None:
         except EOFError:  # the parent has ended
             return
         except ConveyorError as error:
-            pipe.send(Failed(str(error)))
+            pipe.send(ServerFailed(str(error)))
         except Exception as error:
-            pipe.send(Failed(f"{task.kind}: {type(error).__name__}: {error}"))
+            pipe.send(ServerFailed(f"{task.kind}: {type(error).__name__}: {error}"))
     os._exit(0)  # freeing thousands of nodes takes longer than closing all connections

@@ -9,13 +9,13 @@ from typing import Any
 
 from conveyor_sim.protocols.hosting.server_child import ServerChild
 from conveyor_sim.protocols.hosting.server_host import ServerHost
-from conveyor_sim.protocols.hosting.server_kinds import Kind
-from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.hosting.server_kinds import ServerKind
+from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.hosting.thread_host import ThreadHost
 from conveyor_sim.protocols.server.interface import HERE, Health, Status
 from conveyor_sim.protocols.server.users import Logins, read_users
-from conveyor_sim.protocols.tags.line_mirror import View
-from conveyor_sim.protocols.tags.tag_provider import TagSource
+from conveyor_sim.protocols.tags.line_mirror import LineMirror
+from conveyor_sim.protocols.tags.tag_provider import TagProvider
 
 
 class Serving(AbstractContextManager["Serving"]):
@@ -23,9 +23,9 @@ class Serving(AbstractContextManager["Serving"]):
 
     def __init__(
         self,
-        source: TagSource,
-        chosen: Sequence[tuple[Kind, Any]],
-        settings: Settings,
+        source: TagProvider,
+        chosen: Sequence[tuple[ServerKind, Any]],
+        settings: ServerSettings,
         say: Callable[[str], object] = lambda sentence: None,
         ready: Mapping[str, ServerChild] = MappingProxyType({}),
     ) -> None:
@@ -48,9 +48,11 @@ class Serving(AbstractContextManager["Serving"]):
             self.close()
             raise
 
-    def _host(self, kind: Kind, place: Any, logins: Logins, say: Callable[[str], object]) -> ServerHost | ThreadHost:
+    def _host(
+        self, kind: ServerKind, place: Any, logins: Logins, say: Callable[[str], object]
+    ) -> ServerHost | ThreadHost:
         """Start one protocol server: the only place that chooses where it runs."""
-        if not kind.isolated or not isinstance(self._source, View):
+        if not kind.isolated or not isinstance(self._source, LineMirror):
             return ThreadHost(kind, place, self._settings, self._source, logins)
         ready = self._ready.get(kind.name)
         return ServerHost(kind, place, self._settings, self._source, logins, say, self.health, ready)

@@ -1,4 +1,4 @@
-"""`Settings` of all protocol servers."""
+"""`ServerSettings` of all protocol servers."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conveyor_sim.line.inputs import WriterKind
-from conveyor_sim.protocols.opcua.limits import LIMITS, Limits
+from conveyor_sim.protocols.opcua.limits import LIMITS, OpcUaLimits
 from conveyor_sim.protocols.server.interface import HERE, Stamps
 from conveyor_sim.protocols.server.quotas import QUOTA, Quota
 from conveyor_sim.protocols.server.users import Role
 
 
 @dataclass(frozen=True)
-class Settings:
+class ServerSettings:
     """What is asked of all faces, or of one."""
 
     host: str = HERE
@@ -42,7 +42,7 @@ class Settings:
     """Patterns of the tags whose last values it keeps."""
     web_certificates: Path | None = None
     """Folder of the certificate and key of the page; None: where it needs them, those of the OPC UA face."""
-    opcua_limits: Limits = LIMITS
+    opcua_limits: OpcUaLimits = LIMITS
     """Limits of one OPC UA client."""
     opcua_quota: Quota = QUOTA
     """Places of the OPC UA connections."""

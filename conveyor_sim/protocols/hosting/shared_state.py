@@ -1,4 +1,4 @@
-"""`Shared`: state of a protocol server that its parent keeps, so that it survives a restart."""
+"""`SharedState`: state of a protocol server that its parent keeps, so that it survives a restart."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from conveyor_sim.protocols.tags.holding import HoldingService
 
 
 @dataclass(frozen=True)
-class Shared:
+class SharedState:
     """State that a protocol server uses and its parent keeps."""
 
     logins: LoginService

@@ -1,7 +1,7 @@
 """`ThreadHost`: one protocol server in a thread of this process, where the owner of the line decides when time passes.
 
-Two protocol servers run this way: those of a test's line (`TickSource`), because the test steps it, and the only one of
-`attach`. All others run in processes (server_host.py). A protocol server in a thread is not restarted.
+Two protocol servers run this way: those of a test's line (`SteppedTagProvider`), because the test steps it, and the
+only one of `attach`. All others run in processes (server_host.py). A protocol server in a thread is not restarted.
 """
 
 from __future__ import annotations
@@ -10,28 +10,30 @@ import asyncio
 from typing import Any
 
 from conveyor_sim.protocols.hosting.loop_lag import beat
-from conveyor_sim.protocols.hosting.server_kinds import Kind
+from conveyor_sim.protocols.hosting.server_kinds import ServerKind
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
-from conveyor_sim.protocols.hosting.settings import Settings
-from conveyor_sim.protocols.hosting.shared_state import Shared
-from conveyor_sim.protocols.server.interface import Face, Health, Status
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.hosting.shared_state import SharedState
+from conveyor_sim.protocols.server.interface import Health, ProtocolServer, Status
 from conveyor_sim.protocols.server.users import Logins
 from conveyor_sim.protocols.tags.holding import Holding
-from conveyor_sim.protocols.tags.tag_provider import TagSource
+from conveyor_sim.protocols.tags.tag_provider import TagProvider
 
 
 class ThreadHost:
     """Serves from its start until `end` and `join`, as a `ServerHost` does."""
 
-    def __init__(self, kind: Kind, place: Any, settings: Settings, source: TagSource, logins: Logins) -> None:
+    def __init__(
+        self, kind: ServerKind, place: Any, settings: ServerSettings, source: TagProvider, logins: Logins
+    ) -> None:
         """Serve from now on. place: port or URL. Raises ConveyorError, in one sentence, if that can't be."""
         self.kind = kind
         self._lag = 0.0  # s of wall time, the longest since the last `health`
         self._thread = ServerThread()
-        self._server: Face | None = None
+        self._server: ProtocolServer | None = None
         self._beating: asyncio.Task[None] | None = None
         try:
-            server = kind.make(source, place, settings, Shared(logins, Holding(source, kind.name)))
+            server = kind.make(source, place, settings, SharedState(logins, Holding(source, kind.name)))
             self._thread.run(server.start())
             self._server = server
             self._thread.run(self._begin())

@@ -27,7 +27,7 @@ from conveyor_sim.protocols.tags.control_mode import (
     refused_for_good,
 )
 from conveyor_sim.protocols.tags.handshake import MAY_GO_ON, TARGET
-from conveyor_sim.protocols.tags.tag_provider import OPCUA, Control, TagSource
+from conveyor_sim.protocols.tags.tag_provider import OPCUA, Control, TagProvider
 
 Codes = ua.StatusCodes
 
@@ -62,7 +62,7 @@ def reader(name: str = "") -> Client:
 class Requests:
     """Of all clients of one source."""
 
-    def __init__(self, source: TagSource) -> None:
+    def __init__(self, source: TagProvider) -> None:
         self._source = source
         self._receipt = Receipt(source.about.tags, source.about.where)
         self._commands: Mapping[str, Tag] = {tag.name: tag for tag in source.about.tags if tag.role in COMMANDS}

@@ -1,4 +1,4 @@
-"""`Face`: a server, or a client of a broker, that shows a tag source by one of the protocols that plants speak."""
+"""`ProtocolServer`: interface of a server, or a client of a broker, that serves the tags of a line by one protocol."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Stamps = Literal["wall", "simulated"]
 """What the times of values are: wall time, or simulated time on the scene's start_time."""
 
 
-class FaceError(ConveyorError):
+class ServerError(ConveyorError):
     """A face that can't be."""
 
 
@@ -60,7 +60,7 @@ class Health(NamedTuple):
         return f"lag {self.lag * 1e3:.0f} ms{silent}{times}"
 
 
-class Face(Protocol):
+class ProtocolServer(Protocol):
     """One protocol at one address. All of it is used in one asyncio loop, which it must not hold up."""
 
     @property
@@ -68,7 +68,7 @@ class Face(Protocol):
         """Where clients find it, as they are told: "modbus://127.0.0.1:5020"."""
 
     async def start(self) -> None:
-        """Serve from now on. Raises FaceError, in one sentence, if that can't be; nothing is left behind then."""
+        """Serve from now on. Raises ServerError, in one sentence, if that can't be; nothing is left behind then."""
 
     async def stop(self) -> None:
         """End all connections. Harmless if it was not started, or is stopped already."""
@@ -78,7 +78,7 @@ class Face(Protocol):
 
 
 def require_free(face: str, host: str, port: int) -> None:
-    """Raises FaceError, with the reason, which libraries don't tell, if a face of that name can't listen there."""
+    """Raises ServerError, with the reason, which libraries don't tell, if a face of that name can't listen there."""
     expected = "an address of this machine"
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
@@ -90,4 +90,4 @@ def require_free(face: str, host: str, port: int) -> None:
             probe.bind((host, port))
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise FaceError(f"{face}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error
+        raise ServerError(f"{face}: {host}:{port} can't be listened on ({reason}), expected {expected}") from error

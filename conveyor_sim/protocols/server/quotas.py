@@ -1,4 +1,4 @@
-"""`Places`: which clients may be connected to a protocol server at once, and which of them make room for others.
+"""`ConnectionSlots`: bounded number of connections to a protocol server, and the order in which they make room.
 
 A client needs a place before it can identify itself, so connections without a session never block others. When all
 places are taken, a connection whose login failed makes room, else the connection at the earliest stage. Among several,
@@ -45,7 +45,7 @@ QUOTA = Quota()
 
 
 @dataclass(eq=False)
-class Place:
+class ConnectionSlot:
     """Place of one connection."""
 
     address: str
@@ -68,7 +68,7 @@ def share_of_guests(places: int) -> int:
     return max(1, int(places * (1.0 - RESERVED)))
 
 
-class Places:
+class ConnectionSlots:
     """All connections of one protocol server."""
 
     def __init__(self, quota: Quota, keeps_active: bool = False) -> None:
@@ -79,14 +79,14 @@ class Places:
         self._quota, self._keeps_active = quota, keeps_active
         self.idle = quota.idle
         """Seconds without a request after which a connection is idle."""
-        self._taken: set[Place] = set()
+        self._taken: set[ConnectionSlot] = set()
         self.dropped = self.refused = 0
         """Connections that made room so far, and connections that got no place."""
 
     def __len__(self) -> int:
         return len(self._taken)
 
-    def take(self, address: str, end: Callable[[], None]) -> Place | None:
+    def take(self, address: str, end: Callable[[], None]) -> ConnectionSlot | None:
         """Return a place for a connection from an address; None: all are held by clients that keep theirs."""
         own = self._of(address)
         if len(own) >= self._quota.connections_per_address and not self._drop_first(own):
@@ -95,11 +95,11 @@ class Places:
         if len(self._taken) >= self._quota.connections and not self._drop_first(list(self._taken)):
             self.refused += 1
             return None
-        place = Place(address, end)
+        place = ConnectionSlot(address, end)
         self._taken.add(place)
         return place
 
-    def admit_guest(self, place: Place) -> bool:
+    def admit_guest(self, place: ConnectionSlot) -> bool:
         """Let a connection go on without a user. Return False if guests hold their share, and none of them is idle."""
         if place.user:
             self.leave_user(place)
@@ -117,7 +117,7 @@ class Places:
         place.touch(GUEST)
         return True
 
-    def admit_user(self, place: Place, user: str) -> bool:
+    def admit_user(self, place: ConnectionSlot, user: str) -> bool:
         """Let a connection go on as a user. Return False if that user holds all its places, and none is idle."""
         same = [one for one in self._taken if one.user == user and one is not place]
         if len(same) >= self._quota.connections_per_user:
@@ -130,23 +130,23 @@ class Places:
         place.touch(USER)
         return True
 
-    def leave_user(self, place: Place) -> None:
+    def leave_user(self, place: ConnectionSlot) -> None:
         """Note that a connection has no session any more."""
         place.user, place.stage = "", min(place.stage, OPENED)
 
-    def leave(self, place: Place) -> None:
+    def leave(self, place: ConnectionSlot) -> None:
         """Note that a connection has ended."""
         self._taken.discard(place)
 
-    def _of(self, address: str) -> list[Place]:
+    def _of(self, address: str) -> list[ConnectionSlot]:
         """Return connections from an address; users are not counted against it."""
         return [one for one in self._taken if one.address == address and one.stage < USER]
 
-    def _idle(self, those: list[Place]) -> list[Place]:
+    def _idle(self, those: list[ConnectionSlot]) -> list[ConnectionSlot]:
         before = time.monotonic() - self.idle
         return [one for one in those if one.active < before]
 
-    def _drop_first(self, those: list[Place]) -> bool:
+    def _drop_first(self, those: list[ConnectionSlot]) -> bool:
         """Drop the connection that comes first in the order of the module. Return False if there are only users."""
         kept = set(those) - set(self._idle(those)) if self._keeps_active else set()
         may = (one for one in those if one.stage < GUEST or (one.stage == GUEST and one not in kept))
@@ -156,7 +156,7 @@ class Places:
         self._drop(first)
         return True
 
-    def _drop(self, place: Place) -> None:
+    def _drop(self, place: ConnectionSlot) -> None:
         self._taken.discard(place)
         self.dropped += 1
         place.end()

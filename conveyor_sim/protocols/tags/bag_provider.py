@@ -1,4 +1,4 @@
-"""`BagSource`: a recording, played back, as a tag source. Nothing is simulated, and nothing of it can be commanded."""
+"""`BagTagProvider`: tags of a recording that is played back. It accepts no commands."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.errors import BagError, ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING, RunState
-from conveyor_sim.protocols.tags.line_mirror import DRAWN, HEARD, View
-from conveyor_sim.protocols.tags.tag_history import Past
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror
+from conveyor_sim.protocols.tags.tag_history import TagHistory
 from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.run.calls import Calls
 from conveyor_sim.run.playback import Message, Playback
@@ -25,7 +25,7 @@ SHORTEST = 0.005
 """s of wall time between two states that are shown, however fast it is played."""
 
 
-class BagSource(View, AbstractContextManager["BagSource"]):
+class BagTagProvider(LineMirror, AbstractContextManager["BagTagProvider"]):
     """Played from its start until close(). Only what is played of it is read, by its index."""
 
     takes_inputs = False
@@ -47,11 +47,11 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         self._shown_at = 0.0  # s of wall time
         self._calls = Calls()
         self._bag = open_bag(path)
-        self._past = Past(path)
+        self._past = TagHistory(path)
         try:
             if not self._bag.counts.get("signals"):
                 raise BagError(f"{path}: holds no message of topic signals, expected some: tags are read from them")
-            playback = Playback(self._bag, (*HEARD, *DRAWN))
+            playback = Playback(self._bag, (*STATE_TOPICS, *DRAWING_TOPICS))
             self._player = Player(playback, speed, start=None, paused=paused, publish=self._keep, beat=_nothing)
             self._player.seek(self._player.span[0])
             self._bring()
@@ -63,7 +63,7 @@ class BagSource(View, AbstractContextManager["BagSource"]):
         self._thread.start()
 
     @property
-    def past(self) -> Past:
+    def past(self) -> TagHistory:
         """All that it holds."""
         return self._past
 
@@ -161,11 +161,11 @@ class BagSource(View, AbstractContextManager["BagSource"]):
             return
         states, self._states = self._states, {}
         events, self._new_events = self._new_events, []
-        for topic in HEARD:
+        for topic in STATE_TOPICS:
             if topic in states and topic != "run_state":  # a playback's own, whatever was recorded
                 self.take(topic, self._bag.decode(topic, states[topic]))
                 self.pass_on(topic, states[topic])
-        for topic in states.keys() & set(DRAWN):
+        for topic in states.keys() & set(DRAWING_TOPICS):
             self.keep(topic, partial(self._bag.decode, topic, states[topic]))
             self.pass_on(topic, states[topic])
         for data in events:

@@ -9,7 +9,7 @@ from conveyor_sim.line.inputs import SET, Input, WriterKind
 from conveyor_sim.line.receipt import Receipt, Refusal
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.protocols.tags.tag_provider import Control, TagSource
+from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
 TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
 """States of a run in which nothing that is given would ever act."""
@@ -27,7 +27,7 @@ def is_mode(tag: Tag) -> bool:
     return bool(tag.device) and tag.name == f"{tag.device}/mode"
 
 
-def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
+def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
     """Why a command is not taken of a writer, as the line was last; "" if it is."""
     shown, device = source.shown, command.device
     if stops(command.name, value, kind):
@@ -42,7 +42,7 @@ def objection(source: TagSource, command: Tag, value: float, kind: WriterKind, w
     return f"{device}: the line is owned by controller {shown.owner}"
 
 
-def refused_for_good(source: TagSource, receipt: Receipt, request: Input) -> Refusal | None:
+def refused_for_good(source: TagProvider, receipt: Receipt, request: Input) -> Refusal | None:
     """Return why the line would refuse an input in every state; None if it might accept it.
 
     Such an input is still passed on if its writer may use the operation: the line then records the refusal.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from conveyor_sim.line.inputs import Input, WriterKind
 from conveyor_sim.line.run_state import LOCKSTEP, RUN, RunState
-from conveyor_sim.protocols.tags.tag_provider import Control, TickSource
+from conveyor_sim.protocols.tags.tag_provider import Control, SteppedTagProvider
 
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
@@ -44,7 +44,7 @@ def problem(what: Control, value: float, tick: int) -> str:
     return ""
 
 
-class HandshakeSource(TickSource):
+class HandshakeTagProvider(SteppedTagProvider):
     """A simulation that one thread steps as far as clients have said."""
 
     controls: frozenset[Control] = frozenset({"target"})

@@ -11,7 +11,7 @@ import time
 from typing import Protocol
 
 from conveyor_sim.line.inputs import DISOWN, OWN, Input
-from conveyor_sim.protocols.tags.tag_provider import Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 
 GRACE = 30.0
 """s of wall time after a restart of the protocol server in which the holder of the line can come back."""
@@ -40,7 +40,7 @@ class HoldingService(Protocol):
 class Holding:
     """Whose the line is, as far as the clients of one face are concerned. What changes is on record as inputs are."""
 
-    def __init__(self, source: TagSource, face: str) -> None:
+    def __init__(self, source: TagProvider, face: str) -> None:
         """face: source of the inputs."""
         self._source, self._face = source, face
         self._holder = ""
@@ -105,7 +105,7 @@ class Holding:
         if self._leaving and not self._give(self._holder, DISOWN):
             self._leaving, self._holder = False, ""
 
-    def _is_owner(self, shown: Shown) -> bool:
+    def _is_owner(self, shown: LineSnapshot) -> bool:
         """Whether the line is its own, or will be once a tick passes; another may have been faster."""
         return shown.owner in ("", self._holder)
 

@@ -1,4 +1,4 @@
-"""`View`: a line as it is heard of by topics, whatever brings them: a process, a recording, a node."""
+"""`LineMirror`: a line as it is heard of by topics, whatever brings them: a process, a recording, a node."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.server.interface import Health
-from conveyor_sim.protocols.tags.tag_provider import About, Listeners, RecentEvents, Shown, TagSource
+from conveyor_sim.protocols.tags.tag_provider import LineInfo, LineSnapshot, Listeners, RecentEvents, TagProvider
 from conveyor_sim.run.inbox import MESSAGE_BYTES, TOO_LARGE, size_of
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.tags.tag_history import Past
+    from conveyor_sim.protocols.tags.tag_history import TagHistory
 
-HEARD = ("line", "run_state", "signals", "events", "readback", "alarm_states")
+STATE_TOPICS = ("line", "run_state", "signals", "events", "readback", "alarm_states")
 """Topics that it takes."""
 
-DRAWN = ("bottles", "contacts", "belts", "counters", "rail_wear")
+DRAWING_TOPICS = ("bottles", "contacts", "belts", "counters", "rail_wear")
 """Topics that only a page shows; it decodes them if somebody looks."""
 
 NOTHING = "nothing has been heard of the line yet"
 
 
-class ViewError(ConveyorError):
+class LineMirrorError(ConveyorError):
     """A line that can't be shown."""
 
 
 @dataclass(frozen=True)
-class Picture:
+class DrawableFrame:
     """What can be drawn of a line, as it was last."""
 
     line: Any
@@ -57,16 +57,16 @@ class Picture:
     forced: NDArray[Any]
     """Indices of those that are forced."""
     drawn: Mapping[str, Callable[[], Any]]
-    """What decodes the last message of each of DRAWN that there is; another one is another message."""
+    """What decodes the last message of each of DRAWING_TOPICS that there is; another one is another message."""
 
 
-class PictureSource(TagSource, Protocol):
+class DrawableProvider(TagProvider, Protocol):
     """A source that can be drawn."""
 
     takes_inputs: bool
 
     @property
-    def picture(self) -> Picture:
+    def picture(self) -> DrawableFrame:
         """What is drawn of the line as it was last."""
 
     @property
@@ -83,7 +83,7 @@ class PictureSource(TagSource, Protocol):
         """Number that changes when earlier messages no longer hold."""
 
     def watch(self) -> Callable[[], None]:
-        """Have DRAWN be there, too, from now on; what is returned ends that."""
+        """Have DRAWING_TOPICS be there, too, from now on; what is returned ends that."""
 
     def hear(self, heard: Callable[[str, bytes], None]) -> Callable[[], None]:
         """Have a function called with topic and bytes of each message from now on; what is returned ends that.
@@ -92,8 +92,8 @@ class PictureSource(TagSource, Protocol):
         """
 
 
-class View:
-    """The half of a TagSource that is read. One thread tells it what came, any may look.
+class LineMirror:
+    """The half of a TagProvider that is read. One thread tells it what came, any may look.
 
     What is taken is shown all at once, by `show`. Time may go back, and another run of the same line may begin.
     """
@@ -115,7 +115,7 @@ class View:
 
     def __init__(self) -> None:
         """Nothing is known."""
-        self._about: About | None = None
+        self._about: LineInfo | None = None
         self._signal_names: Sequence[str] = ()
         self._command_names: Sequence[str] = ()
         self._initial: list[float] = []
@@ -123,8 +123,8 @@ class View:
         self._events = RecentEvents()
         self._known = threading.Event()
         self._strange = False  # whether it has become another line
-        self._shown = Shown(0, {}, lost=NOTHING)
-        self._picture: Picture | None = None
+        self._shown = LineSnapshot(0, {}, lost=NOTHING)
+        self._picture: DrawableFrame | None = None
         self._watchers = 0
         self._watching = threading.Lock()
         self._hearers = Listeners()
@@ -135,19 +135,19 @@ class View:
         self._forget("")
 
     @property
-    def about(self) -> About:
+    def about(self) -> LineInfo:
         """What stays the same. RuntimeError before it is known."""
         if self._about is None:
             raise RuntimeError("the line is not known yet")
         return self._about
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> LineSnapshot:
         """The line as it was last."""
         return self._shown
 
     @property
-    def picture(self) -> Picture:
+    def picture(self) -> DrawableFrame:
         """The same, for a page. RuntimeError before it is known."""
         if self._picture is None:
             raise RuntimeError("nothing has been shown yet")
@@ -164,12 +164,12 @@ class View:
         return self._era
 
     def watch(self) -> Callable[[], None]:
-        """Have DRAWN be there, too, from now on, if that costs anything; what is returned ends that."""
+        """Have DRAWING_TOPICS be there, too, from now on, if that costs anything; what is returned ends that."""
         self._count_watchers(1)
         return lambda: self._count_watchers(-1)
 
     @property
-    def past(self) -> Past | None:
+    def past(self) -> TagHistory | None:
         """Nobody knows."""
         return None
 
@@ -201,8 +201,9 @@ class View:
     # By the thread that hears
 
     def take(self, topic: str, message: Any) -> None:
-        """A decoded message of one of the topics HEARD. Raises ViewError for another line than before, of which nothing
-        else is taken.
+        """Take a decoded message of one of STATE_TOPICS.
+
+        Raises LineMirrorError for another line than before; its other messages are ignored.
         """
         if self._strange and topic != "line":
             return
@@ -221,12 +222,12 @@ class View:
                 self._take_events(TOPICS[topic].unpack(message))
 
     def pass_on(self, topic: str, data: bytes) -> None:
-        """A message as it came, of one of HEARD and DRAWN."""
+        """A message as it came, of one of STATE_TOPICS and DRAWING_TOPICS."""
         self._newest[topic] = data
         self._hearers.tell(topic, data)
 
     def keep(self, topic: str, decode: Callable[[], Any]) -> None:
-        """What decodes a message of one of DRAWN, in any thread."""
+        """What decodes a message of one of DRAWING_TOPICS, in any thread."""
         self._drawn[topic] = decode
 
     def state_run(self, run: RunState) -> None:
@@ -248,8 +249,10 @@ class View:
         shown = dict(zip(names, values.tolist(), strict=False))
         shown |= zip(self._command_names, self._commands(), strict=False)
         now = time.time() if at is None else at
-        self._picture = Picture(self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn))
-        self._shown = Shown(
+        self._picture = DrawableFrame(
+            self._line, self._tick, now, self._image.values, self._image.forced, dict(self._drawn)
+        )
+        self._shown = LineSnapshot(
             self._tick,
             shown,
             frozenset(names[place] for place in self._image.forced if place < len(names)),
@@ -295,11 +298,11 @@ class View:
         self._released = ()
 
     def _take_line(self, message: Any) -> None:
-        about = about_line(message)
+        about = line_info(message)
         self._strange = self._about is not None and self._about != about
         if self._about is not None and self._strange:
             self._forget(message.run_id)
-            raise ViewError(
+            raise LineMirrorError(
                 f"{about.name}: another line than before, or with other tags; expected {self._about.name} as it was: "
                 "start serving anew"
             )
@@ -341,10 +344,12 @@ def decoded(topic: str, data: bytes) -> Any:
     return typestore().deserialize_cdr(data, TOPICS[topic].type)
 
 
-def about_line(message: Any) -> About:
-    """What a message of topic `line` tells of its tags. Raises ViewError for one from before there were tags."""
+def line_info(message: Any) -> LineInfo:
+    """What a message of topic `line` tells of its tags. Raises LineMirrorError for one from before there were tags."""
     if not len(getattr(message, "tag_names", ())):
-        raise ViewError(f"{message.scene_name}: recorded without tags, by an older version; expected a newer recording")
+        raise LineMirrorError(
+            f"{message.scene_name}: recorded without tags, by an older version; expected a newer recording"
+        )
     columns = (
         message.tag_names,
         message.tag_kinds,
@@ -360,7 +365,7 @@ def about_line(message: Any) -> About:
         message.tag_classes,
     )
     tags = tuple(_tag(*row) for row in zip(*columns, strict=True))
-    return About(message.scene_name, message.where, message.tick_ns * 1e-9, message.start_time, tags)
+    return LineInfo(message.scene_name, message.where, message.tick_ns * 1e-9, message.start_time, tags)
 
 
 def _tag(

@@ -1,4 +1,4 @@
-"""What a `SceneSource` and its process send each other."""
+"""What a `SceneTagProvider` and its process send each other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PATIENCE = 20.0
 
 
 @dataclass(frozen=True)
-class Task:
+class SceneTask:
     """What the process is to do, the first thing that it is sent."""
 
     scene: Scene
@@ -32,13 +32,13 @@ class Task:
     """Whether it goes as far as it is told, and no further; `playing` counts for nothing then."""
 
 
-class Give(NamedTuple):
+class InputRequest(NamedTuple):
     """Sent to the process: an input for the next tick."""
 
     given: Input
 
 
-class Ask(NamedTuple):
+class ControlRequest(NamedTuple):
     """Sent to the process: something to do with the run."""
 
     what: Control
@@ -47,27 +47,27 @@ class Ask(NamedTuple):
     """Empty: nobody has to be told."""
 
 
-class Go(NamedTuple):
+class TargetRequest(NamedTuple):
     """Sent to a process in lockstep: a tick to go to once the one before is reached, and what acts as it sets off."""
 
     target: int
     inputs: Sequence[Input]
 
 
-class Observe(NamedTuple):
+class VariablesRequest(NamedTuple):
     """Sent to the process: what a controller's own variables are, to be recorded."""
 
     names: Sequence[str]
     values: Sequence[float]
 
 
-class Watch(NamedTuple):
+class DrawingRequest(NamedTuple):
     """Sent to the process: whether what is drawn is to be copied, too."""
 
     on: bool
 
 
-class Copy(NamedTuple):
+class LineCopy(NamedTuple):
     """Sent by the process: serialized messages, and how far it is with inputs."""
 
     states: Mapping[str, bytes]
@@ -81,14 +81,14 @@ class Copy(NamedTuple):
     """Wall time of what it shows, s since 1970."""
 
 
-class Note(NamedTuple):
+class UserMessage(NamedTuple):
     """Sent by the process: a sentence for people."""
 
     text: str
     bad: bool = False
 
 
-class Failed(NamedTuple):
+class SimulationFailed(NamedTuple):
     """Sent by the process, the last thing: why it can't go on."""
 
     reason: str

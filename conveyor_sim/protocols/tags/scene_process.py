@@ -1,4 +1,4 @@
-"""The process that simulates a scene for a `SceneSource`: it steps and records it, and sends copies of what it shows.
+"""Process that simulates a scene for a `SceneTagProvider`: it steps, records and sends copies of the messages.
 
 The stepping thread only leaves copies behind; another one sends them, the newest of each. So whoever receives them,
 slowly or not at all, holds up no tick and fills no memory.
@@ -25,8 +25,19 @@ from conveyor_sim.line.inputs import SET
 from conveyor_sim.page.watch import with_forces
 from conveyor_sim.protocols.tags.child import pipes_of_child
 from conveyor_sim.protocols.tags.handshake import HANDSHAKE
-from conveyor_sim.protocols.tags.line_mirror import DRAWN, HEARD
-from conveyor_sim.protocols.tags.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
+from conveyor_sim.protocols.tags.scene_messages import (
+    PATIENCE,
+    ControlRequest,
+    DrawingRequest,
+    InputRequest,
+    LineCopy,
+    SceneTask,
+    SimulationFailed,
+    TargetRequest,
+    UserMessage,
+    VariablesRequest,
+)
 from conveyor_sim.protocols.tags.tag_provider import MOST_EVENTS, Control
 from conveyor_sim.run.compilation import Cancelled, Compilation
 from conveyor_sim.run.inbox import size_of
@@ -49,7 +60,7 @@ SHARE = 0.05
 """Of the stepping thread's time that pictures take, at most."""
 
 TAKEN = frozenset({"bottles", "contacts", "belts"})
-"""Of DRAWN, what a picture is taken of, whatever the scene's rates; the others come as they are output."""
+"""Of DRAWING_TOPICS, what a picture is taken of, whatever the scene's rates; the others come as they are output."""
 
 MOST_NOTES = 100
 
@@ -68,7 +79,7 @@ class Copies:
         self._now_events: deque[bytes] = deque(maxlen=MOST_EVENTS)
         self._states: dict[str, bytes] = {}
         self._events: deque[bytes] = deque(maxlen=MOST_EVENTS)
-        self._others: deque[Note | Failed] = deque(maxlen=MOST_NOTES)
+        self._others: deque[UserMessage | SimulationFailed] = deque(maxlen=MOST_NOTES)
         self._counts = (0, 0)
         self._at = 0.0
         self._new = self._closed = False
@@ -79,7 +90,9 @@ class Copies:
 
     def wants(self, topic: str) -> bool:
         """What faces show; signals are theirs at every tick, whatever the scene's rate."""
-        return (topic in HEARD and topic != "signals") or (self.watched and topic in DRAWN and topic not in TAKEN)
+        if topic in DRAWING_TOPICS:
+            return self.watched and topic not in TAKEN
+        return topic in STATE_TOPICS and topic != "signals"
 
     @property
     def sent(self) -> bool:
@@ -114,7 +127,7 @@ class Copies:
                 self._new = True
                 self._wake.notify()
 
-    def tell(self, other: Note | Failed) -> None:
+    def tell(self, other: UserMessage | SimulationFailed) -> None:
         """Send something else. From any thread."""
         with self._wake:
             self._others.append(other)
@@ -135,7 +148,7 @@ class Copies:
                         self._wake.wait()
                     done = self._closed
                     others = list(self._others)
-                    copy = Copy(self._states, list(self._events), *self._counts, self._at)
+                    copy = LineCopy(self._states, list(self._events), *self._counts, self._at)
                     self._states, self._new, self._sent = {}, False, time.monotonic()
                     self._events.clear()
                     self._others.clear()
@@ -154,10 +167,10 @@ class _Log:
         self._copies = copies
 
     def info(self, message: str) -> None:
-        self._copies.tell(Note(message))
+        self._copies.tell(UserMessage(message))
 
     def warning(self, message: str) -> None:
-        self._copies.tell(Note(message, bad=True))
+        self._copies.tell(UserMessage(message, bad=True))
 
     error = warning
 
@@ -165,14 +178,14 @@ class _Log:
 class _Process:
     """One run after another, until the pipe ends."""
 
-    def __init__(self, pipe: Connection, task: Task, stop: StopRequest) -> None:
+    def __init__(self, pipe: Connection, task: SceneTask, stop: StopRequest) -> None:
         self._pipe, self._task, self._stop = pipe, task, stop
         self._copies = Copies(pipe, 0.0 if task.lockstep else SHORTEST)
-        self._compilation = Compilation(task.scene, lambda sentence: self._copies.tell(Note(sentence)))
+        self._compilation = Compilation(task.scene, lambda sentence: self._copies.tell(UserMessage(sentence)))
         self._stepper: Stepper | None = None
         self._handed = 0
-        self._goals: deque[Go] = deque()
-        self._goal: Go | None = None  # where the line is on its way to
+        self._goals: deque[TargetRequest] = deque()
+        self._goal: TargetRequest | None = None  # where the line is on its way to
         self._shown = self._pictured = ("", -1)  # run and tick of the signals, and the picture, that were copied last
         self._next_picture = 0.0  # s of wall time
 
@@ -242,7 +255,7 @@ class _Process:
 
     def _fail(self, error: Exception) -> None:
         text = str(error) if isinstance(error, ConveyorError) else f"{type(error).__name__}: {error}"
-        self._copies.tell(Failed(text))
+        self._copies.tell(SimulationFailed(text))
         self._stop.request()
 
     def _listen(self) -> None:
@@ -255,24 +268,24 @@ class _Process:
         time.sleep(PATIENCE)
         os._exit(1)
 
-    def _do(self, request: Give | Go | Ask | Observe | Watch) -> None:
-        if isinstance(request, Watch):
+    def _do(self, request: InputRequest | TargetRequest | ControlRequest | VariablesRequest | DrawingRequest) -> None:
+        if isinstance(request, DrawingRequest):
             self._pictured = ("", -1)
             self._copies.watched = request.on
             return
         stepper = self._stepper
         if stepper is None:  # nobody knows the line yet
             return
-        if isinstance(request, Give):
+        if isinstance(request, InputRequest):
             if request.given.operation == SET:  # commands are counted
                 stepper.inbox.receive()
             stepper.give(request.given, size_of(request.given))
             self._handed += 1
             return
-        if isinstance(request, Observe):
+        if isinstance(request, VariablesRequest):
             stepper.call(lambda: stepper.session.outputs.show_variables(*request))
             return
-        if isinstance(request, Go):
+        if isinstance(request, TargetRequest):
             self._goals.append(request)
             stepper.call(self._set_off)
             return
@@ -289,9 +302,9 @@ class _Process:
             error = future.exception()
             told = f"{what}, asked for by {by}"
             if error is not None:
-                self._copies.tell(Note(f"{told}, refused: {error}", bad=True))
+                self._copies.tell(UserMessage(f"{told}, refused: {error}", bad=True))
             elif by:
-                self._copies.tell(Note(told))
+                self._copies.tell(UserMessage(told))
 
         stepper.call(todo[what]).add_done_callback(done)
 

@@ -1,4 +1,4 @@
-"""`SceneSource`: a scene, simulated by a process of its own, as a tag source."""
+"""`SceneTagProvider`: a scene, simulated by a process of its own, as a tag source."""
 
 from __future__ import annotations
 
@@ -21,8 +21,19 @@ from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.protocols.tags.child import start_child
 from conveyor_sim.protocols.tags.handshake import TARGET, problem
-from conveyor_sim.protocols.tags.line_mirror import DRAWN, HEARD, View, decoded
-from conveyor_sim.protocols.tags.scene_messages import PATIENCE, Ask, Copy, Failed, Give, Go, Note, Observe, Task, Watch
+from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, decoded
+from conveyor_sim.protocols.tags.scene_messages import (
+    PATIENCE,
+    ControlRequest,
+    DrawingRequest,
+    InputRequest,
+    LineCopy,
+    SceneTask,
+    SimulationFailed,
+    TargetRequest,
+    UserMessage,
+    VariablesRequest,
+)
 from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 from conveyor_sim.support.child_process import how_it_ended
 
@@ -38,10 +49,10 @@ LOOK = 0.5
 ENDED_HERE = "serving has ended"
 
 
-class SceneSource(View, AbstractContextManager["SceneSource"]):
+class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
     """Simulated from its start until close(). If its process dies, another one begins the scene anew."""
 
-    def __init__(self, task: Task, say: Callable[[str], object]) -> None:
+    def __init__(self, task: SceneTask, say: Callable[[str], object]) -> None:
         """say: called with a sentence whenever there is something to tell people, by a thread of this source.
 
         It returns at once; `wait_for_line` says whether it has come to anything.
@@ -54,7 +65,9 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         self._given = self._handed = self._waiting = 0
         self._target = 0  # in lockstep: up to which tick it goes
         self._set: list[Input] = []  # that acts with the next target
-        self._requests: SimpleQueue[Task | Give | Go | Ask | Observe | Watch | None] = SimpleQueue()
+        self._requests: SimpleQueue[
+            SceneTask | InputRequest | TargetRequest | ControlRequest | VariablesRequest | DrawingRequest | None
+        ] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._thread = threading.Thread(target=self._supervise, name="scene", daemon=True)
@@ -107,7 +120,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
             if self._given - self._handed + self._waiting >= MOST_WAITING:
                 return f"{MOST_WAITING} inputs wait for the next tick already"
             self._given += 1
-            self._requests.put(Give(given))
+            self._requests.put(InputRequest(given))
         return ""
 
     def control(self, what: Control, value: float, by: str) -> str:
@@ -132,7 +145,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 return f"{MOST_WAITING} requests wait already"
             if what in ("pause", "resume"):
                 self._task = replace(self._task, playing=what == "resume")  # of one that begins it anew, too
-            self._requests.put(Ask(what, value, by))
+            self._requests.put(ControlRequest(what, value, by))
         return ""
 
     def _go(self, what: Control, value: float) -> str:
@@ -147,7 +160,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         with self._lock:
             if value > self._target:
                 self._target = int(value)
-                self._requests.put(Go(self._target, tuple(self._set)))
+                self._requests.put(TargetRequest(self._target, tuple(self._set)))
                 self._set.clear()
         return ""
 
@@ -157,7 +170,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
         """
         with self._lock:
             if self._requests.qsize() < MOST_WAITING:
-                self._requests.put(Observe(tuple(values), tuple(values.values())))
+                self._requests.put(VariablesRequest(tuple(values), tuple(values.values())))
 
     def discard(self) -> None:
         """Leave no recording of a line that no tick has passed of. Once it is closed."""
@@ -177,7 +190,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
 
     def _watched(self, on: bool) -> None:
         with self._lock:
-            self._requests.put(Watch(on))
+            self._requests.put(DrawingRequest(on))
 
     def _end_process(self) -> None:
         with self._lock:
@@ -225,7 +238,7 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 self._set.clear()
                 self._requests = SimpleQueue()
                 self._requests.put(replace(self._task, number=len(self.recordings)))
-                self._requests.put(Watch(self._watchers > 0))
+                self._requests.put(DrawingRequest(self._watchers > 0))
                 self._process = process = start_child("conveyor_sim.protocols.tags.scene_process", there)
             there.close()
             threading.Thread(target=_pass_on, args=(self._requests, here), name="requests", daemon=True).start()
@@ -250,20 +263,20 @@ class SceneSource(View, AbstractContextManager["SceneSource"]):
                 continue
             message, heard = pipe.recv(), time.monotonic()
             match message:
-                case Copy():
+                case LineCopy():
                     self._take_copy(message)
-                case Note():
+                case UserMessage():
                     if message.bad or not self._closing:
                         self._say(message.text)
-                case Failed():
+                case SimulationFailed():
                     return message.reason
 
-    def _take_copy(self, copy: Copy) -> None:
-        for topic in HEARD:
+    def _take_copy(self, copy: LineCopy) -> None:
+        for topic in STATE_TOPICS:
             if (data := copy.states.get(topic)) is not None:
                 self.take(topic, decoded(topic, data))
                 self.pass_on(topic, data)
-        for topic in DRAWN:
+        for topic in DRAWING_TOPICS:
             if (data := copy.states.get(topic)) is not None:
                 self.keep(topic, partial(decoded, topic, data))
                 self.pass_on(topic, data)

@@ -1,4 +1,4 @@
-"""`Past`: what tags of a recording were, read from its files when somebody asks."""
+"""`TagHistory`: what tags of a recording were, read from its files when somebody asks."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ WINDOW = 1000
 """Ticks that are read together."""
 
 
-class Sample(NamedTuple):
+class TagSample(NamedTuple):
     """A value, and since which tick."""
 
     tick: int
     value: float
 
 
-class Past:
+class TagHistory:
     """Of one bag. Any thread may ask; one is answered at a time."""
 
     def __init__(self, path: Path) -> None:
@@ -40,19 +40,21 @@ class Past:
         self._first, self._last = first_ns // self._tick_ns, -(-last_ns // self._tick_ns)
         self._lock = threading.Lock()
 
-    def read(self, name: str, first: int, last: int, most: int, back: bool = False) -> tuple[list[Sample], int | None]:
+    def read(
+        self, name: str, first: int, last: int, most: int, back: bool = False
+    ) -> tuple[list[TagSample], int | None]:
         """Where a tag changed at ticks from first to last, backwards if asked for; and the tick to go on from, None if
         that is all: at most so many changes, from about MOST_READ messages.
 
         Raises BagError for damage.
         """
         first, last = max(first, self._first), min(last, self._last)
-        found: list[Sample] = []
+        found: list[TagSample] = []
         looked_at = 0
         if name not in self._places:
             return [], None
         with self._lock:
-            before: Sample | None = None
+            before: TagSample | None = None
             for low, high in _windows(first, last, back):
                 samples = list(self._samples(name, low * self._tick_ns, max(1, high * self._tick_ns) + 1))
                 if samples and (back or before is None):
@@ -73,7 +75,7 @@ class Past:
         with self._lock:
             self._bag.close()
 
-    def _before(self, name: str, tick: int) -> Sample | None:
+    def _before(self, name: str, tick: int) -> TagSample | None:
         """The last sample of a tag before a tick; None: there is none."""
         span = WINDOW
         while True:
@@ -83,13 +85,13 @@ class Past:
                 return found[0] if found else None
             span *= 4
 
-    def _samples(self, name: str, start_ns: int, stop_ns: int) -> Iterator[Sample]:
+    def _samples(self, name: str, start_ns: int, stop_ns: int) -> Iterator[TagSample]:
         """Of a tag, from a log time on, before another."""
         topic, place = self._places[name]
         for _, _, data in self._bag.raw({topic}, start_ns, stop_ns):
             message = self._bag.decode(topic, data)
             columns = messages.to_image(message).values if topic == "signals" else TOPICS[topic].unpack(message).value
-            yield Sample(int(message.tick), float(columns[place]))
+            yield TagSample(int(message.tick), float(columns[place]))
 
 
 def _windows(first: int, last: int, back: bool) -> Iterator[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""`TagSource`: what a SCADA face knows of a line, wherever that runs; and the source that a stepped simulation is."""
+"""`TagProvider`: what a SCADA face knows of a line, wherever that runs; and the source that a stepped simulation is."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag
 
 if TYPE_CHECKING:
-    from conveyor_sim.protocols.tags.tag_history import Past
+    from conveyor_sim.protocols.tags.tag_history import TagHistory
     from conveyor_sim.simulation import Simulation
 
 MODBUS = "modbus"
@@ -34,7 +34,7 @@ WEB = "web"
 PLC = "plc"
 """Source of what a PLC commands whose client the line is."""
 
-FACES = (MODBUS, OPCUA, MQTT, WEB, PLC)
+SCADA_SOURCES = (MODBUS, OPCUA, MQTT, WEB, PLC)
 """Sources of inputs that SCADA clients give."""
 
 MOST_WAITING = 1000
@@ -49,7 +49,7 @@ target: the tick up to which a line in lockstep goes (handshake.py)."""
 
 
 @dataclass(frozen=True)
-class About:
+class LineInfo:
     """What stays the same of a line for as long as it is served."""
 
     name: str
@@ -65,7 +65,7 @@ class About:
 
 
 @dataclass(frozen=True)
-class Shown:
+class LineSnapshot:
     """A line at one tick. It never changes, so any thread may read it."""
 
     tick: int
@@ -88,15 +88,15 @@ class Shown:
     """Patterns of the devices that it leaves to others."""
 
 
-class TagSource(Protocol):
+class TagProvider(Protocol):
     """Tags with their values, and a way in for inputs. Its methods may be called from any thread."""
 
     @property
-    def about(self) -> About:
+    def about(self) -> LineInfo:
         """What stays the same."""
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> LineSnapshot:
         """The line as it was last."""
 
     @property
@@ -104,7 +104,7 @@ class TagSource(Protocol):
         """What `control` can do here."""
 
     @property
-    def past(self) -> Past | None:
+    def past(self) -> TagHistory | None:
         """What its tags were before now; None: nobody knows but who has listened."""
 
     def events(self, after: int) -> tuple[int, Sequence[Event]]:
@@ -174,7 +174,7 @@ class RecentEvents:
         return total, last[len(last) - new :]
 
 
-class TickSource:
+class SteppedTagProvider:
     """A simulation that one thread steps, as a source.
 
     That thread hands over the inputs before a tick, and takes a copy of the line after it.
@@ -192,22 +192,22 @@ class TickSource:
         image, scene = simulation.process_image, simulation.scene
         self._names = (*image.signal_names, *image.command_names)
         self._signal_names = image.signal_names
-        self._about = About(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
+        self._about = LineInfo(scene.name, scene.where, scene.tick, scene.start_time, image.tags)
         self._alarms, self._read_back = simulation.line.alarms.columns(), simulation.line.read_back.columns()
         self._show()
 
     @property
-    def about(self) -> About:
+    def about(self) -> LineInfo:
         """What stays the same."""
         return self._about
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> LineSnapshot:
         """The line as it was at the end of the last tick."""
         return self._shown
 
     @property
-    def past(self) -> Past | None:
+    def past(self) -> TagHistory | None:
         """Nobody knows."""
         return None
 
@@ -256,7 +256,7 @@ class TickSource:
         simulation = self._simulation
         signals = simulation.line.signals()
         values = [*signals.values.tolist(), *simulation.line.read_back.values]
-        self._shown = Shown(
+        self._shown = LineSnapshot(
             simulation.tick,
             dict(zip(self._names, values, strict=True)),
             frozenset(self._signal_names[place] for place in signals.forced),

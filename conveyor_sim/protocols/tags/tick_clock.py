@@ -1,17 +1,17 @@
-"""`Clock`: the dates and times that faces state of ticks."""
+"""`TickClock`: the dates and times that faces state of ticks."""
 
 from __future__ import annotations
 
 from datetime import datetime, timedelta, timezone
 
 from conveyor_sim.protocols.server.interface import Stamps
-from conveyor_sim.protocols.tags.tag_provider import About
+from conveyor_sim.protocols.tags.tag_provider import LineInfo
 
 
-class Clock:
+class TickClock:
     """Dates and times of ticks."""
 
-    def __init__(self, about: About, stamps: Stamps) -> None:
+    def __init__(self, about: LineInfo, stamps: Stamps) -> None:
         """stamps: which of both the time stamps of values are."""
         self._start = datetime.fromisoformat(about.start_time.replace("Z", "+00:00")).astimezone(timezone.utc)
         self._tick = about.tick

@@ -18,16 +18,16 @@ from protocols.waiting import PATIENCE, until
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.protocols.hosting.server_kinds import FACES
+from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.hosting.settings import Settings
-from conveyor_sim.protocols.server.interface import FaceError
-from conveyor_sim.protocols.tags.bag_provider import BagSource
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp is not installed: pip install conveyor-sim[scada]")
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed: pip install conveyor-sim[foxglove]")
 
-FOXGLOVE = next(kind for kind in FACES if kind.name == "foxglove")
+FOXGLOVE = next(kind for kind in SERVER_KINDS if kind.name == "foxglove")
 LATCHED = {"/line", "/readback", "/alarm_states", "/plant"}
 SPHERE_LIST, LINE_STRIP = 7, 4
 
@@ -102,14 +102,14 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def source(bag: Path) -> Iterator[BagSource]:
-    with BagSource(bag, print, loop=True) as source:
+def source(bag: Path) -> Iterator[BagTagProvider]:
+    with BagTagProvider(bag, print, loop=True) as source:
         yield source
 
 
 @pytest.fixture(scope="module")
-def serving(source: BagSource) -> Iterator[Serving]:
-    with Serving(source, [(FOXGLOVE, 0)], Settings()) as serving:
+def serving(source: BagTagProvider) -> Iterator[Serving]:
+    with Serving(source, [(FOXGLOVE, 0)], ServerSettings()) as serving:
         yield serving
 
 
@@ -146,7 +146,7 @@ def test_who_comes_late_is_sent_what_is_latched(address: str, bag: Path) -> None
     assert {marker.text for marker in found["/plant"][0].markers} >= {"line", "turn", "out"}
 
 
-def test_bottles_and_gates_are_drawn_where_they_are(source: BagSource, address: str, bag: Path) -> None:
+def test_bottles_and_gates_are_drawn_where_they_are(source: BagTagProvider, address: str, bag: Path) -> None:
     assert source.control("pause", 0.0, "a test") == "" and source.control("seek", 7.0, "a test") == ""
     until(lambda: source.shown.tick == 700, "7 s")
 
@@ -163,7 +163,7 @@ def test_bottles_and_gates_are_drawn_where_they_are(source: BagSource, address: 
     assert source.control("resume", 0.0, "a test") == ""
 
 
-def test_another_time_begins_another_session_with_all_that_is_latched(source: BagSource, address: str) -> None:
+def test_another_time_begins_another_session_with_all_that_is_latched(source: BagTagProvider, address: str) -> None:
     async def seek(client: Client) -> list[str]:
         await client.messages(*LATCHED, until=lambda found: all(found.values()))
         assert source.control("seek", 0.0, "a test") == ""
@@ -188,10 +188,10 @@ def test_clients_that_look_are_counted(serving: Serving, address: str) -> None:
     until(lambda: "foxglove: 0 clients" in serving.progress(), "that it has left")
 
 
-def test_a_port_that_is_taken_is_said_in_one_sentence(source: BagSource, serving: Serving, address: str) -> None:
+def test_a_port_that_is_taken_is_said_in_one_sentence(source: BagTagProvider, serving: Serving, address: str) -> None:
     port = int(address.rpartition(":")[2])
-    with pytest.raises(FaceError, match=rf"^foxglove: 127.0.0.1:{port} can't be served \("):
-        Serving(source, [(FOXGLOVE, port)], Settings())
+    with pytest.raises(ServerError, match=rf"^foxglove: 127.0.0.1:{port} can't be served \("):
+        Serving(source, [(FOXGLOVE, port)], ServerSettings())
 
 
 def test_a_scene_is_served_to_foxglove(command: Callable[..., Served]) -> None:

@@ -24,7 +24,7 @@ from protocols.waiting import PATIENCE, until
 
 from bench.scada import CHANGING, CLIENTS, EVERY, KINDS, TICK, Counting
 from conveyor_sim.protocols.hosting.serving import Serving
-from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.hosting.settings import ServerSettings
 
 ROOT = Path(__file__).parents[3]
 CHANGES = 200
@@ -75,7 +75,7 @@ def resident() -> int:
 
 def test_no_client_that_keeps_up_misses_a_change_and_memory_stays_flat() -> None:
     source, memory = Counting(), 0
-    with Serving(source, [(kind, 0) for kind in KINDS], Settings()) as serving:
+    with Serving(source, [(kind, 0) for kind in KINDS], ServerSettings()) as serving:
         names = [kind.name for kind in KINDS]
         clients = {name: Clients(name, face.address) for name, face in zip(names, serving.faces, strict=True)}
         try:

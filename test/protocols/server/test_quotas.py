@@ -8,11 +8,19 @@ from pathlib import Path
 import pytest
 
 from conveyor_sim.protocols.hosting.limit_options import limit_names, limit_settings
-from conveyor_sim.protocols.hosting.settings import Settings
-from conveyor_sim.protocols.opcua.limits import Limits
+from conveyor_sim.protocols.hosting.settings import ServerSettings
+from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.server.budget import Budget
-from conveyor_sim.protocols.server.interface import FaceError
-from conveyor_sim.protocols.server.quotas import GREETED, GUEST, OPENED, Place, Places, Quota, share_of_guests
+from conveyor_sim.protocols.server.interface import ServerError
+from conveyor_sim.protocols.server.quotas import (
+    GREETED,
+    GUEST,
+    OPENED,
+    ConnectionSlot,
+    ConnectionSlots,
+    Quota,
+    share_of_guests,
+)
 
 HERE, THERE = "10.0.0.1", "10.0.0.2"
 
@@ -21,10 +29,10 @@ class Clients:
     """Connections to one server with 16 places, 12 per address, 4 per user."""
 
     def __init__(self, keeps_active: bool = False, idle: float = 1000.0) -> None:
-        self.places = Places(Quota(16, 12, 4, idle), keeps_active)
-        self.ended: list[Place] = []
+        self.places = ConnectionSlots(Quota(16, 12, 4, idle), keeps_active)
+        self.ended: list[ConnectionSlot] = []
 
-    def come(self, address: str = HERE, user: str | None = None) -> Place | None:
+    def come(self, address: str = HERE, user: str | None = None) -> ConnectionSlot | None:
         """Connect. user: "" for a guest, None for a connection without a session."""
         place = self.places.take(address, lambda: self.ended.append(place) if place else None)
         if place is not None and user is not None:
@@ -137,8 +145,8 @@ def test_budgets_refill_at_their_rate() -> None:
 
 
 def test_limits_are_options() -> None:
-    settings = Settings(**limit_settings(["opcua.nodes_per_read=5", "opcua.connections=7", "web.idle=3"]))
-    assert settings.opcua_limits == Limits(nodes_per_read=5)
+    settings = ServerSettings(**limit_settings(["opcua.nodes_per_read=5", "opcua.connections=7", "web.idle=3"]))
+    assert settings.opcua_limits == OpcUaLimits(nodes_per_read=5)
     assert settings.opcua_quota.connections == 7 and settings.web_quota.idle == 3
     assert settings.modbus_quota == Quota()
     assert all(limit_settings([f"{name}=1"]) for name in limit_names())
@@ -150,12 +158,12 @@ def test_limits_are_options() -> None:
     + [f"opcua.connections={text}" for text in ("0", "-1", "1.5", "x", "", "²", "9" * 5000, "1e3", "1000000001")],
 )
 def test_limits_that_can_not_be_are_named(option: str) -> None:
-    with pytest.raises(FaceError, match=r"^--limit: .* given, expected"):
+    with pytest.raises(ServerError, match=r"^--limit: .* given, expected"):
         limit_settings([option])
 
 
 def test_a_limit_is_given_once() -> None:
-    with pytest.raises(FaceError, match="given twice, expected once"):
+    with pytest.raises(ServerError, match="given twice, expected once"):
         limit_settings(["web.idle=3", "web.idle=4"])
 
 
@@ -164,8 +172,8 @@ def test_the_docs_state_all_limits_and_their_defaults() -> None:
     rows = re.findall(r"^\| ((?:`[a-z]+\.\w+`,? ?)+) \| (\d+) \|", text, re.MULTILINE)
     stated = {name: int(value) for names, value in rows for name in re.findall(r"`([^`]+)`", names)}
     assert set(stated) == set(limit_names())
-    settings = Settings(**limit_settings(f"{name}={value}" for name, value in stated.items()))
-    assert settings == Settings()
+    settings = ServerSettings(**limit_settings(f"{name}={value}" for name, value in stated.items()))
+    assert settings == ServerSettings()
 
 
 def test_a_connection_whose_login_failed_makes_room_first() -> None:

@@ -18,7 +18,7 @@ from conveyor_sim.line.inputs import FORCE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING
 from conveyor_sim.protocols.tags import tag_history
-from conveyor_sim.protocols.tags.bag_provider import BagSource
+from conveyor_sim.protocols.tags.bag_provider import BagTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -46,17 +46,17 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def source(bag: Path) -> Iterator[BagSource]:
-    with BagSource(bag, print, paused=True) as source:
+def source(bag: Path) -> Iterator[BagTagProvider]:
+    with BagTagProvider(bag, print, paused=True) as source:
         yield source
 
 
-def seek(source: BagSource, time: float) -> None:
+def seek(source: BagTagProvider, time: float) -> None:
     assert source.control("seek", time, "a test") == ""
     until(lambda: source.shown.tick == round(time * 100), f"{time:g} s")
 
 
-def test_its_past_is_where_tags_changed_forwards_and_back(source: BagSource, bag: Path) -> None:
+def test_its_past_is_where_tags_changed_forwards_and_back(source: BagTagProvider, bag: Path) -> None:
     with open_bag(bag) as opened:
         place = list(opened.line.signal_names).index(SPEED)
         speeds = [(frame.tick, float(frame.data[place])) for frame in opened.signals()]
@@ -71,13 +71,13 @@ def test_its_past_is_where_tags_changed_forwards_and_back(source: BagSource, bag
     assert source.past.read("nothing", 0, TICKS, 1000) == ([], None)
 
 
-def test_a_long_past_is_read_in_parts(source: BagSource, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_past_is_read_in_parts(source: BagTagProvider, monkeypatch: pytest.MonkeyPatch) -> None:
     whole, _ = source.past.read(SPEED, 0, TICKS, 1000)
     monkeypatch.setattr(tag_history, "MOST_READ", 10)
     monkeypatch.setattr(tag_history, "WINDOW", 100)
     for back in (False, True):
         first, last = 0, TICKS
-        found: list[tag_history.Sample] = []
+        found: list[tag_history.TagSample] = []
         parts = 0
         rest: int | None = 0
         while rest is not None:
@@ -89,7 +89,7 @@ def test_a_long_past_is_read_in_parts(source: BagSource, monkeypatch: pytest.Mon
         assert parts > 3 and found == (whole[::-1] if back else whole)
 
 
-def test_it_shows_what_was_recorded_at_any_time_forwards_and_back(source: BagSource, bag: Path) -> None:
+def test_it_shows_what_was_recorded_at_any_time_forwards_and_back(source: BagTagProvider, bag: Path) -> None:
     with open_bag(bag) as opened:
         names = opened.line.signal_names
         recorded = {frame.tick: dict(zip(names, frame.data.tolist(), strict=True)) for frame in opened.signals()}
@@ -107,7 +107,7 @@ def test_it_shows_what_was_recorded_at_any_time_forwards_and_back(source: BagSou
         assert shown.forced == ({"photo_eyes/full1/blocked"} if after else frozenset())
 
 
-def test_it_plays_with_what_happens_and_ends_and_begins_anew(source: BagSource) -> None:
+def test_it_plays_with_what_happens_and_ends_and_begins_anew(source: BagTagProvider) -> None:
     seek(source, 4.9)
     assert source.shown.owner == ""
     heard = source.events(0)[0]
@@ -133,7 +133,7 @@ def test_it_plays_with_what_happens_and_ends_and_begins_anew(source: BagSource) 
     assert source.shown.tick == tick
 
 
-def test_it_can_not_be_commanded_nor_led_out_of_itself(source: BagSource) -> None:
+def test_it_can_not_be_commanded_nor_led_out_of_itself(source: BagTagProvider) -> None:
     assert source.give(GIVEN).endswith("a recording can't be commanded")
     assert source.control("seek", 11.0, "a test") == "seek: 11 given, expected a time of the recording, 0 to 10 (s)"
     assert source.control("speed", -1.0, "a test").startswith("speed: -1 given")
@@ -142,7 +142,7 @@ def test_it_can_not_be_commanded_nor_led_out_of_itself(source: BagSource) -> Non
 
 def test_what_can_not_be_shown_is_said_at_the_start(bag: Path, tmp_path: Path) -> None:
     with pytest.raises(BagError, match="no such bag"):
-        BagSource(tmp_path / "none", print)
+        BagTagProvider(tmp_path / "none", print)
     broken = tmp_path / "broken"
     shutil.copytree(bag, broken)
     (file,) = broken.glob("*.mcap")
@@ -150,11 +150,11 @@ def test_what_can_not_be_shown_is_said_at_the_start(bag: Path, tmp_path: Path) -
     data[len(data) // 2] ^= 0xFF
     file.write_bytes(data)
     with pytest.raises(BagError, match="is damaged"):
-        BagSource(broken, print)
+        BagTagProvider(broken, print)
     folder = tmp_path / "silent"
     simulation = Simulation(load_scene("config/scenarios/zoned_line.yaml", {"outputs": {"signals": 0.0}}), threads=1)
     with Recorder(folder) as recorder:
         outputs = Outputs(simulation, [recorder], run_id="")
         outputs.start()
     with pytest.raises(BagError, match="no message of topic signals"):
-        BagSource(folder, print)
+        BagTagProvider(folder, print)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from conveyor_sim.line.inputs import SET, Input
-from conveyor_sim.protocols.tags.handshake import FURTHEST, HandshakeSource
+from conveyor_sim.protocols.tags.handshake import FURTHEST, HandshakeTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 
@@ -17,11 +17,11 @@ def written(value: float) -> Input:
 
 
 @pytest.fixture
-def source() -> HandshakeSource:
-    return HandshakeSource(Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1))
+def source() -> HandshakeTagProvider:
+    return HandshakeTagProvider(Simulation(load_scene("config/scenarios/zoned_line.yaml"), threads=1))
 
 
-def advance(source: HandshakeSource) -> list[float]:
+def advance(source: HandshakeTagProvider) -> list[float]:
     """One tick, and what acted in it; it must not have to wait."""
     taken = source.take(0.0)
     assert taken is not None
@@ -32,7 +32,7 @@ def advance(source: HandshakeSource) -> list[float]:
     return [given.values[0] for given in taken]
 
 
-def test_nothing_passes_before_there_is_a_target(source: HandshakeSource) -> None:
+def test_nothing_passes_before_there_is_a_target(source: HandshakeTagProvider) -> None:
     assert source.give(written(0.1)) == ""
     assert source.take(0.0) is None
     assert source.control("target", 1, "plc") == ""
@@ -40,7 +40,7 @@ def test_nothing_passes_before_there_is_a_target(source: HandshakeSource) -> Non
     assert source.take(0.0) is None
 
 
-def test_sets_act_at_the_ticks_between_targets_however_early_they_come(source: HandshakeSource) -> None:
+def test_sets_act_at_the_ticks_between_targets_however_early_they_come(source: HandshakeTagProvider) -> None:
     for value, target in ((0.1, 2), (0.2, 3)):
         source.give(written(value))
         source.control("target", target, "plc")
@@ -49,7 +49,7 @@ def test_sets_act_at_the_ticks_between_targets_however_early_they_come(source: H
     assert source.take(0.0) is None
 
 
-def test_a_target_once_more_does_nothing(source: HandshakeSource) -> None:
+def test_a_target_once_more_does_nothing(source: HandshakeTagProvider) -> None:
     source.control("target", 2, "plc")
     source.give(written(0.1))
     assert source.control("target", 2, "plc") == source.control("target", 0, "plc") == ""
@@ -58,7 +58,7 @@ def test_a_target_once_more_does_nothing(source: HandshakeSource) -> None:
     assert advance(source) == [0.1]
 
 
-def test_no_tick_is_seen_before_the_target(source: HandshakeSource) -> None:
+def test_no_tick_is_seen_before_the_target(source: HandshakeTagProvider) -> None:
     seen = []
     source.listen(lambda: seen.append(source.shown.tick))
     source.control("target", 3, "plc")
@@ -68,10 +68,10 @@ def test_no_tick_is_seen_before_the_target(source: HandshakeSource) -> None:
 
 
 @pytest.mark.parametrize("target", [0.5, -1, FURTHEST + 1, float("inf"), float("nan")])
-def test_a_target_that_can_t_be_is_refused(source: HandshakeSource, target: float) -> None:
+def test_a_target_that_can_t_be_is_refused(source: HandshakeTagProvider, target: float) -> None:
     assert "expected a whole number from 0 to" in source.control("target", target, "plc")
     assert source.take(0.0) is None
 
 
-def test_nothing_else_is_asked_of_the_run(source: HandshakeSource) -> None:
+def test_nothing_else_is_asked_of_the_run(source: HandshakeTagProvider) -> None:
     assert "expected run/target_tick alone" in source.control("pause", 0, "plc")

@@ -22,13 +22,13 @@ from conveyor_sim.line.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPED
 from conveyor_sim.protocols.hosting.frames import MOST_FRAMES, Frames
-from conveyor_sim.protocols.hosting.remote_provider import Calls, RemoteSource
+from conveyor_sim.protocols.hosting.remote_provider import ParentCalls, RemoteTagProvider
 from conveyor_sim.protocols.hosting.server_messages import ServerTask
-from conveyor_sim.protocols.hosting.settings import Settings
+from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.tags.line_mirror import decoded
-from conveyor_sim.protocols.tags.scene_messages import Task
-from conveyor_sim.protocols.tags.scene_provider import SceneSource
-from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Shown
+from conveyor_sim.protocols.tags.scene_messages import SceneTask
+from conveyor_sim.protocols.tags.scene_provider import SceneTagProvider
+from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, LineSnapshot
 from conveyor_sim.scene import Scene, load_scene
 
 SPEED, SETPOINT = "belts/zone1/speed", "belts/zone1/cmd_speed"
@@ -42,13 +42,15 @@ class Served:
     """Sources that end with their test."""
 
     def __init__(self) -> None:
-        self.sources: list[SceneSource] = []
+        self.sources: list[SceneTagProvider] = []
         self.said: list[str] = []
 
     def __call__(
         self, scene: Scene | None = None, record: Path | None = None, factor: float = 1.0, lockstep: bool = False
-    ) -> SceneSource:
-        source = SceneSource(Task(scene or zoned(), record, 0, factor, 1, lockstep=lockstep), self.said.append)
+    ) -> SceneTagProvider:
+        source = SceneTagProvider(
+            SceneTask(scene or zoned(), record, 0, factor, 1, lockstep=lockstep), self.said.append
+        )
         self.sources.append(source)
         source.wait_for_line()
         return source
@@ -63,15 +65,15 @@ def served() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def kept() -> Iterator[SceneSource]:
+def kept() -> Iterator[SceneTagProvider]:
     """For tests that need no process of their own."""
-    with SceneSource(Task(zoned(), None, 0, 1.0, 1), lambda sentence: None) as source:
+    with SceneTagProvider(SceneTask(zoned(), None, 0, 1.0, 1), lambda sentence: None) as source:
         source.wait_for_line()
         yield source
 
 
 @pytest.fixture
-def running(kept: SceneSource) -> SceneSource:
+def running(kept: SceneTagProvider) -> SceneTagProvider:
     """The same, at its beginning."""
     run = kept.shown.run_id
     assert kept.control("reset", 0, "a test") == ""
@@ -85,7 +87,7 @@ def setpoint(value: float, writer: str = "me") -> Input:
     return Input("modbus", writer, "controller", SET, (SETPOINT,), (value,))
 
 
-def pause(source: SceneSource) -> None:
+def pause(source: SceneTagProvider) -> None:
     assert source.control("pause", 0.0, "a test") == ""
     until(lambda: source.shown.run.state == PAUSED, "the pause")
 
@@ -113,7 +115,7 @@ def test_it_is_shown_as_it_is(served: Served) -> None:
     until(lambda: source.events(0)[0] > 0, "an event")
 
 
-def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneSource) -> None:
+def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneTagProvider) -> None:
     source, ticks = running, list[int]()
     end = source.listen(lambda: ticks.append(source.shown.tick))
     until(lambda: len(ticks) > 100, "a second of ticks")
@@ -122,13 +124,13 @@ def test_every_tick_of_a_line_in_real_time_can_be_heard_of(running: SceneSource)
     assert len(set(ticks)) > 50  # of a busy machine
 
 
-def mirror(source: SceneSource, pipe: Connection) -> RemoteSource:
+def mirror(source: SceneTagProvider, pipe: Connection) -> RemoteTagProvider:
     """Return the line as the process of a protocol server mirrors it."""
-    task = ServerTask("modbus", 0, Settings(), source.controls, True, False, None, (0, 0))
-    return RemoteSource(task, Calls(pipe), decoded, None)
+    task = ServerTask("modbus", 0, ServerSettings(), source.controls, True, False, None, (0, 0))
+    return RemoteTagProvider(task, ParentCalls(pipe), decoded, None)
 
 
-def catch_up(frames: Frames, view: RemoteSource) -> int:
+def catch_up(frames: Frames, view: RemoteTagProvider) -> int:
     """Apply all frames that wait; how many there were."""
     count = 0
     while (frame := frames.fetch()) is not None and frame.shown:
@@ -137,7 +139,7 @@ def catch_up(frames: Frames, view: RemoteSource) -> int:
     return count
 
 
-def test_a_mirror_shows_what_its_source_does(running: SceneSource) -> None:
+def test_a_mirror_shows_what_its_source_does(running: SceneTagProvider) -> None:
     frames, (pipe, _) = Frames(running), Pipe()
     view = mirror(running, pipe)
     view.apply(frames.fetch())
@@ -162,7 +164,7 @@ def test_a_mirror_shows_what_its_source_does(running: SceneSource) -> None:
     assert frames.fetch() is None
 
 
-def catch_up_until(frames: Frames, view: RemoteSource, condition: Callable[[], bool]) -> None:
+def catch_up_until(frames: Frames, view: RemoteTagProvider, condition: Callable[[], bool]) -> None:
     def step() -> bool:
         view.apply(frames.fetch())
         return condition()
@@ -170,7 +172,7 @@ def catch_up_until(frames: Frames, view: RemoteSource, condition: Callable[[], b
     until(step, "the mirror")
 
 
-def test_who_fetches_nothing_misses_ticks_and_fills_no_memory(running: SceneSource) -> None:
+def test_who_fetches_nothing_misses_ticks_and_fills_no_memory(running: SceneTagProvider) -> None:
     frames, (pipe, _) = Frames(running), Pipe()
     view = mirror(running, pipe)
     frames.counts = False  # a process that starts
@@ -187,7 +189,7 @@ def test_who_fetches_nothing_misses_ticks_and_fills_no_memory(running: SceneSour
     frames.end()
 
 
-def test_who_gets_no_answer_is_refused(running: SceneSource) -> None:
+def test_who_gets_no_answer_is_refused(running: SceneTagProvider) -> None:
     pipe, _unread = Pipe()
     view = mirror(running, pipe)
     assert "gave no answer within 1 s" in view.give(setpoint(0.25))
@@ -294,7 +296,7 @@ def test_what_the_guard_stops_is_shown_with_the_reason(served: Served) -> None:
     until(lambda: source.shown.run.state == PAUSED, "the reset")
 
 
-def test_what_waits_while_it_is_paused_is_bounded(running: SceneSource) -> None:
+def test_what_waits_while_it_is_paused_is_bounded(running: SceneTagProvider) -> None:
     source = running
     pause(source)
     refused = [source.give(setpoint(0.1 + 0.1 * (number % 2))) for number in range(MOST_WAITING + 100)]
@@ -308,7 +310,7 @@ def test_what_waits_while_it_is_paused_is_bounded(running: SceneSource) -> None:
 def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Served, tmp_path: Path) -> None:
     source = served(record=tmp_path / "bag")
     until(lambda: source.shown.tick > 20, "ticks")
-    run, seen = source.shown.run_id, list[Shown]()
+    run, seen = source.shown.run_id, list[LineSnapshot]()
     source.listen(lambda: seen.append(source.shown))
     os.kill(source.pid, signal.SIGKILL)
     until(lambda: any(shown.lost for shown in seen), "its loss")
@@ -321,7 +323,7 @@ def test_a_process_that_is_killed_is_told_of_and_followed_by_another(served: Ser
     assert replay(tmp_path / "bag_1").difference is None
 
 
-def test_a_process_that_hangs_is_stale_until_it_goes_on(running: SceneSource) -> None:
+def test_a_process_that_hangs_is_stale_until_it_goes_on(running: SceneTagProvider) -> None:
     source = running
     until(lambda: source.shown.tick > 5, "ticks")
     os.kill(source.pid, signal.SIGSTOP)
@@ -336,14 +338,14 @@ def test_a_process_that_hangs_is_stale_until_it_goes_on(running: SceneSource) ->
 
 def test_a_scene_that_can_not_be_recorded_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    source = SceneSource(Task(zoned(), tmp_path / "file", 0, 1.0, 1), lambda sentence: None)
+    source = SceneTagProvider(SceneTask(zoned(), tmp_path / "file", 0, 1.0, 1), lambda sentence: None)
     with pytest.raises(ConveyorError, match="a file is in its place"):
         source.wait_for_line()
     source.close()
     assert source.give(setpoint(0.1)) != ""
 
 
-def test_faults_are_not_for_clients(running: SceneSource) -> None:
+def test_faults_are_not_for_clients(running: SceneTagProvider) -> None:
     source, before = running, running.events(0)[0]
     assert source.give(Input("opcua", "Jo", "operator", INJECT, ("machines/filler/stop",), (1.0,))) == ""
     until(lambda: any(event.kind == "command_refused" for event in source.events(before)[1]), "the refusal")
