@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from fuzz.crossing import crossed
-from fuzz.inputs import accepted, faults_of
 from fuzz.violation import Violation
 from numpy.typing import NDArray
 
+from conveyor_sim.line.inputs import INJECT, CommandOutcome
 from conveyor_sim.line.packml import State
 from conveyor_sim.observe.columns import BottleColumns
 from conveyor_sim.scene.geometry import SegmentPiece
@@ -46,8 +45,7 @@ class DeviceWatch:
         self._sim = simulation
         self._signals = simulation.process_image.signals
         self._scene = simulation.scene
-        self._faults = faults_of(simulation.scene)
-        self._forced: dict[str, float] = {}
+        self._injected: dict[str, float] = {}
         """The last accepted value of each injected fault."""
         self._shapes = moving_shapes(simulation.scene) if simulation.model.has("moving_rails") else []
         self._now = self._before = self._values()
@@ -57,11 +55,11 @@ class DeviceWatch:
         self._work = None if ledger is None else ledger.rail_work.copy()
         self._image()
 
-    def check(self, before: BottleColumns, now: BottleColumns, sent: list[tuple[Any, ...]]) -> None:
-        """The checks, between two ticks. sent: names, values, and whether they are faults."""
-        for names, values, fault in sent:
-            if fault and accepted(self._faults, names, values):
-                self._forced |= dict(zip(names, values, strict=True))
+    def check(self, before: BottleColumns, now: BottleColumns, outcomes: list[CommandOutcome]) -> None:
+        """Check the devices between two ticks. outcomes: of the inputs of the second one."""
+        for outcome in outcomes:
+            if outcome.accepted and outcome.operation == INJECT:
+                self._injected |= dict(zip(outcome.names, outcome.values, strict=True))
         self._before, self._now = self._now, self._values()
         self._image()
         self._rising()
@@ -86,7 +84,7 @@ class DeviceWatch:
 
     def _fault(self, name: str) -> float:
         """Return the value of an injected fault, 0 if it was never injected."""
-        return self._forced.get(name, 0.0)
+        return self._injected.get(name, 0.0)
 
     def _place(self, shape: MovingShape, values: dict[str, float]) -> float:
         return values[f"{shape.name}/position"] * shape.stroke
@@ -205,7 +203,7 @@ class DeviceWatch:
         gone = np.setdiff1d(before.id, now.id).size
         for name, eye in self._scene.photo_eyes.items():
             if (
-                any(fault.startswith(f"photo_eyes/{name}/") for fault in self._forced)
+                any(fault.startswith(f"photo_eyes/{name}/") for fault in self._injected)
                 or eye.debounce
                 or eye.on_delay
                 or eye.off_delay
