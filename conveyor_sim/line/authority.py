@@ -5,7 +5,6 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE, WRITER_KINDS, Input, WriterKind
-from conveyor_sim.line.packml import Command
 from conveyor_sim.support.printable import printable
 
 PEOPLE: tuple[WriterKind, ...] = ("operator", "engineer")
@@ -50,9 +49,6 @@ IN_CONTROL: Mapping[int, tuple[WriterKind, ...]] = {
     MANUAL: (*PEOPLE, "test"),
 }
 """Whose commands a device takes, by its mode."""
-
-CNTRL_CMD = "/cntrl_cmd"
-"""How the names end by which machines take commands of PackML."""
 
 OPERATORS_MODES = (AUTOMATIC, MANUAL)
 """Between which an operator may switch; engineers and tests between all."""
@@ -101,11 +97,6 @@ def hand_over_problem(given: Input) -> str:
         expected = "texts alone, patterns of devices" if given.operation == OWN else "nothing beside its writer"
         return f"{len(given.names)} names, {len(given.values)} values, {len(given.texts)} texts, expected {expected}"
     return "" if given.writer else "no writer given, expected the name of a controller"
-
-
-def stops(name: str, value: float, kind: str) -> bool:
-    """Whether a command is Stop or Abort of a machine, given by a person: that is taken in every mode."""
-    return kind in PEOPLE and value in (Command.STOP, Command.ABORT) and name.endswith(CNTRL_CMD)
 
 
 def unauthorized(given: Input, operations: Collection[str]) -> str:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Collection, Sequence
 from types import SimpleNamespace
 
 from conveyor_sim.line.alarms.declaration import Declared, error
-from conveyor_sim.line.authority import CNTRL_CMD
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.failures import Draws, FailureClock, PlannedTimes
 from conveyor_sim.line.packml import COMMAND_TEXTS, STATE_TEXTS, Command, State, StateMachine, mode_objection, objection
@@ -32,6 +31,9 @@ from conveyor_sim.scene.parts.machine import PackmlPart
 
 ROUNDING = 1e-9
 """Of a cycle: sums of rate x tick must not miss the tick they fall on."""
+
+CNTRL_CMD = "/cntrl_cmd"
+"""Ending of the names of commands that take PackML commands."""
 
 EXECUTE, SUSPENDED, HELD = int(State.EXECUTE), int(State.SUSPENDED), int(State.HELD)
 
@@ -155,6 +157,10 @@ class MachineDevice(Device):
     def mode_objection(self) -> str:
         """Why its mode can't change in the present state, "" if it can."""
         return mode_objection(self.state)
+
+    def stops(self, name: str, value: float) -> bool:
+        """Return True for the PackML commands Stop and Abort."""
+        return name.endswith(CNTRL_CMD) and value in (Command.STOP, Command.ABORT)
 
     def stop_by_hand(self, name: str, value: float) -> None:
         """Take Stop or Abort; cntrl_cmd stays as who has control gave it."""

@@ -16,7 +16,6 @@ from conveyor_sim.line.authority import (
     pattern_problem,
     reserved,
     reserved_mode,
-    stops,
     unauthorized,
     who,
 )
@@ -175,8 +174,8 @@ class Modes:
         """Commands of an input that stop devices, and may be given in any mode: if a person gives them."""
         if given.writer_kind not in PEOPLE:
             return ()
-        own, kind = zip(given.names, given.values, strict=True), given.writer_kind
-        return [name for name, value in own if name in self._device_of and stops(name, value, kind)]
+        own = ((name, value) for name, value in zip(given.names, given.values, strict=True) if name in self._device_of)
+        return [name for name, value in own if self._devices[self._device_of[name]].stops(name, value)]
 
     def _is_free(self, given: Input) -> bool:
         """Whether no other controller than the writer owns the line."""
