@@ -51,7 +51,28 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "accounts": "model state",
         "stepping": "accounts model state",
     },
-    "control": {"": "", "st": ""},
+    "line": {
+        "units": "",
+        "tag": "units",
+        "process_image": "tag",
+        "alarms": "",
+        "device": "alarms process_image tag",
+        "commands": "alarms device tag",
+        "devices": "alarms commands device process_image tag",
+        "machines": "alarms commands device devices tag",
+        "": "alarms commands device devices machines process_image tag",
+    },
+    "control": {
+        "alarm": "",
+        "line_tags": "",
+        "scan": "alarm line_tags",
+        "load": "scan",
+        "recorded": "scan",
+        "blocks": "",
+        "edges": "scan",
+        "st": "line_tags load recorded scan",
+        "": "alarm blocks edges scan",
+    },
 }
 """Import rules inside a package, from the lowest up: what each part may import of the others.
 

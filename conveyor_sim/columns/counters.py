@@ -29,7 +29,7 @@ class CounterColumns:
     """Thrown out."""
     failures: NDArray[np.uint64]
     running: NDArray[np.float64]
-    """s, as those that follow; `line/time_account.py` says what each is."""
+    """s, as those that follow; `line/machines/time_account.py` says what each is."""
     starved: NDArray[np.float64]
     blocked: NDArray[np.float64]
     down: NDArray[np.float64]
@@ -38,7 +38,7 @@ class CounterColumns:
     rate: NDArray[np.float64]
     """1/s, nominal."""
     availability: NDArray[np.float64]
-    """These by `line/efficiency.py`; NaN while nothing is known."""
+    """These by `line/machines/efficiency.py`; NaN while nothing is known."""
     effectiveness: NDArray[np.float64]
     quality: NDArray[np.float64]
     oee: NDArray[np.float64]

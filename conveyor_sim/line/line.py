@@ -11,23 +11,23 @@ from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.columns.damage import DamageEvent
 from conveyor_sim.columns.events import Event
 from conveyor_sim.columns.image import Image
+from conveyor_sim.line.alarm_system import AlarmSystem
 from conveyor_sim.line.alarms.alarms import Alarms
-from conveyor_sim.line.alarms.system import AlarmSystem
-from conveyor_sim.line.authority import MAY, PEOPLE, unauthorized
-from conveyor_sim.line.belt_surfaces import BeltSurfaces
-from conveyor_sim.line.commands import refusal, shown
-from conveyor_sim.line.counters import RESET_COUNTERS, Counters
+from conveyor_sim.line.commands.authority import MAY, PEOPLE, unauthorized
+from conveyor_sim.line.commands.forcing import Forcing
+from conveyor_sim.line.commands.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, as_kept
+from conveyor_sim.line.commands.modes import Modes
+from conveyor_sim.line.commands.operation import Operation
+from conveyor_sim.line.commands.read_back import ReadBack
+from conveyor_sim.line.commands.refusal import refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.devices import build_devices
+from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.devices.belt import BeltDevice
+from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
 from conveyor_sim.line.devices.photo_eye import PhotoEyeDevice
 from conveyor_sim.line.event_log import EventLog
-from conveyor_sim.line.forcing import Forcing
-from conveyor_sim.line.inputs import FAULT, INJECT, SET, WATCHDOG, CommandOutcome, Input, as_kept
-from conveyor_sim.line.modes import Modes
-from conveyor_sim.line.operation import Operation
+from conveyor_sim.line.machines.counters import RESET_COUNTERS, Counters
 from conveyor_sim.line.process_image import ProcessImage
-from conveyor_sim.line.read_back import ReadBack
 from conveyor_sim.line.run_state import RUN_TAGS
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.physics.model import build_model

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.opcua.limits import LIMITS, Limits
 from conveyor_sim.protocols.quotas import QUOTA, Quota
 from conveyor_sim.protocols.users import Role

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.face import HERE, Face, FaceError, Settings, require_free
 from conveyor_sim.protocols.shared import Shared
 from conveyor_sim.protocols.source import MODBUS, MQTT, OPCUA, WEB, TagSource

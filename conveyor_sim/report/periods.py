@@ -18,7 +18,7 @@ class Period(NamedTuple):
     end: float
     """s"""
     category: str
-    """As in `line/time_account.py`."""
+    """As in `line/machines/time_account.py`."""
     reason: str
     """Why it was down, idle or stopped by plan; "" else."""
 

@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.line.inputs import SET
+from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.protocols.face import Face
 from conveyor_sim.protocols.handshake import TARGET, HandshakeSource
 from conveyor_sim.protocols.modbus.address_map import modbus_map

@@ -16,7 +16,7 @@ from datetime import datetime, timezone
 from types import MappingProxyType
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.clock import Clock
 from conveyor_sim.protocols.face import FaceError, Stamps, Status
 from conveyor_sim.protocols.holding import HoldingService

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from line.test_station import LOADED, stationed
+from line.machines.test_station import LOADED, stationed
 from physics.state.test_checkpoint import INTEGRATORS, queue, run
 from scenes import SPRINGS_AND_RINGS, line, scene
 
