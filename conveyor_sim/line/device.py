@@ -189,8 +189,8 @@ class Device:
     def take_mode(self, mode: int, now: ScanContext) -> None:
         """It is in other hands (authority.MODES) from this tick on; commands in force stay."""
 
-    def wake(self) -> None:
-        """Forget what was only kept to save work: what it remembers was restored."""
+    def restored(self, tick: int) -> None:
+        """Derive again what depends on public attributes, which were restored for a tick."""
 
     @property
     def held(self) -> Sequence[int]:

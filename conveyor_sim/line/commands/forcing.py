@@ -30,7 +30,7 @@ class Forcing:
         self._place = {tag.name: place for place, tag in enumerate(signals)}
         self._note = note
         self.forces = []
-        self.wake()
+        self._arrange()
 
     def operations(self) -> dict[str, Operation]:
         """What forces, by name."""
@@ -53,15 +53,19 @@ class Forcing:
         """What is read of one signal, which has this value."""
         return next((forced for other, forced, _ in self.forces if other == name), value)
 
-    def wake(self) -> None:
-        """It was restored. Raises ValueError for what can't be."""
+    def restored(self, tick: int) -> None:
+        """Check the restored attributes. Raise ValueError if they do not fit the line."""
         names, values = [name for name, _, _ in self.forces], [value for _, value, _ in self.forces]
         places = [self._place.get(name, -1) for name in names]
         if places != sorted(set(places)) or (names and refusal(self._table, "signal", names, values)):
             raise ValueError("line.forcing has what can't be forced")
         if any(by != printable(by, SENTENCE) for _, _, by in self.forces):
             raise ValueError("line.forcing has texts that can't be")
-        self._places, self._values = np.array(places, dtype=np.uint32), np.array(values)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        self._places = np.array([self._place[name] for name in self.names], dtype=np.uint32)
+        self._values = np.array([value for _, value, _ in self.forces])
 
     def _problem(self, given: Input) -> str:
         if given.texts:
@@ -91,4 +95,4 @@ class Forcing:
 
     def _take(self, forces: Mapping[str, tuple[str, float, str]]) -> None:
         self.forces = [forces[name] for name in sorted(forces, key=self._place.__getitem__)]
-        self.wake()
+        self._arrange()

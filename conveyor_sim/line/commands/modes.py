@@ -144,8 +144,8 @@ class Modes:
         self.reported += new
         return bool(new)
 
-    def wake(self) -> None:
-        """It was restored. Raises ValueError for what can't be."""
+    def restored(self, tick: int) -> None:
+        """Check the restored attributes. Raise ValueError if they do not fit the line."""
         known = {f"{device}:{kind}" for device in self.modes for kind in WRITER_KINDS}
         if any(mode not in MODES for mode in self.modes.values()) or not known.issuperset(self.reported):
             raise ValueError("line.modes has a mode or a device that there is not")

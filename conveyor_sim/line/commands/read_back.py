@@ -33,8 +33,8 @@ class ReadBack:
         """A tick begins."""
         self._changed = False
 
-    def wake(self, tick: int) -> None:
-        """It was restored at a tick: whoever looks now has not seen it. Raises ValueError for what it can't be."""
+    def restored(self, tick: int) -> None:
+        """Check the restored attributes and report them as changed. Raise ValueError if they do not fit the line."""
         commands = len(self._index)
         if not len(self.values) == len(self.since) == len(self.writers) == commands:
             raise ValueError(f"line.read_back has other commands than the {commands} of the scene")

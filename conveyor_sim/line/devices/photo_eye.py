@@ -77,8 +77,8 @@ class PhotoEyeDevice(Device):
             self.next_flip = now.time
             self._draw()
 
-    def wake(self) -> None:
-        """It was restored, and may have been in the middle of something."""
+    def restored(self, tick: int) -> None:
+        """Evaluate the beam again in the next tick, because a delay may be running."""
         self._quiet = False
 
     def end(self, now: ScanContext) -> None:

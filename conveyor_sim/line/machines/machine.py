@@ -120,7 +120,7 @@ class MachineDevice(Device):
             }
         )
         self._clocks: list[FailureClock] = list(vars(self.clocks).values())
-        self.wake()
+        self.restored(0)
 
     @property
     def alarms(self) -> Sequence[Declared]:
@@ -141,8 +141,8 @@ class MachineDevice(Device):
         """Call something as a tick ends in which the category or the stop reason has changed."""
         self._watchers.append(watcher)
 
-    def wake(self) -> None:
-        """Follow from what is remembered."""
+    def restored(self, tick: int) -> None:
+        """Derive flags, category and status from the stored attributes."""
         self._note_failures()
         self._note_state()
         self._category: Category = category_of(self.state, self.reason, self.cause, bool(self._failed))
