@@ -14,7 +14,7 @@ from conveyor_sim.bag.cdr import CdrWriter, pose_rows
 from conveyor_sim.bag.packing import packer
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
-from conveyor_sim.line.inputs import CommandOutcome, Input, recorded_input
+from conveyor_sim.line.commands.inputs import CommandOutcome, Input, recorded_input
 from conveyor_sim.line.run_state import RunState
 
 if TYPE_CHECKING:

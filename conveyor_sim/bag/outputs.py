@@ -13,7 +13,7 @@ from conveyor_sim.columns.variables import VariableColumns
 
 if TYPE_CHECKING:
     from conveyor_sim.columns.events import GuardEvent
-    from conveyor_sim.line.inputs import CommandOutcome
+    from conveyor_sim.line.commands.inputs import CommandOutcome
     from conveyor_sim.line.run_state import RunState
     from conveyor_sim.simulation import Simulation
 

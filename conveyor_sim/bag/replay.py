@@ -20,7 +20,7 @@ from conveyor_sim.bag.topics import COMPARED, STATES, Snapshot
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.errors import BagError, SceneError
-from conveyor_sim.line.inputs import ARRIVAL
+from conveyor_sim.line.commands.inputs import ARRIVAL
 from conveyor_sim.scene import parse_overrides, parse_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.printable import printable

@@ -17,8 +17,8 @@ from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.errors import SceneError
-from conveyor_sim.line.devices import build_devices
-from conveyor_sim.line.inputs import ARRIVAL
+from conveyor_sim.line.commands.inputs import ARRIVAL
+from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.tag import Adds
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.physics.model.remedies import StepLimit, step_limit

@@ -11,7 +11,7 @@ from conveyor_sim.bag.messages import Header, Outcome, to_outcome
 from conveyor_sim.bag.qos import EVENTS, LATCHED, Qos
 from conveyor_sim.bag.reader import Bag
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.inputs import SET
+from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.line.process_image import speed_command
 from conveyor_sim.line.run_state import REPLAYING, RunState
 from conveyor_sim.support.printable import printable

@@ -14,7 +14,7 @@ from conveyor_sim.bag.messages import Outcome
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import typestore
 from conveyor_sim.columns.bottles import BottleColumns, ContactColumns
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 
 
 class Line:

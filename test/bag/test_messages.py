@@ -17,7 +17,7 @@ from conveyor_sim.columns.damage import DamageColumns, DamageEvent, RailWearColu
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.columns.ledger import balance
-from conveyor_sim.line.inputs import CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import CommandOutcome, Input
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 

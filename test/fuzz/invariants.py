@@ -14,7 +14,7 @@ from fuzz.violation import Violation
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.line.inputs import CommandOutcome
+from conveyor_sim.line.commands.inputs import CommandOutcome
 from conveyor_sim.scene.contacts import Contact
 from conveyor_sim.simulation import Simulation
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from conveyor_sim.engine.arrays.moving import HELD, OFF_PROFILE, ON_PROFILE, MovingRails
-from conveyor_sim.line.course import course_to, later, position_at, resting
 from conveyor_sim.line.device import Device, ScanContext
-from conveyor_sim.line.setup import Setup
+from conveyor_sim.line.devices.course import course_to, later, position_at, resting
+from conveyor_sim.line.devices.setup import Setup
 from conveyor_sim.line.tag import number, switch
 from conveyor_sim.scene.parts.movers import Mover as MoverPart
 

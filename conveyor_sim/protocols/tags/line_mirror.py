@@ -20,7 +20,7 @@ from conveyor_sim.columns.events import Event, EventColumns
 from conveyor_sim.columns.image import Image
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.server.interface import Health

@@ -21,7 +21,7 @@ from conveyor_sim.bag.messages import Header
 from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import SET
+from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.page.watch import with_forces
 from conveyor_sim.protocols.tags.child import pipes_of_child
 from conveyor_sim.protocols.tags.handshake import HANDSHAKE

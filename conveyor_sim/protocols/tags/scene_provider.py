@@ -17,7 +17,7 @@ from typing import Any
 
 from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.protocols.tags.child import start_child
 from conveyor_sim.protocols.tags.handshake import TARGET, problem

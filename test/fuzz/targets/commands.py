@@ -30,7 +30,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.line.authority import MAY
+from conveyor_sim.line.commands.authority import MAY
 from conveyor_sim.ros.child import Child
 from conveyor_sim.ros.domain import in_environment, own_domain
 
