@@ -52,6 +52,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "stepping": "accounts model state",
     },
     "control": {"": "", "st": ""},
+    "bag": {"mcap": "", "messages": "", "": "mcap messages"},
 }
 """Import rules inside a package, from the lowest up: what each part may import of the others.
 

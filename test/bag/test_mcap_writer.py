@@ -10,8 +10,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from conveyor_sim.bag import mcap_writer
-from conveyor_sim.bag.mcap_writer import CHUNK_SIZE, McapWriter
+from conveyor_sim.bag.mcap import writer as mcap_writer
+from conveyor_sim.bag.mcap.writer import CHUNK_SIZE, McapWriter
 
 TOPICS = ("/bottles", "/signals", "/never")
 

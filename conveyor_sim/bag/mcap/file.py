@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from typing import IO, Any
 
 from conveyor_sim import __version__
-from conveyor_sim.bag.mcap_writer import McapWriter
-from conveyor_sim.bag.metadata import (
+from conveyor_sim.bag.mcap.metadata import (
     RECORD_KEY,
     RECORD_NAME,
     FileInfo,
@@ -16,6 +15,7 @@ from conveyor_sim.bag.metadata import (
     from_yaml,
     to_yaml,
 )
+from conveyor_sim.bag.mcap.writer import McapWriter
 
 QOS_KEY = "offered_qos_profiles"
 HASH_KEY = "topic_type_hash"
