@@ -51,8 +51,10 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "accounts": "model state",
         "stepping": "accounts model state",
     },
+    "bag": {"mcap": "", "messages": "", "": "mcap messages"},
     "line": {
-        "tag": "",
+        "units": "",
+        "tag": "units",
         "process_image": "tag",
         "alarms": "",
         "device": "alarms process_image tag",

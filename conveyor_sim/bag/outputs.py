@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import OUTPUTS, TOPICS, Snapshot, Topic
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import OUTPUTS, TOPICS, Snapshot, Topic
 from conveyor_sim.columns.variables import VariableColumns
 
 if TYPE_CHECKING:

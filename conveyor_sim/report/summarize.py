@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.messages import to_image
+from conveyor_sim.bag.messages.encode import to_image
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.itinerary import Itinerary
 from conveyor_sim.columns.ledger import Ledger

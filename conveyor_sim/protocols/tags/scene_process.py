@@ -17,9 +17,9 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from conveyor_sim.bag.folder import bag_folder
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.page.watch import with_forces

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Schema, Statistics
 
-from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, UNKNOWN, Data, Malformed, checksum, records
+from conveyor_sim.bag.mcap.records import MAGIC, RECORD_HEAD, UNKNOWN, Data, Malformed, checksum, records
 
 DATA_END = struct.Struct("<BQI")
 """Opcode, length 4, CRC of all bytes before."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.topics import TOPICS, Topic
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.topics import TOPICS, Topic
 from conveyor_sim.scene.schema import Outputs
 
 

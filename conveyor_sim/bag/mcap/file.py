@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import IO, Any
 
+from mcap.writer import Writer
+
 from conveyor_sim import __version__
-from conveyor_sim.bag.mcap_writer import McapWriter
-from conveyor_sim.bag.metadata import (
+from conveyor_sim.bag.mcap.metadata import (
     RECORD_KEY,
     RECORD_NAME,
     FileInfo,
@@ -42,44 +44,44 @@ def topic_info(name: str, type_name: str, channel_metadata: dict[str, str], mess
 
 
 class McapFile:
-    """Writes to a binary stream, which stays the caller's to close. Every method may raise OSError."""
+    """Writer of one file to a binary stream, which the caller closes. Every method may raise OSError.
+
+    Chunks of 1 MiB, each with a checksum, compressed by zstd at its level 3: `mcap.writer` has no setting for it. The
+    cost beside level 1 is stated in docs/performance.md.
+    """
 
     def __init__(self, stream: IO[bytes], name: str, distro: str) -> None:
         self._distro = distro
-        self._writer = McapWriter(stream, PROFILE, f"{LIBRARY} {__version__}")
+        self._writer = Writer(stream, enable_data_crcs=True)
+        self._writer.start(PROFILE, f"{LIBRARY} {__version__}")
         self._schemas: dict[Schema, int] = {}
         self._topics: dict[int, TopicInfo] = {}
-        self._foreign: set[int] = set()  # channels without a ROS 2 type
-        self._times: tuple[int, int] | None = None  # of the other channels; kept only if there are foreign ones
+        self._counts: Counter[int] = Counter()  # of messages on ROS 2 topics, by channel
+        self._times: tuple[int, int] | None = None  # log times of the first and the last of them, ns
         self._name = name
 
     @property
     def info(self) -> FileInfo:
         """The file so far: its ROS 2 messages."""
-        times = (self._times or (0, 0)) if self._foreign else self._writer.times
-        foreign = sum(self._writer.counts[channel] for channel in self._foreign)
-        return FileInfo(self._name, *times, self._writer.counts.total() - foreign)
+        return FileInfo(self._name, *(self._times or (0, 0)), self._counts.total())
 
     @property
     def topics(self) -> list[TopicInfo]:
         """The topics with their counts so far."""
-        counts = self._writer.counts
-        return [replace(topic, message_count=counts[channel]) for channel, topic in self._topics.items()]
+        return [replace(topic, message_count=self._counts[channel]) for channel, topic in self._topics.items()]
 
     def add_topic(self, name: str, schema: Schema, encoding: str, metadata: dict[str, str]) -> int:
-        """Registers a channel for messages of the schema's type; returns its number."""
+        """Register a channel for messages of the schema's type. Return its number."""
         channel = self._writer.register_channel(name, encoding, self._number(schema), metadata)
         self._topics[channel] = topic_info(name, schema.name, metadata, 0)
         return channel
 
     def add_foreign(self, name: str, schema: Schema | None, encoding: str, metadata: dict[str, str]) -> int:
-        """Register a channel without a ROS 2 type, before the first message. Return its number.
+        """Register a channel without a ROS 2 type. Return its number.
 
         rosbag2's metadata leave it out. schema: None for messages that describe themselves.
         """
-        channel = self._writer.register_channel(name, encoding, 0 if schema is None else self._number(schema), metadata)
-        self._foreign.add(channel)
-        return channel
+        return self._writer.register_channel(name, encoding, 0 if schema is None else self._number(schema), metadata)
 
     def _number(self, schema: Schema) -> int:
         """Return the number of a schema, which is registered the first time."""
@@ -88,28 +90,29 @@ class McapFile:
         return self._schemas[schema]
 
     def add_message(self, channel: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
-        """Appends a message; times in ns."""
+        """Append a message; times in ns."""
         self._writer.add_message(channel, log_time, data, publish_time, sequence)
-        if self._foreign and channel not in self._foreign:
+        if channel in self._topics:
+            self._counts[channel] += 1
             start, end = self._times or (log_time, log_time)
             self._times = min(start, log_time), max(end, log_time)
 
     def add_metadata(self, name: str, content: dict[str, str]) -> None:
-        """Appends a metadata record."""
+        """Append a metadata record."""
         self._writer.add_metadata(name, content)
 
     def add_attachment(self, name: str, media_type: str, data: bytes, log_time: int, create_time: int) -> None:
-        """Appends a file; times in ns."""
-        self._writer.add_attachment(name, media_type, data, log_time, create_time)
+        """Append a file; times in ns."""
+        self._writer.add_attachment(create_time, log_time, name, media_type, data)
 
     def flush(self) -> None:
-        """Ends the present chunk and hands everything to the operating system."""
-        self._writer.flush()
+        """End the present chunk, if it has messages, and hand all bytes to the operating system."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
 
     def finish(self) -> str:
-        """Writes the metadata record, index and end; returns what belongs into metadata.yaml (`write_metadata`)."""
+        """Write the metadata record, the index and the end. Return the content of metadata.yaml (`write_metadata`)."""
         self.flush()
         information = to_yaml(bag_information(self.topics, [self.info], self._distro))
         self.add_metadata(RECORD_NAME, {RECORD_KEY: information})
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
         return information

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.cdr import CdrWriter, xyz_rows
-from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.messages.cdr import CdrWriter, xyz_rows
+from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.columns.bottles import BottleColumns
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.bag.cdr import CdrWriter, pose_rows
-from conveyor_sim.bag.packing import packer
+from conveyor_sim.bag.messages.cdr import CdrWriter, pose_rows
+from conveyor_sim.bag.messages.packing import packer
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.image import NOTHING_FORCED, Image
 from conveyor_sim.line.commands.inputs import CommandOutcome, Input, recorded_input

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from conveyor_sim.bag import messages
-from conveyor_sim.bag.entries import bin_name, bottle_name, command_name, contact_name
-from conveyor_sim.bag.markers import bottles_markers, plant_markers
-from conveyor_sim.bag.messages import Header, Outcome
-from conveyor_sim.bag.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.encode import Header, Outcome
+from conveyor_sim.bag.messages.entries import bin_name, bottle_name, command_name, contact_name
+from conveyor_sim.bag.messages.markers import bottles_markers, plant_markers
+from conveyor_sim.bag.messages.qos import ALARMS, CLOCK, DATA, EVENTS, LATCHED, OUTCOMES, Qos
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.bottles import BeltColumns, BottleColumns, ContactColumns
 from conveyor_sim.columns.counters import CounterColumns
@@ -103,7 +103,7 @@ class Topic:
 
     def pack(self, data: Any, header: Header) -> bytes:
         """The message of what `state` or `events` gave."""
-        return messages.columns_message(self.type, data, header) if self.write is None else self.write(data, header)
+        return encode.columns_message(self.type, data, header) if self.write is None else self.write(data, header)
 
     def unpack(self, message: Any) -> Any:
         """What a decoded message is read back as; itself where nothing is said."""
@@ -128,17 +128,17 @@ _MOTION = {"x": 1e-6, "y": 1e-6, "theta": 1e-5, "vx": 1e-4, "vy": 1e-4, "omega":
 _ROWS = (
     Topic(
         "line",
-        messages.LINE,
+        encode.LINE,
         "names behind the indices, limits, scene text, seed, versions, time step",
         "once a run, latched",
         LATCHED,
         once=True,
         state=lambda now: (now.sim, now.run_id),
-        write=lambda data, header: messages.line_message(data[0], data[1], header),
+        write=lambda data, header: encode.line_message(data[0], data[1], header),
     ),
     Topic(
         "plant",
-        messages.MARKERS,
+        encode.MARKERS,
         "belts, rails, directions of travel, and every device that has a place",
         "once a run, latched",
         LATCHED,
@@ -148,13 +148,13 @@ _ROWS = (
     ),
     Topic(
         "outcomes",
-        messages.OUTCOME,
+        encode.OUTCOME,
         "what became of an input: who gave it, tick, accepted or the reason",
         "when it happens",
         OUTCOMES,
         events=lambda sim: sim.take_outcomes(),
-        write=messages.outcome_message,
-        read=messages.to_outcome,
+        write=encode.outcome_message,
+        read=encode.to_outcome,
         columns=Outcome,
     ),
     Topic(
@@ -185,15 +185,15 @@ _ROWS = (
     ),
     Topic(
         "poses",
-        messages.POSES,
+        encode.POSES,
         "the same bottles as poses, in the same order",
         rate="poses",
         state=lambda now: now.bottles,
-        write=messages.poses_message,
+        write=encode.poses_message,
     ),
     Topic(
         "markers",
-        messages.MARKERS,
+        encode.MARKERS,
         "bottles for RViz and Foxglove",
         "as `poses`, at most `marker_rate` a wall second",
         rate="poses",
@@ -310,16 +310,16 @@ _ROWS = (
         "what the run is doing: running, paused, lockstep, ended, stopped with the reason, replaying",
         "latched, when it changes",
         LATCHED,
-        write=messages.run_state_message,
+        write=encode.run_state_message,
         read=lambda message: RunState(int(message.state), message.reason),
     ),
     Topic(
         "photo_eyes/<eye>",
-        messages.BOOL,
+        encode.BOOL,
         "whether a photo-eye is blocked: for the simplest controllers; not recorded, `signals` has it",
         "latched, when it changes",
         LATCHED,
-        write=messages.bool_message,
+        write=encode.bool_message,
         recorded=False,
     ),
     Topic(
@@ -348,7 +348,7 @@ _ROWS = (
     ),
     Topic(
         "commands",
-        messages.COMMANDS,
+        encode.COMMANDS,
         "setpoints by name (`line.command_names`), applied together or refused together; alarms",
         qos=EVENTS,
         recorded=False,
@@ -356,7 +356,7 @@ _ROWS = (
     ),
     Topic(
         "belts/<belt>/cmd_speed",
-        messages.SPEED,
+        encode.SPEED,
         "speed of one belt, m/s, positive forward: the easy one to send by hand",
         qos=EVENTS,
         recorded=False,

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.bag.cdr import HEADER
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages.cdr import HEADER
+from conveyor_sim.bag.messages.typestore import typestore
 
 NS = 1_000_000_000
 CODES = {

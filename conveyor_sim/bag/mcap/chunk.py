@@ -13,7 +13,7 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Channel, McapRecord, Schema
 
-from conveyor_sim.bag.records import LIMIT, RECORD_HEAD, UNKNOWN, Data, Malformed, head_at, parse
+from conveyor_sim.bag.mcap.records import LIMIT, RECORD_HEAD, UNKNOWN, Data, Malformed, head_at, parse
 
 HEAD = struct.Struct("<QQQII")
 """First time, last time, uncompressed size, CRC, length of the compression's name."""

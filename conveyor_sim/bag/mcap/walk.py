@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, McapRecord, Message, MessageIndex, Metadata, Schema
 
-from conveyor_sim.bag.chunk import (
+from conveyor_sim.bag.mcap.chunk import (
     MESSAGE,
     Chunk,
     Content,
@@ -22,8 +22,18 @@ from conveyor_sim.bag.chunk import (
     read_cut,
     survey,
 )
-from conveyor_sim.bag.index import CRC_SIZE, DATA_END, DATA_END_HEAD, chained_to, read_index
-from conveyor_sim.bag.records import LIMIT, MAGIC, RECORD_HEAD, UNKNOWN, Data, Malformed, checksum, head_at, parse_part
+from conveyor_sim.bag.mcap.index import CRC_SIZE, DATA_END, DATA_END_HEAD, chained_to, read_index
+from conveyor_sim.bag.mcap.records import (
+    LIMIT,
+    MAGIC,
+    RECORD_HEAD,
+    UNKNOWN,
+    Data,
+    Malformed,
+    checksum,
+    head_at,
+    parse_part,
+)
 from conveyor_sim.errors import BagError
 
 TOP_LEVEL = (

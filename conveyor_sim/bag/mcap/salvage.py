@@ -9,14 +9,13 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message
 
-from conveyor_sim.bag.chunk import COMPRESSIONS, inside, read_content, read_cut
-from conveyor_sim.bag.foreign import is_ros, skipped_parts
-from conveyor_sim.bag.index import DATA_END, Index
-from conveyor_sim.bag.line_copy import LineCopy, read_line_copy
-from conveyor_sim.bag.losses import Loss, lose, without_one
-from conveyor_sim.bag.messages import LINE
-from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, Data, checksum, parse
-from conveyor_sim.bag.walk import MISMATCH, Walk
+from conveyor_sim.bag.mcap.chunk import COMPRESSIONS, inside, read_content, read_cut
+from conveyor_sim.bag.mcap.foreign import is_ros, skipped_parts
+from conveyor_sim.bag.mcap.index import DATA_END, Index
+from conveyor_sim.bag.mcap.line_copy import LineCopy, read_line_copy
+from conveyor_sim.bag.mcap.losses import Loss, lose, without_one
+from conveyor_sim.bag.mcap.records import MAGIC, RECORD_HEAD, Data, checksum, parse
+from conveyor_sim.bag.mcap.walk import MISMATCH, Walk
 
 WRONG = "the checksum over all data is wrong"
 LISTED = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)
@@ -64,12 +63,11 @@ class Salvage(Walk):
         times += [] if self.restored is None else [self.restored.log_time]
         return (min(times), max(times)) if times else (0, 0)
 
-    @property
-    def line(self) -> LineCopy | None:
-        """The line message, for a copy of it; None if none is left."""
+    def line(self, type_name: str) -> LineCopy | None:
+        """Return the first message of the line's type, for a copy of it; None if none is left."""
         if self.restored is not None:
             return self.line_copy
-        lines = {number for number, channel in self.ros_channels.items() if self._type(channel) == LINE}
+        lines = {number for number, channel in self.ros_channels.items() if self._type(channel) == type_name}
         if not any(self.counts[number] for number in lines):
             return None
         message = next((message for message in self.messages() if message.channel_id in lines), None)
