@@ -43,10 +43,11 @@ RULES: Mapping[str, str] = {
 WITHIN: Mapping[str, Mapping[str, str]] = {
     "physics": {
         "sources_hash": "",
+        "plant": "",
         "laws": "",
         "timestep": "laws",
-        "effects": "laws timestep",
-        "model": "effects laws sources_hash timestep",
+        "effects": "laws plant timestep",
+        "model": "effects laws plant sources_hash timestep",
         "state": "model",
         "accounts": "model state",
         "stepping": "accounts model state",

@@ -201,7 +201,7 @@ def _simulation(bag: Bag) -> Simulation:
         simulation = Simulation(recorded_scene(bag.line, f"{bag.path} (recorded scene)"))
     except SceneError as error:
         raise SceneError(f"{bag.path}: the recorded scene is refused by this version:\n{error}") from error
-    for shape in simulation.model.moving_shapes:
+    for shape in simulation.model.plant.moving:
         if f"{shape.name}/blocked" not in bag.line.signal_names:
             raise BagError(
                 f"{bag.path}: recorded when {shape.name} pushed with unlimited force, expected a recording with the "

@@ -214,12 +214,12 @@ class State:
         """The rails that move, where they are now."""
         if self.world.moving is None:
             return ()
-        places = zip(self.model.moving_shapes, self.world.moving.position.tolist(), strict=True)
+        places = zip(self.model.plant.moving, self.world.moving.position.tolist(), strict=True)
         return tuple(shape.shape(position) for shape, position in places)
 
     def rails(self) -> tuple[RailShape, ...]:
         """All rails by number, where they are now."""
-        return (*self.model.rails_at_rest, *self.moving_rails())
+        return (*self.model.plant.rails_at_rest, *self.moving_rails())
 
     def make_lists(self) -> None:
         """Rebuild the neighbour lists if they are stale, growing those that are too short."""

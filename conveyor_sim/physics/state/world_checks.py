@@ -102,7 +102,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "neighbourhood.bucket": (0, slots),
         "neighbourhood.order": (0, slots - 1),
         "probe.bottle": (0, slots - 1),
-        "probe.other": (0, max(slots, len(model.rail_shapes)) - 1),
+        "probe.other": (0, max(slots, len(model.plant.rails)) - 1),
         "probe.due": (0, 1),
         "railed.bottle": (0, slots - 1),
         "railed.first": (0, slots),
