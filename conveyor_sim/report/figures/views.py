@@ -98,7 +98,7 @@ def scene_figure(plant: Plant, frame: Frame, title: str) -> Figure:
 
 
 def table_region(plant: Plant, frames: Sequence[Frame]) -> Box:
-    """Return the box around the widest belt with a margin of one bottle; the complete plant if that is nearly as large."""
+    """Return the box around the widest belt plus one bottle width; the complete plant if that is nearly as large."""
     if not plant.belts:
         return whole_region(plant, frames)
     widest = int(np.argmax([belt.width for belt in plant.belts]))
