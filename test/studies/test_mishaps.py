@@ -91,7 +91,7 @@ def test_ctrl_c_ends_it_and_says_how_to_go_on(tmp_path: Path) -> None:
         process.kill()
     said = (tmp_path / "said").read_text()
     assert process.returncode == 130
-    assert missing(said, ["finished run", str(out), "same command"]) == []
+    assert missing(said, ["finished runs", str(out), "same command"]) == []
     assert "Traceback" not in said
     (pid,) = (int(path.name.partition("_")[2]) for path in tmp_path.glob("running_*"))
     until(lambda: not _is_alive(pid), "the end of the process that ran it")
