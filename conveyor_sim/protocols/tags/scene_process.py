@@ -23,7 +23,6 @@ from conveyor_sim.bag.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import SET
 from conveyor_sim.page.watch import with_forces
-from conveyor_sim.protocols.tags.child import pipes_of_child
 from conveyor_sim.protocols.tags.handshake import HANDSHAKE
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
 from conveyor_sim.protocols.tags.scene_messages import (
@@ -45,6 +44,7 @@ from conveyor_sim.run.lockstep import Refused
 from conveyor_sim.run.session import Session
 from conveyor_sim.run.stepper import Stepper
 from conveyor_sim.simulation import Simulation
+from conveyor_sim.support.child_process import pipes_of_child
 from conveyor_sim.support.stop_request import StopRequest
 
 SHORTEST = 0.005

@@ -19,7 +19,6 @@ from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.line.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
-from conveyor_sim.protocols.tags.child import start_child
 from conveyor_sim.protocols.tags.handshake import TARGET, problem
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, decoded
 from conveyor_sim.protocols.tags.scene_messages import (
@@ -35,7 +34,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     VariablesRequest,
 )
 from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
-from conveyor_sim.support.child_process import how_it_ended
+from conveyor_sim.support.child_process import how_it_ended, start_python
 
 RUNNING_FREE: frozenset[Control] = frozenset({"pause", "resume", "step", "reset", "speed"})
 IN_LOCKSTEP: frozenset[Control] = frozenset({"target"})
@@ -239,7 +238,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                 self._requests = SimpleQueue()
                 self._requests.put(replace(self._task, number=len(self.recordings)))
                 self._requests.put(DrawingRequest(self._watchers > 0))
-                self._process = process = start_child("conveyor_sim.protocols.tags.scene_process", there)
+                self._process = process = start_python("conveyor_sim.protocols.tags.scene_process", there)
             there.close()
             threading.Thread(target=_pass_on, args=(self._requests, here), name="requests", daemon=True).start()
             with suppress(EOFError, OSError):
