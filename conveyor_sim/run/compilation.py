@@ -18,7 +18,7 @@ from contextlib import suppress
 from multiprocessing import Pipe
 
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH, KERNELS
-from conveyor_sim.engine.compiler.kernel_cache import NotCached, cached_only
+from conveyor_sim.engine.compiler.kernel_folder import NotCached, cached_only
 from conveyor_sim.physics.model import Model, build_model
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation

@@ -1,4 +1,4 @@
-"""Processor time that numba takes to compile, counted apart from what runs."""
+"""Processor time that numba spends compiling."""
 
 from collections.abc import Callable
 
@@ -6,10 +6,10 @@ from numba.core import event
 
 
 class CompileTime(event.Listener):
-    """What compiling takes from `begin` to `end`, in this process."""
+    """Processor time spent compiling between `begin` and `end`, in this process."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """clock: s of processor time so far."""
+        """clock: returns the processor time so far, s."""
         self.spent = 0.0
         """s"""
         self._clock = clock
@@ -17,21 +17,21 @@ class CompileTime(event.Listener):
         self._began = 0.0
 
     def begin(self) -> None:
-        """Listen from now on."""
-        event.register("numba:compile", self)  # type: ignore[no-untyped-call]
+        """Start to measure."""
+        event.register("numba:compile", self)
 
     def end(self) -> None:
-        """Listen no longer."""
-        event.unregister("numba:compile", self)  # type: ignore[no-untyped-call]
+        """Stop measuring."""
+        event.unregister("numba:compile", self)
 
     def on_start(self, _event: event.Event) -> None:
-        """Numba begins to compile something, perhaps inside of something else."""
+        """Note the start of a compilation, possibly inside another one."""
         if self._depth == 0:
             self._began = self._clock()
         self._depth += 1
 
     def on_end(self, _event: event.Event) -> None:
-        """It is done with it."""
+        """Add the time of an outermost compilation."""
         self._depth -= 1
         if self._depth == 0:
             self.spent += self._clock() - self._began
