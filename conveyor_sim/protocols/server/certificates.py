@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import socket
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import datetime, timedelta, timezone
 from ipaddress import ip_address
 from pathlib import Path
@@ -19,12 +16,16 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.support.files import MB, FileError, read_file
+from conveyor_sim.support.file_lock import locked
+from conveyor_sim.support.files import MB, FileError, read_file, write_file
 
 CERTIFICATE, KEY, TRUSTED = "certificate.der", "key.pem", "trusted"
 """In the folder. TRUSTED: clients' certificates; while there is one, others are refused."""
 
 YEARS = 10
+
+_PATIENCE = 30.0
+"""Wall time to wait for another process that makes the certificate, s."""
 
 
 class CertificateError(ConveyorError):
@@ -60,7 +61,7 @@ def identity(folder: Path) -> Identity:
             )
         (folder / TRUSTED).mkdir(mode=0o700, exist_ok=True)
         if not (folder / KEY).exists():
-            with _alone(folder):  # the servers of a line start at the same time
+            with locked(folder, _PATIENCE):  # the servers of a line start at the same time
                 if not (folder / KEY).exists():
                     _make(folder)
         trusted = frozenset(_der(path) for path in sorted((folder / TRUSTED).iterdir()) if path.is_file())
@@ -76,17 +77,6 @@ def identity(folder: Path) -> Identity:
     except (x509.ExtensionNotFound, ValueError) as error:
         raise CertificateError(f"{folder / CERTIFICATE}: names no application, expected one URI of it") from error
     return Identity(certificate, _read(folder / KEY), uri, trusted)
-
-
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder. Wait while another process holds it."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _make(folder: Path) -> None:
@@ -137,13 +127,10 @@ def _make(folder: Path) -> None:
 
 
 def _write(path: Path, content: bytes) -> None:
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
     try:
-        with open(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600), "wb") as stream:
-            stream.write(content)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+        write_file(path, content, mode=0o600)
+    except FileError as error:
+        raise CertificateError(f"{path}: {error}, expected a folder for certificates") from error
 
 
 def _read(path: Path) -> bytes:
