@@ -1,4 +1,4 @@
-"""The server's certificate and key: made on first use, in a folder that nobody else can read."""
+"""Certificate and key of the servers: made on first use, in a folder that only this user can read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from conveyor_sim.support.file_lock import locked
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 
 CERTIFICATE, KEY, TRUSTED = "certificate.der", "key.pem", "trusted"
-"""In the folder. TRUSTED: clients' certificates; while there is one, others are refused."""
+"""Names in the folder. TRUSTED: folder of clients' certificates; if it holds any, all others are refused."""
 
 YEARS = 10
 
@@ -29,29 +29,29 @@ _PATIENCE = 30.0
 
 
 class CertificateError(ConveyorError):
-    """A certificate or key that can't be made or read."""
+    """Error: a certificate or key can't be made or read."""
 
 
 class Identity(NamedTuple):
-    """What the server proves itself by."""
+    """Certificate and private key of the server."""
 
     certificate: bytes
     """DER."""
     key: bytes
     """PEM."""
     application_uri: str
-    """As the certificate has it."""
+    """Application URI of the certificate."""
     trusted: frozenset[bytes]
-    """Certificates of clients that are let in, DER; empty: any is."""
+    """Accepted certificates of clients, DER; empty: all are accepted."""
 
 
 def default_folder() -> Path:
-    """`conveyor_sim/opcua` in the folder for data of this user ($XDG_DATA_HOME, else ~/.local/share)."""
+    """Return `conveyor_sim/opcua` in the folder for data of this user ($XDG_DATA_HOME, else ~/.local/share)."""
     return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "conveyor_sim" / "opcua"
 
 
 def identity(folder: Path) -> Identity:
-    """What is in a folder; it is made first where it is missing. Raises CertificateError."""
+    """Return the certificate and key in a folder; make them if they are missing. Raises CertificateError."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if (mode := stat.S_IMODE(folder.stat().st_mode)) & 0o077 or folder.stat().st_uid != os.geteuid():
