@@ -70,7 +70,7 @@ class ProtocolServer(Protocol):
         """Address for clients: "modbus://127.0.0.1:5020"."""
 
     async def start(self) -> None:
-        """Serve from now on. Raises ServerError, in one sentence, if that is not possible; nothing is left behind then."""
+        """Serve from now on. Raise ServerError, in one sentence, if that fails; nothing is left behind then."""
 
     async def stop(self) -> None:
         """End all connections. Do nothing if it was not started or is stopped."""

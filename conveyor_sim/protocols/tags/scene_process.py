@@ -73,7 +73,7 @@ class Copies:
     """Sink whose messages a separate thread sends."""
 
     def __init__(self, pipe: Connection, shortest: float) -> None:
-        """Start sending. shortest: wall time between two copies, s; the messages of that time are merged into one copy."""
+        """Start sending. shortest: wall time between two copies, s; messages in between are merged into one copy."""
         self._pipe, self._shortest = pipe, shortest
         self.watched = False
         """True if frames for drawing are requested."""

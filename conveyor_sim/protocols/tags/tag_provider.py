@@ -1,4 +1,4 @@
-"""`TagProvider`: interface between the protocol servers and a line; and the provider of a simulation that a test steps."""
+"""`TagProvider`: interface between protocol servers and a line; the provider of a simulation that a test steps."""
 
 from __future__ import annotations
 
