@@ -62,7 +62,7 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
             raise
 
     def each(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[tuple[T, R | DiedError]]:
-        """Run tasks as `Engine.each`. Raise StudyError if the scheduler doesn't answer or the workers lack the function."""
+        """Run tasks as `Engine.each`. Raise StudyError if the scheduler is silent or the workers lack the function."""
         todo = list(tasks)[::-1]
         pending: dict[Any, T] = {}
         done: SimpleQueue[Any] = SimpleQueue()

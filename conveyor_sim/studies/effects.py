@@ -29,7 +29,7 @@ def main_effects(results: Results) -> list[list[list[Response]]]:
 
 
 def interactions(results: Results, metric: str) -> list[list[list[Response]]]:
-    """Return a row per pair of parameters: the metric over the first, a line per level of the second; and vice versa."""
+    """Return one row per pair of parameters: the metric over each of them, with a line per level of the other."""
     panels = []
     for pair in combinations(_levelled(results), 2):
         panels.append([_lines(results, metric, *pair), _lines(results, metric, *pair[::-1])])

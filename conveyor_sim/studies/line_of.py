@@ -23,7 +23,7 @@ _STEP = re.compile(r"([A-Za-z]\w*)|\[(\d+)\]")
 
 
 def scene_of(setup: Setup, parameters: Mapping[str, Any], seed: int) -> Scene:
-    """Return the scene of a run. Raise SceneError or StudyError if it is invalid, or any exception of a study function."""
+    """Return the scene of a run. Raise SceneError or StudyError if invalid, or any exception of a study function."""
     study = setup.study
     text, name, overrides = setup.text, setup.name, setup.overrides
     if setup.function:

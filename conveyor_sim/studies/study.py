@@ -188,7 +188,7 @@ class Study(Part):
         default=0.0,
     )
     warm_start: Positive | None = quantity(
-        "Duration of a run that is made once per seed, with the controller as in `settings`; every run begins at its end. "
+        "Duration of a run made once per seed, with the controller as in `settings`. Every run begins at its end. "
         "For studies in which only the controller varies.",
         "s",
         default=None,
