@@ -1,14 +1,14 @@
 """Semi-implicit Euler, the paper's integrator (eqs. 5 and 6), and leapfrog: v += dt a(r, v), then r += dt v, the new v.
 
-Velocities are those of mid-step, positions those of the step's end. Semi-implicit Euler takes both for one instant,
-so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at rest are off
-by mu g dt / v_lim. Leapfrog asks the belt for its velocity where the bottle was at mid-step (`Settings.lag`), and is
-not (test/physics/test_resting_load.py). On straight belts and floors the two are the same to the bit.
+Velocities are those of mid-step, positions those of the end of the step. Semi-implicit Euler treats both as
+simultaneous, so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at
+rest are off by mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle's mid-step position (`Settings.lag`)
+and has no such error (test/physics/test_resting_load.py). On straight belts and floors the two agree to the bit.
 
-Order 1 through dashpots, clamped or not, and through friction, with a jump at first touch or without. Without damping
-its errors in energy stay bounded; a rebound and a peak force are of order 2 then, with Hertz a rebound is of 2.5.
-Measured in a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in friction
-(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). One force evaluation a step.
+The order is 1 through dashpots, clamped or not, and through friction, with or without a jump at first touch. Without
+damping its errors in energy stay bounded; a rebound and a peak force are then of order 2, with Hertz a rebound is of
+2.5. Measured in a rebound: 0.93 with a dashpot, 0.99 clamped, 1.99 without, 2.46 with Hertz; 1.00 in friction
+(test/physics/test_head_on.py, test_contact_laws.py, test_set_down.py). A step takes one force evaluation.
 """
 
 from typing import Any
@@ -64,7 +64,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
 
 @part
 def _move(bottles: Bottles, load: Load, dt: float, first: int, end: int) -> None:
-    """Move bottles first to end, and pack them for the next step, all in one pass."""
+    """Move bottles first to end and pack them for the next step, in one pass."""
     for i in range(uint64(first), uint64(end)):
         vx = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
         vy = settle(bottles.vy[i] + dt * (load.fy[i] * bottles.inverse_mass[i]))

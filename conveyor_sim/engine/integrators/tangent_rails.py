@@ -1,4 +1,4 @@
-"""The contacts of bottles with rails for the linearly implicit method (`tangent.py`)."""
+"""Contacts of bottles with rails in the linearly implicit method (`tangent.py`)."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ from conveyor_sim.engine.threads.workers import UNIT, units
 def stiffest_rails(world: World, found: RailContacts, first: int, end: int) -> None:
     """Write to `linear.most`, for each unit of bottles first to end, the largest stiffness over mass (1/s^2).
 
-    Of the contacts with rails that are closed now, at `bottles.x`.
+    It is the maximum over the contacts with rails that are closed at `bottles.x`.
     """
     bottles, linear, railed = world.bottles, world.linear, world.railed
     begin, stop = units(first, end)
@@ -39,7 +39,7 @@ def stiffest_rails(world: World, found: RailContacts, first: int, end: int) -> N
 
 @part
 def linear_rails(world: World, found: RailContacts, step: tuple[float, float], first: int, end: int) -> None:
-    """Add what rails exert ahead on bottles first to end to `load` and `spin.moment`, and resist to `linear.own`.
+    """Add the forces of rails ahead on bottles first to end to their load, and the resistance to `linear.own`.
 
     step: as in `linear_contact`.
     """
@@ -51,7 +51,8 @@ def linear_rails(world: World, found: RailContacts, step: tuple[float, float], f
         i = railed.bottle[place]
         x, y, radius = bottles.x[i], bottles.y[i], bottles.radius[i]
         old_x, old_y = linear.x[i], linear.y[i]
-        # Contacts that are closed ahead; then those that were before the step, of surfaces that are not touched ahead.
+        # First contacts that are closed ahead, then those that were closed before the step, of surfaces not touched
+        # ahead.
         for earlier in range(2 if step[1] > 0.5 else 1):
             if earlier:
                 bottles.x[i], bottles.y[i] = old_x, old_y
@@ -72,7 +73,7 @@ def linear_rails(world: World, found: RailContacts, step: tuple[float, float], f
 
 @part
 def _overlap(world: World, entry: int, x: float, y: float, radius: float) -> float:
-    """Overlap (m) of a circle with the piece at an entry of the lists (`RailContacts.entry`)."""
+    """Return the overlap (m) of a circle with the piece at an entry of the lists (`RailContacts.entry`)."""
     if entry >= 0:
         return _segment_overlap(world.segments, world.near_segments, entry, x, y, radius)
     return _arc_overlap(world.arcs, world.near_arcs, -1 - entry, x, y, radius)
@@ -96,7 +97,7 @@ def _arc_overlap(arcs: Any, near: Any, entry: int, x: float, y: float, radius: f
 
 @part
 def _touched(world: World, surface: int, i: int, x: float, y: float, radius: float) -> bool:
-    """Whether bottle i at (x, y) touches a rail surface."""
+    """Return True if bottle i at (x, y) touches a rail surface."""
     segments, near_segments, arcs, near_arcs = world.segments, world.near_segments, world.arcs, world.near_arcs
     touched = False
     if segments is not None:
@@ -120,7 +121,7 @@ def _add_contact(
     step: tuple[float, float],
     hold: bool,
 ) -> None:
-    """overlaps, step, hold: as in `linear_contact`."""
+    """Add one contact. overlaps, step, hold: as in `linear_contact`."""
     bottles, spin, load, linear = world.bottles, world.spin, world.load, world.linear
     nx, ny = found.nx[c], found.ny[c]
     closing, slip = bottles.vx[i] * nx + bottles.vy[i] * ny, bottles.vy[i] * nx - bottles.vx[i] * ny
@@ -143,7 +144,7 @@ def _add_contact(
         step,
         hold,
     )
-    # The block, which holds this contact, will take that off again.
+    # The block, which contains this contact, will subtract that again.
     normal -= along * closing_change / step[0]
     load.fx[i] += -normal * nx - tangential * ny
     load.fy[i] += tangential * nx - normal * ny

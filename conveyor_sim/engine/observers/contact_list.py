@@ -1,4 +1,4 @@
-"""All closed contacts as columns, by the same functions that make the forces; read-only."""
+"""All closed contacts as columns, by the functions that compute the forces; read-only."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,10 @@ BOTTLE_BOTTLE, BOTTLE_RAIL = 0, 1
 
 @kernel
 def list_contacts(world: World, found: RailContacts, kind: NDArray[np.uint8], a: I8, b: I8, values: F8) -> int:
-    """Write the contacts of the present state; return how many there are, which may exceed the columns' length.
+    """Write the contacts of the present state; return their number, which may exceed the length of the columns.
 
-    found: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap (m),
-    N, T (N). The neighbour lists must hold. Friction that is solved implicitly is listed as the explicit law has it.
+    rail_contacts: scratch. kind: (C,). a, b: (C,), slots, or b the rail. values: (7, C): x, y (m), normal x, y, overlap
+    (m), N, T (N). The neighbour lists must hold. Friction that is solved implicitly is listed by the explicit law.
     """
     return _rail_contacts(world, found, kind, a, b, values, _pair_contacts(world, kind, a, b, values))
 
@@ -51,7 +51,7 @@ def _pair_contacts(world: World, kind: NDArray[np.uint8], a: I8, b: I8, values: 
 
 @part
 def pair_contact(world: World, p: int, overlap: float, nx: float, ny: float) -> tuple[float, float, float]:
-    """N and T (N) on the first bottle of pair p, and its slip (m/s); the normal is that from the first to the other."""
+    """Return N and T (N) on the first bottle of pair p, and its slip (m/s); the normal points to the other bottle."""
     settings, bottles, spin, pairs = world.settings, world.bottles, world.spin, world.pairs
     i, j = pairs.i[p], pairs.j[p]
     vx = bottles.vx[i] - bottles.vx[j]
@@ -94,7 +94,7 @@ def _rail_contacts(
 
 @part
 def _write_point(values: F8, c: int, bottles: Bottles, i: int, x: float, y: float) -> None:
-    """x, y: from the axis of bottle i, m."""
+    """Write the contact point. x, y: from the axis of bottle i, m."""
     values[0, c] = bottles.x[i] + x
     values[1, c] = bottles.y[i] + y
 
@@ -109,7 +109,7 @@ def _write_force(values: F8, c: int, nx: float, ny: float, overlap: float, norma
 
 
 def closed_contacts(world: World, found: RailContacts) -> tuple[NDArray[np.uint8], I8, F8]:
-    """Every closed contact of the present state as `list_contacts` has it: kind (C,), ends (2, C), values (7, C)."""
+    """Return every closed contact of the present state as in `list_contacts`: kind (C,), ends (2, C), values (7, C)."""
     world, room = contacts_of(world), 64
     while True:
         kind, ends, values = np.zeros(room, np.uint8), np.zeros((2, room), np.int64), np.zeros((7, room))

@@ -1,11 +1,11 @@
-"""What bottles and rails bear in every step: scuffing, crushing, impacts, tipping. Changes no force.
+"""Loads on bottles and rails in every step: scuffing, crushing, impacts, tipping. It changes no force.
 
-A look at the state between two steps: each bottle lists its closed contacts, with the forces that the laws exert
-there, and adds up its own; what it shares with another both add up. So no bottle writes to what is another's, no sum
-runs over bottles of several threads, and it is the same for every integrator. Nothing is noted within a step.
+The state is evaluated between two steps. Each bottle lists its closed contacts, with the forces of the laws there, and
+adds up its own; both partners add up a contact that they share. So no bottle writes data of another one, no sum runs
+over bottles of several threads, and the evaluation is the same for every integrator. Nothing is recorded within a step.
 
-Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a rail
-that moves.
+Keys of contacts: id + 1 of the other bottle; -1 - 2 g for segment g; -2 - 2 k for arc k; less than -MOVING for a moving
+rail.
 """
 
 import math
@@ -28,9 +28,9 @@ from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, wait_for_all
 
 @part
 def note_damage(world: World, worker: Worker, dt: float) -> None:
-    """Note what all bottles bear in the present state, for a step of dt seconds; lists hold and bottles are in place.
+    """Evaluate the loads on all bottles in the present state, for a step of dt seconds.
 
-    Every worker calls it; on return all have read what they need.
+    Lists must hold and bottles must be in place. Every worker calls it; on return all have read what they need.
     """
     _note(world, world.damage, worker, dt)
 
@@ -39,7 +39,7 @@ def note_damage(world: World, worker: Worker, dt: float) -> None:
 def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
     if damage is None:
         return
-    # Velocity Verlet has just given bottles their velocities, each worker those of its own.
+    # Velocity Verlet has just set velocities, each worker those of its own bottles.
     wait_for_all(worker)
     begin, stop = share(worker, world.bottles.x.size)
     for first in range(begin, stop, BLOCK):
@@ -59,13 +59,13 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
 
 @part
 def _list_pairs(i: int, world: World, impacts: Any, history: LoadHistory) -> int:
-    """Write the closed contacts of bottle i with others to `history`; return how many."""
+    """Write the closed contacts of bottle i with others to `history`; return their number."""
     slots = world.slots
     if world.pairs is None:
         return 0
     count = 0
     for place in range(int(slots.filled[i])):
-        # In one loop, or all of the law would be compiled twice.
+        # One loop, because two call sites would compile the law twice.
         further = int(slots.more_start[i]) + place - WIDTH
         entry = slots.entry[i * WIDTH + place] if place < WIDTH else slots.more_entry[further]
         count = _list_pair(i, int(entry), world, impacts, history, count)
@@ -97,7 +97,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
         return count
     bottles, found = world.bottles, worker.found
     for c in range(find_rail_contacts(i, world, found)):
-        # What pushes through another piece of its surface counts there.
+        # A contact that pushes through another piece of its surface counts there.
         if found.share[c] > 0.0 and count < MOST_BORNE:
             entry = found.entry[c]
             spring = rail_elongation(world, i, entry)
@@ -106,7 +106,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
             arm = bottles.radius[i] - found.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
             if moves(world.moving, entry):
-                # Work on a rail that moves belongs to no place of the line.
+                # Work on a moving rail belongs to no place of the line.
                 key, place = -entry, -1
             else:
                 key = _rail_key(world.near_segments, world.near_arcs, entry)
@@ -140,7 +140,7 @@ def _write_place(history: LoadHistory, c: int, approach: float, key: int, place:
 
 @part
 def _approach(impacts: Any, i: int, nx: float, ny: float) -> float:
-    """Speed of bottle i along a normal at the last look, m/s."""
+    """Return the speed of bottle i along a normal at the last evaluation, m/s."""
     if impacts is None:
         return 0.0
     return impacts.vx[i] * nx + impacts.vy[i] * ny
@@ -162,7 +162,7 @@ def _piece(near: Any, entry: int) -> int:
 
 @part
 def _bin(scuffing: Any, segments: Any, arcs: Any, key: int, x: float, y: float) -> int:
-    """Bin of the rail piece of a key at a point (m); -1 where nobody asks."""
+    """Return the bin of a rail piece, by its key, at a point (m); -1 if bins are not requested."""
     if scuffing is None:
         return -1
     if key % 2 != 0:
@@ -185,7 +185,7 @@ def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
     dx, dy = x - arcs.x[k], y - arcs.y[k]
     start_x, start_y = arcs.start_x[k], arcs.start_y[k]
     angle = math.atan2(start_x * dy - start_y * dx, start_x * dx + start_y * dy)
-    # From half the gap before the start on.
+    # The range of angles starts at half the gap before the start.
     span = bins.arc_span[k]
     if angle < 0.5 * span - math.pi:
         angle += 2.0 * math.pi
@@ -194,13 +194,13 @@ def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
 
 @part
 def _bin_at(first: int, end: int, way: float) -> int:
-    """Which of the bins first to end lies at a share of the way along them."""
+    """Return which of the bins first to end lies at a share of the length along them."""
     return first + min(max(math.floor(way * (end - first)), 0), end - first - 1)
 
 
 @part
 def _scuff(i: int, scuffing: Any, history: LoadHistory, count: int, dt: float) -> None:
-    """Add |T s| dt to the bottle, and to the rail where it slides."""
+    """Add |T s| dt to the bottle, and to the rail on which it slides."""
     if scuffing is None:
         return
     for c in range(count):
@@ -220,7 +220,7 @@ def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None
 
 @part
 def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
-    """Note the sum of normal forces, and the largest min(N_a, N_b) |cos| of two that oppose each other."""
+    """Update the sum of normal forces, and the largest min(N_a, N_b) |cos| of two opposing ones."""
     if crushing is None:
         return
     total = opposed = 0.0
@@ -235,7 +235,7 @@ def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
 
 @part
 def _hit(i: int, impacts: Any, history: LoadHistory, count: int) -> None:
-    """Note the largest force of one contact, and the speed at which those closed that were open at the last look."""
+    """Update the largest force of one contact, and the closing speed of contacts that were open before."""
     if impacts is None:
         return
     before = 0
@@ -272,7 +272,7 @@ def _keep_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> N
 
 @part
 def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> None:
-    """Find the friction under bottles first to end, N."""
+    """Compute the friction under bottles first to end, N."""
     if tipping is None:
         return
     for i in range(first, end):
@@ -287,7 +287,7 @@ def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> N
 
 @part
 def _apart(spin: Any, moment: Any) -> Any:
-    """The spins, with another place for moments."""
+    """Return the spins with another array for moments."""
     if spin is None:
         return None
     return Spin(spin.theta, spin.omega, spin.inverse_inertia, moment)
@@ -295,7 +295,7 @@ def _apart(spin: Any, moment: Any) -> Any:
 
 @part
 def _tip(i: int, bottles: Bottles, tipping: Any, history: LoadHistory, count: int, dt: float) -> None:
-    """Note |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed: a blow is over before a bottle can tip."""
+    """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip."""
     if tipping is None:
         return
     if bottles.weight[i] <= 0.0:

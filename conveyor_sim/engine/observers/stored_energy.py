@@ -1,4 +1,4 @@
-"""The energy that a state holds: kinetic, in contacts, in tangential springs, in springs under the bottles."""
+"""Energy of a state: kinetic, in contacts, in tangential springs, in springs under the bottles."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ KINETIC, ELASTIC, SPRINGS, BASE_SPRINGS = 0, 1, 2, 3
 
 
 def stored_energy(world: World, found: RailContacts) -> F8:
-    """The energy of all bottles, (4,), J. found: scratch. The neighbour lists must hold."""
+    """Return the energy of all bottles, (4,), J. rail_contacts: scratch. The neighbour lists must hold."""
     energy = np.zeros(4)
     find_stored_energy(energy_of(world), found, energy)
     return energy
@@ -29,8 +29,8 @@ def stored_energy(world: World, found: RailContacts) -> F8:
 def find_stored_energy(world: World, found: RailContacts, energy: F8) -> None:
     """Write the energy (J) of all bottles to energy, (4,).
 
-    Pieces of a rail's surface that push together hold their share of a contact's: with a linear law that is exactly
-    what they give back.
+    Pieces of a rail's surface that push together store their share of a contact's energy: with a linear law that is
+    exactly what they return.
     """
     energy[:] = 0.0
     _kinetic(world.bottles, world.spin, energy)

@@ -1,4 +1,4 @@
-"""The contacts of one bottle with rails, the deepest ones: what touches it is kept here, whatever kind it is of."""
+"""The deepest contacts of one bottle with rails of all kinds."""
 
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import World
@@ -18,7 +18,7 @@ def keep_deepest(
     surface: int,
     entry: int,
 ) -> int:
-    """Write a contact behind the `count` found so far, or over the shallowest; return how many there are then."""
+    """Append a contact to the first `count`, or replace the shallowest one; return their new number."""
     place = count
     if count == MOST_CONTACTS:
         place = 0
@@ -39,11 +39,11 @@ def keep_deepest(
 
 @part
 def law_entry(world: World, found: RailContacts, c: int, i: int) -> int:
-    """Entry of contact c of bottle i in the rails' law."""
+    """Return the entry of contact c of bottle i in the rails' law."""
     return world.bottles.type[i] * world.settings.rail_materials + found.material[c]
 
 
 @part
 def rail_arm(overlap: float, radius: float, lever: float) -> float:
-    """Arm from the axis to the contact point, m: R - delta, or the paper's R."""
+    """Return the arm from the axis to the contact point, m: R - delta, or the paper's R."""
     return radius - lever * overlap

@@ -1,4 +1,4 @@
-"""Contact of bottles with rails: straight pieces and arcs, found through lists made at each rebuild."""
+"""Contact of bottles with rails: straight pieces and arcs, from lists made at each rebuild."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ def _arc_contacts(i: int, bottles: Bottles, arcs: Any, near: Any, found: RailCon
 
 @part
 def find_rail_contacts(i: int, world: World, found: RailContacts) -> int:
-    """Fill `found` with the contacts of bottle i with rails, shares included; return how many."""
+    """Write the contacts of bottle i with rails, shares included; return their number."""
     count = _segment_contacts(i, world.bottles, world.segments, world.near_segments, found, 0)
     count = _arc_contacts(i, world.bottles, world.arcs, world.near_arcs, found, count)
     count = moving_contacts(i, world.bottles, world.moving, found, count)
@@ -72,9 +72,9 @@ def find_rail_contacts(i: int, world: World, found: RailContacts) -> int:
 def rail_contact(
     c: int, i: int, world: World, found: RailContacts, spring: Any, spring_dt: float, implicit: Any
 ) -> tuple[float, float, float, Any]:
-    """N and T (N) on bottle i in its contact c with a rail, its slip (m/s) along it, and its spring before that slip.
+    """Return N and T (N) on bottle i in its contact c with a rail, its slip (m/s), and its spring before that slip.
 
-    spring: m, or None, to be stretched by spring_dt (s) of slip; implicit: as in `contact_force`.
+    spring: m, or None, to be elongated by spring_dt (s) of slip; implicit: as in `contact_force`.
     """
     bottles, spin, settings, law = world.bottles, world.spin, world.settings, world.rail_law
     nx, ny = found.nx[c], found.ny[c]
@@ -118,7 +118,7 @@ def count_rail_contacts(world: World, found: RailContacts, first: int, end: int,
 def add_rail_forces(world: World, found: RailContacts, first: int, end: int, spring_dt: float) -> None:
     """Add the forces and moments of all rails on bottles first to end to `load` and `spin.moment`.
 
-    spring_dt: s, how far the tangential springs are taken along (`pair_phase`).
+    spring_dt: s, time by which the tangential springs are advanced (`pair_phase`).
     """
     railed = world.railed
     if railed is None:
@@ -154,7 +154,7 @@ def add_rail_forces(world: World, found: RailContacts, first: int, end: int, spr
 
 @part
 def _drawn_out(world: World, found: RailContacts, c: int, i: int, spring: Any) -> Any:
-    """Elongation (m) of a spring, or None, after what bottle and rail have gone since it was kept."""
+    """Return the elongation (m) of a spring after the displacement since its last update, or None."""
     path = world.path
     if spring is None:
         return None
@@ -197,7 +197,7 @@ def _compliance(settings: Settings, implicit: Any, i: int) -> Any:
 
 @part
 def rail_elongation(world: World, i: int, entry: int) -> Any:
-    """Elongation of the spring of a contact of bottle i, by its entry in the lists (`RailContacts.entry`), or None."""
+    """Return the elongation of the spring of a contact of bottle i, by its entry (`RailContacts.entry`), or None."""
     if world.rail_law.tangential_stiffness is None:
         return None
     if moves(world.moving, entry):
@@ -216,7 +216,7 @@ def _spring_at(near: Any, entry: int) -> float:
 
 @part
 def _store_springs(world: World, found: RailContacts, count: int, i: int) -> None:
-    """Keep the springs of the closed contacts of bottle i, forget those of all its other rails."""
+    """Store the springs of the closed contacts of bottle i; reset those of all its other rails."""
     if world.rail_law.tangential_stiffness is None:
         return
     _forget_springs(world.near_segments, i)
