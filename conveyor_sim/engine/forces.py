@@ -60,7 +60,7 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
         sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), begin, stop)
         sum_pair_parts(world.pairs, world.slots, world.ledger, begin, stop)
     # All bottles in lists by unit are stepped.
-    add_rail_forces(world, worker.found, first, end, spring_dt)
+    add_rail_forces(world, worker.rail_contacts, first, end, spring_dt)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     for run in range(stepped_runs(world.riding, first)):
         begin, stop = stepped_run(world.riding, first, end, run)
@@ -103,7 +103,7 @@ def _count_closed(world: World, worker: Worker, dt: float) -> None:
         for run in range(stepped_runs(world.riding, first)):
             left, right = stepped_run(world.riding, first, end, run)
             sum_slots(world.slots, _touch(world), left, right, implicit.closed)
-        count_rail_contacts(world, worker.found, first, end, implicit.closed)
+        count_rail_contacts(world, worker.rail_contacts, first, end, implicit.closed)
         for run in range(stepped_runs(world.riding, first)):
             left, right = stepped_run(world.riding, first, end, run)
             for i in range(left, right):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from worlds import callable_part
 
-from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
 from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams
 from conveyor_sim.engine.sensors.beams import cubic as cubic_part
 from conveyor_sim.engine.sensors.beams import within_reach as within_reach_part
@@ -70,7 +70,7 @@ def blocked(start: F8, end: F8, radius: F8, ids: NDArray[np.int64], room: int) -
     line = np.hstack((ENDS[:, 0], low, high, way / length, length))
     near, spans = np.empty((2, room), np.int64), np.empty((len(ENDS), room, 2))
     beams = LightBeams(line, near, spans, np.empty(len(ENDS), np.int64), np.empty(len(ENDS), np.int64))
-    while short := block_beams(Ways(start, *end, radius, ids), LENGTH, beams):
+    while short := block_beams(BottleMotion(start, *end, radius, ids), LENGTH, beams):
         if short == 1:
             beams = beams._replace(near=np.empty((2, 2 * beams.near.shape[1]), np.int64))
         else:

@@ -329,7 +329,7 @@ def test_a_centre_exactly_on_a_rail_is_pushed_off() -> None:
 
 def test_more_contacts_than_there_is_room_for_keep_the_deepest() -> None:
     """Given in any order, the shallowest are the ones left out."""
-    found = ALONE.found
+    found = ALONE.rail_contacts
     overlaps = np.random.default_rng(1).permutation(np.arange(1.0, MOST_CONTACTS + 9.0))
     count = 0
     for overlap in overlaps:

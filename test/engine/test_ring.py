@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from worlds import callable_part
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.lists import Listed
+from conveyor_sim.engine.arrays.lists import BottleList
 from conveyor_sim.engine.arrays.support import Belts, Ring, Sectors, Surface
-from conveyor_sim.engine.arrays.world import Settings, World
+from conveyor_sim.engine.arrays.world import EngineSettings, World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.support.ring import POINTS, straddling_ring
 from conveyor_sim.engine.support.ring import ring_means as ring_means_part
@@ -98,7 +98,7 @@ def table(*belts: dict[str, float], certain: int = -1) -> Belts:
     """Straight belts as candidates of bottle 0, the last listed first."""
     columns = {name: np.array([belt[name] for belt in belts]) for name in STRAIGHT}
     order = np.arange(len(belts), dtype=np.uint32)[::-1].copy()
-    listed = Listed(np.zeros(1, np.uint32), np.array([0, 1], np.uint32))
+    listed = BottleList(np.zeros(1, np.uint32), np.array([0, 1], np.uint32))
     start = np.array([0, len(belts)], np.uint32)
     sectors: Sectors | None = None
     return Belts(**columns, sectors=sectors, certain=np.array([certain], np.int32), start=start, candidate=order,
@@ -116,7 +116,7 @@ def drag(
 ) -> NDArray[np.float64]:
     """Force over mu m g, and moment over mu m g R_b; lag: s by which velocities are older than positions."""
     absent: Any = dict.fromkeys(World._fields)
-    settings = Settings(**{**dict.fromkeys(Settings._fields), "slip_limit": LIMIT})  # type: ignore[arg-type]
+    settings = EngineSettings(**{**dict.fromkeys(EngineSettings._fields), "slip_limit": LIMIT})  # type: ignore[arg-type]
     columns: Any = dict.fromkeys(Bottles._fields)
     columns |= {"x": np.array([x]), "y": np.array([y]), "weight": np.array([WEIGHT]), "type": np.zeros(1, np.uint32)}
     absent |= {"settings": settings, "bottles": Bottles(**columns), "belts": belts, "surface": surface}

@@ -16,7 +16,7 @@ DEEP = 0.004
 
 
 def stored(state: State) -> np.ndarray:
-    return stored_energy(state.world, ALONE.found)
+    return stored_energy(state.world, ALONE.rail_contacts)
 
 
 def test_contacts_hold_what_their_laws_take_up() -> None:

@@ -7,7 +7,7 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Ways(NamedTuple):
+class BottleMotion(NamedTuple):
     """Motion of bottles in a tick, (N,)."""
 
     start: F8

@@ -36,7 +36,7 @@ class Spin(NamedTuple):
 
 
 @group
-class Load(NamedTuple):
+class ForceSums(NamedTuple):
     """Results of the last force evaluation, (S,)."""
 
     fx: F8

@@ -102,7 +102,7 @@ class Gathered(NamedTuple):
     """R omega of i plus that of j, m/s, for different radii, (BLOCK,)."""
     compliance: F8
     """dt/m_t, s/kg, for the implicit solver, (BLOCK,)."""
-    way: F8
+    displacement: F8
     """Displacements of j minus those of i: x, y (m); sums of rotations (rad) and rim displacements (m), (4 * BLOCK,).
     """
 
@@ -130,4 +130,4 @@ class Implicit(NamedTuple):
     closed: F8
     """Number of closed contacts, including the base."""
     compliance: F8
-    """dt times mobility times closed contacts, s/kg, times `Settings.ahead`."""
+    """dt times mobility times closed contacts, s/kg, times `EngineSettings.ahead`."""

@@ -20,7 +20,7 @@ MOST_BORNE = 64
 
 
 @group
-class Worst(NamedTuple):
+class Maximum(NamedTuple):
     """Maximum of a quantity, (S,)."""
 
     tick: F8
@@ -46,7 +46,7 @@ class RailBins(NamedTuple):
 
 
 @group
-class Scuffing(NamedTuple):
+class ScuffingWork(NamedTuple):
     """Sliding work."""
 
     work: F8
@@ -58,9 +58,9 @@ class Scuffing(NamedTuple):
 class Crushing(NamedTuple):
     """Simultaneous normal forces on a bottle."""
 
-    total: Worst
+    total: Maximum
     """Sum of all, N."""
-    opposed: Worst
+    opposed: Maximum
     """Largest squeeze by two of them, N."""
 
 
@@ -68,9 +68,9 @@ class Crushing(NamedTuple):
 class Impacts(NamedTuple):
     """Contacts at the moment of closing."""
 
-    speed: Worst
+    speed: Maximum
     """Relative normal speed one step before, m/s."""
-    force: Worst
+    force: Maximum
     """Force of any one contact, whenever it closed, N."""
     vx: F8
     """Velocity at the last evaluation, m/s, (S,)."""
@@ -85,7 +85,7 @@ class Impacts(NamedTuple):
 class Tipping(NamedTuple):
     """Overturning moment divided by the moment that the weight can hold."""
 
-    ratio: Worst
+    ratio: Maximum
     """Index of tipping."""
     mean_x: F8
     """Smoothed moment, as a vector, (S,)."""
@@ -103,17 +103,17 @@ class Tipping(NamedTuple):
 
 
 @group
-class Damage(NamedTuple):
+class DamageArrays(NamedTuple):
     """Loads that are evaluated in every step."""
 
-    scuffing: Scuffing | None
+    scuffing: ScuffingWork | None
     crushing: Crushing | None
     impacts: Impacts | None
     tipping: Tipping | None
 
 
 @group
-class LoadHistory(NamedTuple):
+class ContactLoads(NamedTuple):
     """Scratch: the closed contacts of one bottle, (MOST_BORNE,)."""
 
     nx: F8
@@ -130,7 +130,7 @@ class LoadHistory(NamedTuple):
     """Bin of the rail; -1 for a bottle."""
 
 
-def empty_history() -> LoadHistory:
+def empty_history() -> ContactLoads:
     """Return room for the contacts of one bottle."""
 
     def reals() -> F8:
@@ -138,11 +138,11 @@ def empty_history() -> LoadHistory:
 
     nx, ny, normal, tangential, slip, approach = (reals() for _ in range(6))
     key, place = np.zeros((2, MOST_BORNE), np.int64)
-    return LoadHistory(nx, ny, normal, tangential, slip, approach, key, place)
+    return ContactLoads(nx, ny, normal, tangential, slip, approach, key, place)
 
 
-def worst_columns(damage: Damage) -> Iterator[Worst]:
-    """Yield every Worst that is present."""
+def worst_columns(damage: DamageArrays) -> Iterator[Maximum]:
+    """Yield every Maximum that is present."""
     if damage.crushing is not None:
         yield from (damage.crushing.total, damage.crushing.opposed)
     if damage.impacts is not None:
@@ -151,7 +151,7 @@ def worst_columns(damage: Damage) -> Iterator[Worst]:
         yield damage.tipping.ratio
 
 
-def slot_columns(damage: Damage) -> Iterator[NDArray[Any]]:
+def slot_columns(damage: DamageArrays) -> Iterator[NDArray[Any]]:
     """Yield every array by slot that persists from step to step, (S, ...)."""
     for worst in worst_columns(damage):
         yield from worst
@@ -163,7 +163,7 @@ def slot_columns(damage: Damage) -> Iterator[NDArray[Any]]:
         yield from (damage.tipping.mean_x, damage.tipping.mean_y)
 
 
-def lasting_columns(damage: Damage) -> Iterator[F8]:
+def lasting_columns(damage: DamageArrays) -> Iterator[F8]:
     """Yield every array by slot of a bottle's load so far, (S,). A bottle retains it inside a machine."""
     for worst in worst_columns(damage):
         yield worst.output
@@ -171,7 +171,7 @@ def lasting_columns(damage: Damage) -> Iterator[F8]:
         yield damage.scuffing.work
 
 
-def bin_columns(damage: Damage) -> Iterator[F8]:
+def bin_columns(damage: DamageArrays) -> Iterator[F8]:
     """Yield every array by bin of rails, (units, B)."""
     if damage.scuffing is not None and damage.scuffing.bins is not None:
         yield from (damage.scuffing.bins.work, damage.scuffing.bins.impulse)

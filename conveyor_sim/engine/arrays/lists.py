@@ -7,7 +7,7 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Listed(NamedTuple):
+class BottleList(NamedTuple):
     """Some of the bottles, in order; unit u (`workers.py`) has bottle[first[u]:first[u + 1]]."""
 
     bottle: U4

@@ -8,7 +8,7 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Ledger(NamedTuple):
+class LedgerArrays(NamedTuple):
     """Work of forces by account (`ledger.py`); absent if the ledger is not requested."""
 
     damping: Triple

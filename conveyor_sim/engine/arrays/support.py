@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from conveyor_sim.engine.arrays.lists import Listed
+from conveyor_sim.engine.arrays.lists import BottleList
 from conveyor_sim.engine.arrays.types import F8, I1, I4, U4
 from conveyor_sim.engine.compiler.groups import group
 
@@ -41,7 +41,7 @@ class Belts(NamedTuple):
     start: U4
     candidate: U4
     """Belts that may carry, the last listed first; slot s has candidate[start[s]:start[s + 1]]."""
-    uncertain: Listed
+    uncertain: BottleList
 
 
 @group

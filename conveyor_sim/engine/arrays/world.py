@@ -2,13 +2,13 @@
 
 from typing import Any, NamedTuple
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load, Peaks, Spin
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Peaks, Spin
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves, Gathered, Implicit, Pairs, Slots
-from conveyor_sim.engine.arrays.damage import Damage, LoadHistory
+from conveyor_sim.engine.arrays.damage import ContactLoads, DamageArrays
 from conveyor_sim.engine.arrays.integrators import Linear, Slopes, Stage, Triple
-from conveyor_sim.engine.arrays.lists import Listed, Near, Neighbourhood, StaticGrid
+from conveyor_sim.engine.arrays.lists import BottleList, Near, Neighbourhood, StaticGrid
 from conveyor_sim.engine.arrays.moving import MovingRails
-from conveyor_sim.engine.arrays.observers import GuardProbe, Ledger
+from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.rails import Arcs, RailContacts, Segments
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.arrays.support import Belts, Footing, Ring, StaticFriction, Surface
@@ -17,7 +17,7 @@ from conveyor_sim.engine.compiler.groups import group
 
 
 @group
-class Settings(NamedTuple):
+class EngineSettings(NamedTuple):
     """Constant numbers."""
 
     slip_limit: float
@@ -47,10 +47,10 @@ class Settings(NamedTuple):
 class World(NamedTuple):
     """Arrays that a force evaluation reads and writes."""
 
-    settings: Settings
+    settings: EngineSettings
     bottles: Bottles
     spin: Spin | None
-    load: Load
+    load: ForceSums
     peaks: Peaks | None
     stage: Stage | None
     path: Triple | None
@@ -71,7 +71,7 @@ class World(NamedTuple):
     arcs: Arcs | None
     near_arcs: Near | None
     moving: MovingRails | None
-    railed: Listed | None
+    railed: BottleList | None
     """Bottles near a rail, or near the sweep of a moving one."""
     rail_law: ContactLaw | None
     belts: Belts | None
@@ -79,8 +79,8 @@ class World(NamedTuple):
     footing: Footing | None
     ring: Ring | None
     static_friction: StaticFriction | None
-    ledger: Ledger | None
-    damage: Damage | None
+    ledger: LedgerArrays | None
+    damage: DamageArrays | None
 
 
 @group
@@ -92,7 +92,7 @@ class Worker(NamedTuple):
     sync: I8
     """Shared counts of the barrier, and flags, (SYNC_SIZE,)."""
     gathered: Gathered
-    found: RailContacts
-    history: LoadHistory
+    rail_contacts: RailContacts
+    history: ContactLoads
     callees: I8
     """Addresses of kernels that step kernels call, (2,) (`integrators/callees.py`)."""

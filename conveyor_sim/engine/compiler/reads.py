@@ -21,7 +21,7 @@ def reads(function: Any) -> list[frozenset[Path]]:
     """Return by argument: `("bottles",)` if it tests the member for None, `("bottles", ALL)` if it takes it."""
     source = function.__globals__.get(SOURCE)
     tree = _functions(source or inspect.getsourcefile(function), source is not None)
-    return _Reading(function, tree[function.__name__, function.__code__.co_firstlineno]).found
+    return _Reading(function, tree[function.__name__, function.__code__.co_firstlineno]).by_argument
 
 
 SOURCE = "__written__"
@@ -34,8 +34,8 @@ def _functions(source: str, is_text: bool) -> Mapping[tuple[str, int], ast.Funct
     if not is_text:
         with open(source, encoding="utf-8") as file:
             source = file.read()
-    found = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
-    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in found}
+    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
+    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in nodes}
 
 
 class _Reading:
@@ -50,7 +50,7 @@ class _Reading:
         while before < (before := len(self._read) + sum(map(len, self._places.values()))):
             for statement in node.body:
                 self._statement(statement)
-        self.found = [frozenset(path[1:] for path in self._read if path[0] == name) for name in arguments]
+        self.by_argument = [frozenset(path[1:] for path in self._read if path[0] == name) for name in arguments]
 
     def _statement(self, node: ast.stmt) -> None:
         if isinstance(node, ast.Assign):
@@ -80,13 +80,13 @@ class _Reading:
         self._read |= {(*path, ALL) for path in self._places_of(node)}
 
     def _places_of(self, node: ast.AST) -> set[Path]:
-        """Return the members of arguments that an expression may stand for, and note the reads on the way."""
+        """Return the members of arguments that an expression may stand for, and note the members read for it."""
         if isinstance(node, ast.Name):
             return self._places.get(node.id, set())
         if isinstance(node, ast.Attribute):
-            found = {(*path, node.attr) for path in self._places_of(node.value)}
-            self._read |= found
-            return found
+            paths = {(*path, node.attr) for path in self._places_of(node.value)}
+            self._read |= paths
+            return paths
         if isinstance(node, ast.IfExp):
             self._whole(node.test)
             return self._places_of(node.body) | self._places_of(node.orelse)
@@ -105,9 +105,9 @@ class _Reading:
         for keyword in node.keywords:
             self._whole(keyword.value)
         for place, argument in enumerate(node.args):
-            found = self._places_of(argument)
+            paths = self._places_of(argument)
             ends = WHOLE if inner is None else inner[place]
-            self._read |= {(*path, *end) for path in found for end in ends}
+            self._read |= {(*path, *end) for path in paths for end in ends}
 
     def _named(self, name: str) -> Any:
         """Return the value of a name outside of the function."""

@@ -21,15 +21,15 @@ def source_hash(root: Path, sources: Iterable[Path], size: int) -> str:
         return _parsed(contents, size)
     file = folder / _hash((part for item in contents.items() for part in (item[0].encode(), item[1])), 16)
     with suppress(OSError):
-        kept = file.read_bytes()
-        if kept == _with_checksum(kept[: 2 * size]):
-            return kept[: 2 * size].decode()
-    found = _parsed(contents, size)
+        cached = file.read_bytes()
+        if cached == _with_checksum(cached[: 2 * size]):
+            return cached[: 2 * size].decode()
+    digits = _parsed(contents, size)
     with suppress(OSError):
-        part = file.with_name(f"{file.name}.{os.getpid()}")
-        part.write_bytes(_with_checksum(found.encode()))
-        part.replace(file)
-    return found
+        temporary = file.with_name(f"{file.name}.{os.getpid()}")
+        temporary.write_bytes(_with_checksum(digits.encode()))
+        temporary.replace(file)
+    return digits
 
 
 def _with_checksum(digits: bytes) -> bytes:

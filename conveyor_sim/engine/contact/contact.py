@@ -41,7 +41,7 @@ def contact_force(
     share: effective divided by geometric overlap, 1 for a single contact; it scales the law as a whole. closing: m/s,
     relative velocity (a minus b) along n. slip: m/s, relative velocity of the contact points along t. atan: selects the
     friction curve (`friction.py`). spring: m, elongation of the tangential spring, or None. implicit: (dt/m_t times
-    `Settings.ahead`, s/kg, `Settings.at_once`) for implicit friction, or None.
+    `EngineSettings.ahead`, s/kg, `EngineSettings.at_once`) for implicit friction, or None.
     """
     depth = 0.0 if overlap < 0.0 else overlap
     elastic = elastic_force(law, e, curves, depth)
@@ -132,17 +132,17 @@ def spring_energy(law: ContactLaw, e: int, spring: Any, overlap: float) -> float
 
 
 @part
-def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, way: float) -> Any:
+def carried(law: ContactLaw, e: int, spring: Any, overlap: float, deeper: float, further: float) -> Any:
     """Return the elongation (m) of a spring after its overlap (m) grew by `deeper` (m), or None without a spring.
 
     A spring that has become stiffer keeps its force, because material that joins a contact joins it without load. One
     that has become softer keeps its elongation (Thornton, Cummins and Cleary 2013). So its energy never grows by
-    itself. way: m, further elongation of the same step; a spring that has become stiffer meets it with its mean
+    itself. further: m, elongation of the same step; a spring that has become stiffer meets it with its mean
     stiffness.
     """
     if spring is None:
         return None
-    return spring - _loss(law.tangential_mindlin, e, spring + 0.5 * way, 0.0 if overlap < 0.0 else overlap, deeper)
+    return spring - _loss(law.tangential_mindlin, e, spring + 0.5 * further, 0.0 if overlap < 0.0 else overlap, deeper)
 
 
 @part

@@ -14,17 +14,17 @@ _ALONG = [law for law in DAMPING if not law.isotropic]
 _ISOTROPIC = [law for law in DAMPING if law.isotropic]
 
 
-def _sum(columns: Sequence[str], functions: Sequence[Callable[..., float]], given: str) -> Any:
+def _sum(columns: Sequence[str], functions: Sequence[Callable[..., float]], inputs: str) -> Any:
     """Return a part (law, e, total, args...) that adds functions of entry e of the columns to the total."""
     places = range(len(columns))
     arguments = "".join(f"column_{n}, " for n in places)
     # A branch is pruned only if its test is of an argument.
-    body = [f"    if column_{n} is not None: total += force_{n}(column_{n}[e], {given})" for n in places]
-    head = f"def function(total, {arguments}e, {given}):"
+    body = [f"    if column_{n} is not None: total += force_{n}(column_{n}[e], {inputs})" for n in places]
+    head = f"def function(total, {arguments}e, {inputs}):"
     forces = {f"force_{n}": part(function) for n, function in enumerate(functions)}
     inner = written("\n".join([head, *body, "    return total"]), **forces)
     passed = "".join(f"law.{column}, " for column in columns)
-    text = f"def function(law, e, total, {given}): return inner(total, {passed}e, {given})"
+    text = f"def function(law, e, total, {inputs}): return inner(total, {passed}e, {inputs})"
     return written(text, inner=inner)
 
 
@@ -45,12 +45,12 @@ add_elastic_force: Any = _sum(_columns, [law.force for law in ELASTIC], "depth, 
 add_elastic_energy: Any = _sum(_columns, [law.energy for law in ELASTIC], "depth, curves")
 """(law, e, total, depth, curves): total plus the energy stored, J."""
 
-_given = "elastic, depth, velocity"
-add_damping: Any = _sum([law.column for law in _ALONG], [law.force for law in _ALONG], _given)
+_inputs = "elastic, depth, velocity"
+add_damping: Any = _sum([law.column for law in _ALONG], [law.force for law in _ALONG], _inputs)
 """(law, e, total, elastic, depth, velocity): total plus damping along the normal, N, at a force (N) and speed (m/s)."""
 
 never_pull: Any = _clamp([law.column for law in _ALONG])
 """(law, total): total, at least 0 if the contact has such damping, so that it never pulls."""
 
-add_drag: Any = _sum([law.column for law in _ISOTROPIC], [law.force for law in _ISOTROPIC], _given)
+add_drag: Any = _sum([law.column for law in _ISOTROPIC], [law.force for law in _ISOTROPIC], _inputs)
 """(law, e, total, elastic, depth, velocity): total plus isotropic damping, N, along the velocity (m/s)."""

@@ -22,10 +22,10 @@ from numba import uint64
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import Gathered, Pairs
-from conveyor_sim.engine.arrays.world import Settings, Worker, World
+from conveyor_sim.engine.arrays.world import EngineSettings, Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.contact import carried, contact_force, spring_after, stretched
-from conveyor_sim.engine.contact.path import slip_time_of, way_in_touch
+from conveyor_sim.engine.contact.path import displacement_in_touch, slip_time_of
 from conveyor_sim.engine.threads.workers import BLOCK, share
 
 # Unsigned constants: a signed index would be tested for wrap-around, and the lanes would not be constants.
@@ -64,7 +64,7 @@ def pair_forces(world: World, worker: Worker, spring_dt: float) -> None:
         count: Any = uint64(min(BLOCK, stop - start))
         _gather(world.bottles.packed, world.spin, pairs, pairs.reach, first, count, gathered)
         _gather_compliance(world.implicit, pairs, first, count, gathered.compliance)
-        _gather_ways(world.path, pairs, pairs.reach, first, count, gathered.way)
+        _gather_displacements(world.path, pairs, pairs.reach, first, count, gathered.displacement)
         _law(world, gathered, first, count, spring_dt)
 
 
@@ -108,20 +108,20 @@ def _gather_compliance(implicit: Any, pairs: Pairs, first: int, count: int, comp
 
 
 @part
-def _gather_ways(path: Any, pairs: Pairs, reach: Any, first: int, count: int, way: Any) -> None:
+def _gather_displacements(path: Any, pairs: Pairs, reach: Any, first: int, count: int, displacement: Any) -> None:
     if path is None:
         return
     for c in range(count):
         p, row = first + c, c * _4
         i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
-        way[row] = path.x[j] - path.x[i]
-        way[row + _1] = path.y[j] - path.y[i]
-        way[row + _2] = path.turn[i] + path.turn[j]
-        way[row + _3] = 0.0 if reach is None else _rim_way(path, pairs, reach, p)
+        displacement[row] = path.x[j] - path.x[i]
+        displacement[row + _1] = path.y[j] - path.y[i]
+        displacement[row + _2] = path.turn[i] + path.turn[j]
+        displacement[row + _3] = 0.0 if reach is None else _rim_displacement(path, pairs, reach, p)
 
 
 @part
-def _rim_way(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
+def _rim_displacement(path: Any, pairs: Pairs, reach: Any, p: int) -> float:
     radius = pairs.radius_i[p]
     return radius * path.turn[pairs.i[p]] + (reach[p] - radius) * path.turn[pairs.j[p]]
 
@@ -185,21 +185,21 @@ def _law(world: World, gathered: Gathered, first: int, count: int, spring_dt: fl
 
 
 @part
-def _reach(settings: Settings, reach: Any, p: int) -> float:
+def _reach(settings: EngineSettings, reach: Any, p: int) -> float:
     if reach is None:
         return settings.reach
     return reach[p]
 
 
 @part
-def _radii(settings: Settings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
+def _radii(settings: EngineSettings, pairs: Pairs, reach: Any, p: int) -> tuple[float, float]:
     if reach is None:
         return 0.5 * settings.reach, 0.5 * settings.reach
     return pairs.radius_i[p], reach[p] - pairs.radius_i[p]
 
 
 @part
-def _rim_slip(settings: Settings, spin: Any, reach: Any, gathered: Any, c: int, shorter: float) -> float:
+def _rim_slip(settings: EngineSettings, spin: Any, reach: Any, gathered: Any, c: int, shorter: float) -> float:
     """Return the slip of the rims, m/s: omega_i arm_i + omega_j arm_j; arms are radii minus half the overlap."""
     if spin is None:
         return 0.0
@@ -223,33 +223,35 @@ def _drawn_out(world: World, gathered: Gathered, c: int, p: int, overlap: float,
     if pairs.spring is None:
         return None
     spring, reach = pairs.spring.elongation[p], pairs.reach
-    way: Any = gathered.way
+    displacement: Any = gathered.displacement
     row: Any = c * _4
-    approach = -(way[row] * nx + way[row + _1] * ny)
+    approach = -(displacement[row] * nx + displacement[row + _1] * ny)
     # The normal turns during the displacement. Its mean is that at half of it: |r| n of its end over |r| of its middle.
     distance = _reach(settings, reach, p) - overlap
-    along = (way[row] * ny - way[row + _1] * nx) * (distance / (distance + 0.5 * approach))
+    along = (displacement[row] * ny - displacement[row + _1] * nx) * (distance / (distance + 0.5 * approach))
     shorter = 0.5 * settings.lever * (overlap - 0.5 * approach)
-    further = way_in_touch(along + _rims_way(settings, reach, way, row, shorter), approach, overlap)
+    further = displacement_in_touch(
+        along + _rims_displacement(settings, reach, displacement, row, shorter), approach, overlap
+    )
     return carried(pairs.law, p, spring, overlap, approach, further) + further
 
 
 @part
-def _rims_way(settings: Settings, reach: Any, way: Any, row: int, shorter: float) -> float:
+def _rims_displacement(settings: EngineSettings, reach: Any, displacement: Any, row: int, shorter: float) -> float:
     if reach is None:
-        return (0.5 * settings.reach - shorter) * way[row + _2]
-    return way[row + _3] - shorter * way[row + _2]
+        return (0.5 * settings.reach - shorter) * displacement[row + _2]
+    return displacement[row + _3] - shorter * displacement[row + _2]
 
 
 @part
-def _compliance(settings: Settings, implicit: Any, gathered: Any, c: int) -> Any:
+def _compliance(settings: EngineSettings, implicit: Any, gathered: Any, c: int) -> Any:
     if implicit is None:
         return None
     return gathered.compliance[c], settings.at_once
 
 
 @part
-def find_touching(settings: Settings, bottles: Bottles, pairs: Any, worker: Worker) -> None:
+def find_touching(settings: EngineSettings, bottles: Bottles, pairs: Any, worker: Worker) -> None:
     """Mark in `pairs.touch` the closed ones of this worker's share of the pairs; for the implicit solver."""
     if pairs is None:
         return

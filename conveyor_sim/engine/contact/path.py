@@ -28,7 +28,7 @@ def note_path(path: Any, stage: Stage, dt: float, first: int, end: int) -> None:
 
 
 @part
-def note_stage(world: World, times: F8, ways: F8, s: int, h: float, first: int, end: int) -> None:
+def note_stage(world: World, times: F8, squared: F8, s: int, h: float, first: int, end: int) -> None:
     """Set the displacements of bottles first to end to row s of a tableau in a step of h (s); see `runge_kutta.py`."""
     path, bottles, slopes = world.path, world.bottles, world.slopes
     if path is None:
@@ -42,7 +42,7 @@ def note_stage(world: World, times: F8, ways: F8, s: int, h: float, first: int, 
         for stage in range(s):
             j: Any = uint64(stage)
             for i in range(uint64(first), uint64(end)):
-                path.turn[i] += h * h * ways[s, stage] * slopes.alpha[j, i]
+                path.turn[i] += h * h * squared[s, stage] * slopes.alpha[j, i]
 
 
 @part
@@ -81,7 +81,7 @@ def slip_time_of(path: Any, spring_dt: float) -> float:
 
 
 @part
-def way_in_touch(way: float, approach: float, overlap: float) -> float:
+def displacement_in_touch(displacement: float, approach: float, overlap: float) -> float:
     """Return the part of a displacement (m) along a contact that was covered in touch. approach: m, overlap gained."""
     depth = 0.0 if overlap < 0.0 else overlap
-    return way * (depth / approach) if depth < approach else way
+    return displacement * (depth / approach) if depth < approach else displacement

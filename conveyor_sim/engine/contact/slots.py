@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Load
+from conveyor_sim.engine.arrays.bodies import ForceSums
 from conveyor_sim.engine.arrays.contacts import Slots
 from conveyor_sim.engine.compiler.compile import fill, part
 
@@ -55,7 +55,7 @@ def _enter(slots: Slots, bottle: int, entry: int) -> None:
 
 
 @part
-def sum_pair_forces(pairs: Any, slots: Any, load: Load, moments: Any, first: int, end: int) -> None:
+def sum_pair_forces(pairs: Any, slots: Any, load: ForceSums, moments: Any, first: int, end: int) -> None:
     """Set `load` and, if bottles turn, `moments` of bottles first to end to the sum of their pair forces."""
     if pairs is None:
         _clear(load, moments, first, end)
@@ -65,7 +65,7 @@ def sum_pair_forces(pairs: Any, slots: Any, load: Load, moments: Any, first: int
 
 
 @part
-def _clear(load: Load, moments: Any, first: int, end: int) -> None:
+def _clear(load: ForceSums, moments: Any, first: int, end: int) -> None:
     _set_zero(load.fx, first, end)
     _set_zero(load.fy, first, end)
     _set_zero(moments, first, end)

@@ -27,10 +27,10 @@ INTEGRATORS: dict[str, Advance] = {
 }
 
 AHEAD = {"leapfrog": (1.0, 0.0), "semi_implicit_euler": (1.0, 0.0), "velocity_verlet": (1.5, 0.5), "rk4": (1.0, 0.5)}
-"""Integrators with implicit friction: `Settings.ahead` and `at_once` (`friction.py`)."""
+"""Integrators with implicit friction: `EngineSettings.ahead` and `at_once` (`friction.py`)."""
 
 LAG = {"leapfrog": 0.5}
-"""Integrators that use the belt's velocity at the bottle's mid-step position (`Settings.lag`)."""
+"""Integrators that use the belt's velocity at the bottle's mid-step position (`EngineSettings.lag`)."""
 
 ON_PATHS = frozenset({"velocity_verlet", "rk4"})
 """Integrators whose tangential springs follow the displacements of bottles (``World.path``, `path.py`)."""

@@ -19,7 +19,7 @@ def find_callees(world: World, worker: Worker) -> None:
     """
     lists = lists_of(world)
     worker.callees[REBUILD] = address(rebuild, lists)
-    worker.callees[PROBE] = address(probe_overlaps, lists, worker.found)
+    worker.callees[PROBE] = address(probe_overlaps, lists, worker.rail_contacts)
 
 
 @part
@@ -31,4 +31,4 @@ def call_rebuild(world: World, worker: Worker) -> None:
 @part
 def call_probe(world: World, worker: Worker) -> None:
     """Update the deepest overlaps: `probe_overlaps`."""
-    call(worker.callees[PROBE], world, worker.found)
+    call(worker.callees[PROBE], world, worker.rail_contacts)

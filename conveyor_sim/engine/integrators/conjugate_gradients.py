@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, Triple
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
@@ -27,7 +27,7 @@ LEAST = 1e-9
 """Kicks below this speed, m/s, are neglected."""
 
 MOST_ROUNDS = 1000
-"""Rounds after which the search ends. The change found by then reduces the error as well, only less."""
+"""Rounds after which the search ends. The change up to then reduces the error as well, only less."""
 
 
 @part
@@ -48,7 +48,7 @@ def factor(own: Blocks, inverse: Blocks, first: int, end: int) -> None:
 
 
 @part
-def begin_search(bottles: Bottles, spin: Any, load: Load, linear: Linear, dt: float, first: int, end: int) -> None:
+def begin_search(bottles: Bottles, spin: Any, load: ForceSums, linear: Linear, dt: float, first: int, end: int) -> None:
     """Start from the present change, with the impulse of `load` in dt (s), of bottles first to end."""
     left, own = linear.left, linear.own
     for i in range(uint64(first), uint64(end)):

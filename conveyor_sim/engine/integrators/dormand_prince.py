@@ -42,8 +42,8 @@ from conveyor_sim.engine.integrators.runge_kutta import (
     keep_slopes,
     keep_state,
     note_peaks,
+    squared_weights,
     turn,
-    ways_of,
 )
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
@@ -63,12 +63,12 @@ WEIGHTS = np.array(
         [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
     ]
 )
-WAYS = ways_of(WEIGHTS)
+SQUARED = squared_weights(WEIGHTS)
 ERRORS = np.array([71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -0.025])
 """Weights of the difference between the new velocity and that of order 4, over h, (STAGES,)."""
 WAY_ERRORS = np.append(ERRORS[:LAST] @ WEIGHTS[:LAST] + ERRORS[LAST] * WEIGHTS[LAST], 0.0)
 
-WAY_SHARE = 10.0
+DRIFT_WEIGHT = 10.0
 """Weight of the difference in position over h, relative to that in velocity."""
 
 SAFETY = 0.9
@@ -99,9 +99,14 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     bottles, allowed = world.bottles, max(world.settings.error, LEAST)
     slopes: Any = world.slopes
     begin, stop = share(worker, bottles.x.size)
-    stage, h, left, tried = 0, dt, dt, 0
+    stage, h, remaining, tried = 0, dt, dt, 0
     if phase == RESUME:
-        stage, h, left, tried = int(slopes.progress[0]), slopes.progress[1], slopes.progress[2], int(slopes.progress[3])
+        stage, h, remaining, tried = (
+            int(slopes.progress[0]),
+            slopes.progress[1],
+            slopes.progress[2],
+            int(slopes.progress[3]),
+        )
     taken = 0
     pack_all(world, worker)
     while taken < steps:
@@ -129,28 +134,33 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                     if worst == math.inf:
                         _spoil(bottles, slopes.error, first, end, tried > MOST)
                 note_damage(world, worker, h)
-                left -= h
+                remaining -= h
                 probe_rebuilt(world, worker)
-                if left == 0.0:
-                    left = dt
+                if remaining == 0.0:
+                    remaining = dt
                     taken += 1
                 if worst == math.inf:
                     taken = steps
-            h = _next(h, worst, allowed, left, dt)
+            h = _next(h, worst, allowed, remaining, dt)
             stage = 0
             if taken == steps:
                 return steps
         stage += 1
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
-            go_to(world, TIMES, WEIGHTS, WAYS, stage, h, first, end)
+            go_to(world, TIMES, WEIGHTS, SQUARED, stage, h, first, end)
             if stage == LAST:
                 come_to_rest(bottles, world.spin, first, end)
             pack(bottles, first, end)
             note_moved(world, worker, first, end)
         if not lists_hold(world, worker):
             if worker.rank == 0:
-                slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = stage, h, left, tried
+                slopes.progress[0], slopes.progress[1], slopes.progress[2], slopes.progress[3] = (
+                    stage,
+                    h,
+                    remaining,
+                    tried,
+                )
             return taken
     return taken
 
@@ -171,8 +181,8 @@ def _note_errors(radius: Any, spin: Any, slopes: Any, h: float, first: int, end:
             x += WAY_ERRORS[j] * ax
             y += WAY_ERRORS[j] * ay
         speed = h * math.sqrt(vx * vx + vy * vy)
-        way = WAY_SHARE * h * math.sqrt(x * x + y * y)
-        slopes.error[i] = _finite(speed if speed > way else way)
+        drift = DRIFT_WEIGHT * h * math.sqrt(x * x + y * y)
+        slopes.error[i] = _finite(speed if speed > drift else drift)
     if spin is not None:
         for i in range(uint64(first), uint64(end)):
             omega = 0.0
@@ -197,18 +207,18 @@ def _largest(errors: Any) -> float:
 
 
 @part
-def _next(h: float, worst: float, allowed: float, left: float, dt: float) -> float:
+def _next(h: float, worst: float, allowed: float, remaining: float, dt: float) -> float:
     """Return the length of the next substep, s, from the largest error in one of h. It divides the remaining step."""
     factor = GROW
     if worst > 0.0:
         factor = min(GROW, max(SHRINK, SAFETY * math.pow(allowed / worst, 0.2)))
-    return left / math.ceil(left / max(factor * h, 0.5 * FLOOR * dt))
+    return remaining / math.ceil(remaining / max(factor * h, 0.5 * FLOOR * dt))
 
 
 @part
 def _accept(world: World, slopes: Any, h: float, first: int, end: int) -> None:
     """End a substep at the present state, and start the next one there with the present forces."""
-    turn(world.spin, slopes, WAYS, h, first, end)
+    turn(world.spin, slopes, SQUARED, h, first, end)
     add_impulses(world.peaks, slopes, WEIGHTS, h, first, end)
     book_stages(world.ledger, WEIGHTS, h, first, end)
     note_powers(world.bottles, world.spin, world.load, world.ledger, 0.0, 0, first, end)

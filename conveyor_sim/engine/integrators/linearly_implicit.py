@@ -115,9 +115,9 @@ def _look_ahead(world: World, time: float, theta: float, first: int, end: int) -
     far = 0.25 * world.settings.skin
     for i in range(uint64(first), uint64(end)):
         vx, vy = bottles.vx[i] + theta * linear.change.x[i], bottles.vy[i] + theta * linear.change.y[i]
-        way = time * math.sqrt(vx * vx + vy * vy)
+        distance = time * math.sqrt(vx * vx + vy * vy)
         allowed = max(far, time * math.sqrt(bottles.vx[i] * bottles.vx[i] + bottles.vy[i] * bottles.vy[i]))
-        reached = time * (allowed / way if way > allowed else 1.0)
+        reached = time * (allowed / distance if distance > allowed else 1.0)
         bottles.x[i] = linear.x[i] + reached * vx
         bottles.y[i] = linear.y[i] + reached * vy
 
@@ -139,7 +139,7 @@ def _stiffest(world: World, worker: Worker) -> float:
     wait_for_all(worker)
     stiffest_pairs(world, worker)
     for first in range(begin, stop, BLOCK):
-        stiffest_rails(world, worker.found, first, min(first + BLOCK, stop))
+        stiffest_rails(world, worker.rail_contacts, first, min(first + BLOCK, stop))
     wait_for_all(worker)
     most = _most_of_pairs(world.pairs)
     for unit in range(linear.most.size):
@@ -171,7 +171,7 @@ def _assemble(world: World, worker: Worker, dt: float, theta: float, first: int,
     own, inverse = linear.own, linear.inverse
     sum_pair_forces(world.pairs, world.slots, world.load, _moments(world.spin), first, end)
     _inertia(bottles, world.spin, own, first, end)
-    linear_rails(world, worker.found, (dt, theta), first, end)
+    linear_rails(world, worker.rail_contacts, (dt, theta), first, end)
     check_footing(bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     add_base_friction(world, world.spin, world.load, None, dt, first, end)
     add_straddling_friction(world, world.spin, world.load, None, world.settings.lag * dt, first, end)

@@ -7,7 +7,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.integrators.callees import call_probe, call_rebuild
@@ -27,7 +27,7 @@ def settle(speed: float) -> float:
 
 
 @part
-def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: int) -> None:
+def kick(bottles: Bottles, spin: Any, load: ForceSums, dt: float, first: int, end: int) -> None:
     """Apply v += dt a and omega += dt alpha, with a = F/m, alpha = M/J (paper eqs. 1, 5)."""
     for i in range(uint64(first), uint64(end)):
         bottles.vx[i] = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))
@@ -38,7 +38,7 @@ def kick(bottles: Bottles, spin: Any, load: Load, dt: float, first: int, end: in
 
 
 @part
-def accumulate_peaks(load: Load, peaks: Any, dt: float, first: int, end: int) -> None:
+def accumulate_peaks(load: ForceSums, peaks: Any, dt: float, first: int, end: int) -> None:
     """Update each bottle's largest normal force (N) and the impulse of all its normal forces (N s)."""
     if peaks is None:
         return

@@ -33,8 +33,8 @@ from conveyor_sim.engine.integrators.runge_kutta import (
     keep_slopes,
     keep_state,
     note_peaks,
+    squared_weights,
     turn,
-    ways_of,
 )
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_stages, note_powers
@@ -51,7 +51,7 @@ WEIGHTS = np.array(
         [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
     ]
 )
-WAYS = ways_of(WEIGHTS)
+SQUARED = squared_weights(WEIGHTS)
 
 
 @kernel
@@ -81,11 +81,11 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 keep_state(bottles, world.spin, slopes, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
-            go_to(world, TIMES, WEIGHTS, WAYS, stage + 1, dt, first, end)
-            note_stage(world, TIMES, WAYS, stage + 1, dt, first, end)
+            go_to(world, TIMES, WEIGHTS, SQUARED, stage + 1, dt, first, end)
+            note_stage(world, TIMES, SQUARED, stage + 1, dt, first, end)
             if stage + 1 == STAGES:
                 come_to_rest(bottles, world.spin, first, end)
-                turn(world.spin, slopes, WAYS, dt, first, end)
+                turn(world.spin, slopes, SQUARED, dt, first, end)
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
                 book_stages(world.ledger, WEIGHTS, dt, first, end)
             pack(bottles, first, end)

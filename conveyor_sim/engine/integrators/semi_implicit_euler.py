@@ -2,8 +2,9 @@
 
 Velocities are those of mid-step, positions those of the end of the step. Semi-implicit Euler treats both as
 simultaneous, so a bottle that a turning belt carries seems to slip outward by half a step's acceleration: its forces at
-rest are off by mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle's mid-step position (`Settings.lag`)
-and has no such error (test/physics/test_resting_load.py). On straight belts and floors the two agree to the bit.
+rest are off by mu g dt / v_lim. Leapfrog uses the belt's velocity at the bottle's mid-step position
+(`EngineSettings.lag`) and has no such error (test/physics/test_resting_load.py). On straight belts and floors the two
+agree to the bit.
 
 The order is 1 through dashpots, clamped or not, and through friction, with or without a jump at first touch. Without
 damping its errors in energy stay bounded; a rebound and a peak force are then of order 2, with Hertz a rebound is of
@@ -15,7 +16,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
@@ -63,7 +64,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
 
 
 @part
-def _move(bottles: Bottles, load: Load, dt: float, first: int, end: int) -> None:
+def _move(bottles: Bottles, load: ForceSums, dt: float, first: int, end: int) -> None:
     """Move bottles first to end and pack them for the next step, in one pass."""
     for i in range(uint64(first), uint64(end)):
         vx = settle(bottles.vx[i] + dt * (load.fx[i] * bottles.inverse_mass[i]))

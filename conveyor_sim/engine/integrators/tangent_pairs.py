@@ -140,26 +140,26 @@ def _note_normal(pairs: Pairs, p: int, normal: float) -> None:
 
 
 @part
-def resist_pairs(pairs: Any, way: Any, old: Any, beta: float, worker: Worker) -> None:
-    """Write, by pair, the impulses with which this worker's pairs resist velocities way + beta old (Triples)."""
+def resist_pairs(pairs: Any, direction: Any, old: Any, beta: float, worker: Worker) -> None:
+    """Write, by pair, the impulses with which this worker's pairs resist velocities direction + beta old (Triples)."""
     if pairs is None:
         return
     begin, stop = share(worker, pairs.used[0])
     for p in range(uint64(begin), uint64(stop)):
-        _resist(pairs, way, old, beta, p)
+        _resist(pairs, direction, old, beta, p)
 
 
 @part
-def _resist(pairs: Pairs, way: Any, old: Any, beta: float, p: int) -> None:
+def _resist(pairs: Pairs, direction: Any, old: Any, beta: float, p: int) -> None:
     tangent: Any = pairs.tangent
     i, j = uint64(pairs.i[p]), uint64(pairs.j[p])
     nx, ny = tangent.nx[p], tangent.ny[p]
-    vx = (way.x[i] + beta * old.x[i]) - (way.x[j] + beta * old.x[j])
-    vy = (way.y[i] + beta * old.y[i]) - (way.y[j] + beta * old.y[j])
+    vx = (direction.x[i] + beta * old.x[i]) - (direction.x[j] + beta * old.x[j])
+    vy = (direction.y[i] + beta * old.y[i]) - (direction.y[j] + beta * old.y[j])
     slip = vy * nx - vx * ny
     arm_i, arm_j = tangent.arm_i[p], tangent.arm_j[p]
     if pairs.moment is not None:
-        slip += (way.turn[i] + beta * old.turn[i]) * arm_i + (way.turn[j] + beta * old.turn[j]) * arm_j
+        slip += (direction.turn[i] + beta * old.turn[i]) * arm_i + (direction.turn[j] + beta * old.turn[j]) * arm_j
     along, across = tangent.normal[p] * (vx * nx + vy * ny), tangent.tangential[p] * slip
     _write(pairs, p, along * nx - across * ny, along * ny + across * nx, across * arm_i, across * arm_j)
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.integrators import Stage
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
@@ -114,7 +114,7 @@ def _end_step(world: World, stage: Stage, dt: float, first: int, end: int) -> No
 
 
 @part
-def _move(bottles: Bottles, load: Load, stage: Stage, dt: float, first: int, end: int) -> None:
+def _move(bottles: Bottles, load: ForceSums, stage: Stage, dt: float, first: int, end: int) -> None:
     half = 0.5 * dt
     for i in range(uint64(first), uint64(end)):
         kick_x = half * (load.fx[i] * bottles.inverse_mass[i])

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.lists import Listed, Near
+from conveyor_sim.engine.arrays.lists import BottleList, Near
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.rails.moving import near_sweep
@@ -90,7 +90,7 @@ def list_railed(bottles: Bottles, near_segments: Any, near_arcs: Any, moving: An
 
 
 @part
-def end_list(listed: Listed, bottles: int, count: int) -> None:
+def end_list(listed: BottleList, bottles: int, count: int) -> None:
     """End a list by unit that holds `count` of all bottles."""
     for unit in range((bottles + UNIT - 1) // UNIT, listed.first.size):
         listed.first[unit] = count

@@ -123,8 +123,8 @@ def _put_springs_back(pairs: Pairs, springs: Any) -> None:
         i, j = pairs.i[p], pairs.j[p]
         while k < kept and (springs.kept_i[k] < i or (springs.kept_i[k] == i and springs.kept_j[k] < j)):
             k += 1
-        found = k < kept and springs.kept_i[k] == i and springs.kept_j[k] == j
-        springs.elongation[p] = springs.kept[k] if found else 0.0
+        stored = k < kept and springs.kept_i[k] == i and springs.kept_j[k] == j
+        springs.elongation[p] = springs.kept[k] if stored else 0.0
     springs.kept_count[0] = -1
 
 

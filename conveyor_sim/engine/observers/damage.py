@@ -11,8 +11,8 @@ rail.
 import math
 from typing import Any
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load, Spin
-from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, LoadHistory, RailBins, Worst
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums, Spin
+from conveyor_sim.engine.arrays.damage import MOST_BORNE, MOST_TOUCHES, ContactLoads, Maximum, RailBins
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.pairs import normal_and_overlap
@@ -58,7 +58,7 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
 
 
 @part
-def _list_pairs(i: int, world: World, impacts: Any, history: LoadHistory) -> int:
+def _list_pairs(i: int, world: World, impacts: Any, history: ContactLoads) -> int:
     """Write the closed contacts of bottle i with others to `history`; return their number."""
     slots = world.slots
     if world.pairs is None:
@@ -73,7 +73,7 @@ def _list_pairs(i: int, world: World, impacts: Any, history: LoadHistory) -> int
 
 
 @part
-def _list_pair(i: int, entry: int, world: World, impacts: Any, history: LoadHistory, count: int) -> int:
+def _list_pair(i: int, entry: int, world: World, impacts: Any, history: ContactLoads, count: int) -> int:
     bottles, pairs = world.bottles, world.pairs
     p = entry if entry < pairs.i.size else entry - pairs.i.size
     j = int(pairs.j[p]) if entry < pairs.i.size else int(pairs.i[p])
@@ -95,15 +95,15 @@ def _list_pair(i: int, entry: int, world: World, impacts: Any, history: LoadHist
 def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -> int:
     if world.rail_law is None:
         return count
-    bottles, found = world.bottles, worker.found
-    for c in range(find_rail_contacts(i, world, found)):
+    bottles, contacts = world.bottles, worker.rail_contacts
+    for c in range(find_rail_contacts(i, world, contacts)):
         # A contact that pushes through another piece of its surface counts there.
-        if found.share[c] > 0.0 and count < MOST_BORNE:
-            entry = found.entry[c]
+        if contacts.share[c] > 0.0 and count < MOST_BORNE:
+            entry = contacts.entry[c]
             spring = rail_elongation(world, i, entry)
-            normal, tangential, slip, _ = rail_contact(c, i, world, found, spring, 0.0, None)
-            nx, ny = found.nx[c], found.ny[c]
-            arm = bottles.radius[i] - found.overlap[c]
+            normal, tangential, slip, _ = rail_contact(c, i, world, contacts, spring, 0.0, None)
+            nx, ny = contacts.nx[c], contacts.ny[c]
+            arm = bottles.radius[i] - contacts.overlap[c]
             x, y = bottles.x[i] + arm * nx, bottles.y[i] + arm * ny
             if moves(world.moving, entry):
                 # Work on a moving rail belongs to no place of the line.
@@ -111,7 +111,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
             else:
                 key = _rail_key(world.near_segments, world.near_arcs, entry)
                 place = _bin(damage.scuffing, world.segments, world.arcs, key, x, y)
-            ux, uy = surface_velocity(world.moving, found, c, bottles, i)
+            ux, uy = surface_velocity(world.moving, contacts, c, bottles, i)
             approach = _approach(damage.impacts, i, nx, ny) - (ux * nx + uy * ny)
             _write_force(worker.history, count, nx, ny, normal, tangential, slip)
             _write_place(worker.history, count, approach, key, place)
@@ -121,7 +121,7 @@ def _list_rails(i: int, world: World, damage: Any, worker: Worker, count: int) -
 
 @part
 def _write_force(
-    history: LoadHistory, c: int, nx: float, ny: float, normal: float, tangential: float, slip: float
+    history: ContactLoads, c: int, nx: float, ny: float, normal: float, tangential: float, slip: float
 ) -> None:
     history.nx[c] = nx
     history.ny[c] = ny
@@ -132,7 +132,7 @@ def _write_force(
 
 
 @part
-def _write_place(history: LoadHistory, c: int, approach: float, key: int, place: int) -> None:
+def _write_place(history: ContactLoads, c: int, approach: float, key: int, place: int) -> None:
     history.approach[c] = approach
     history.key[c] = key
     history.place[c] = place
@@ -193,13 +193,13 @@ def _arc_bin(bins: RailBins, arcs: Any, k: int, x: float, y: float) -> int:
 
 
 @part
-def _bin_at(first: int, end: int, way: float) -> int:
+def _bin_at(first: int, end: int, position: float) -> int:
     """Return which of the bins first to end lies at a share of the length along them."""
-    return first + min(max(math.floor(way * (end - first)), 0), end - first - 1)
+    return first + min(max(math.floor(position * (end - first)), 0), end - first - 1)
 
 
 @part
-def _scuff(i: int, scuffing: Any, history: LoadHistory, count: int, dt: float) -> None:
+def _scuff(i: int, scuffing: Any, history: ContactLoads, count: int, dt: float) -> None:
     """Add |T s| dt to the bottle, and to the rail on which it slides."""
     if scuffing is None:
         return
@@ -219,7 +219,7 @@ def _wear(bins: Any, unit: int, place: int, work: float, impulse: float) -> None
 
 
 @part
-def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
+def _crush(i: int, crushing: Any, history: ContactLoads, count: int) -> None:
     """Update the sum of normal forces, and the largest min(N_a, N_b) |cos| of two opposing ones."""
     if crushing is None:
         return
@@ -234,7 +234,7 @@ def _crush(i: int, crushing: Any, history: LoadHistory, count: int) -> None:
 
 
 @part
-def _hit(i: int, impacts: Any, history: LoadHistory, count: int) -> None:
+def _hit(i: int, impacts: Any, history: ContactLoads, count: int) -> None:
     """Update the largest force of one contact, and the closing speed of contacts that were open before."""
     if impacts is None:
         return
@@ -256,7 +256,7 @@ def _hit(i: int, impacts: Any, history: LoadHistory, count: int) -> None:
 
 
 @part
-def _raise(worst: Worst, i: int, value: float) -> None:
+def _raise(worst: Maximum, i: int, value: float) -> None:
     if value > worst.tick[i]:
         worst.tick[i] = value
 
@@ -277,7 +277,7 @@ def _find_base(world: World, tipping: Any, dt: float, first: int, end: int) -> N
         return
     for i in range(first, end):
         tipping.fx[i] = tipping.fy[i] = tipping.moment[i] = 0.0
-    load = Load(tipping.fx, tipping.fy, None, None)
+    load = ForceSums(tipping.fx, tipping.fy, None, None)
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     spin, lag = _apart(world.spin, tipping.moment), world.settings.lag * dt
     add_base_friction(world, spin, load, None, dt, first, end)
@@ -294,7 +294,7 @@ def _apart(spin: Any, moment: Any) -> Any:
 
 
 @part
-def _tip(i: int, bottles: Bottles, tipping: Any, history: LoadHistory, count: int, dt: float) -> None:
+def _tip(i: int, bottles: Bottles, tipping: Any, history: ContactLoads, count: int, dt: float) -> None:
     """Update |F_c (h_c - h_cg) - F_b h_cg| / (m g R_b), smoothed because a blow is over before a bottle can tip."""
     if tipping is None:
         return

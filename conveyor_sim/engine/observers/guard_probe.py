@@ -38,10 +38,10 @@ def look(bottles: Bottles, spin: Any) -> tuple[int, int, float, float, float]:
 
 
 @kernel
-def probe_overlaps(world: World, found: RailContacts) -> None:
+def probe_overlaps(world: World, contacts: RailContacts) -> None:
     """Update the deepest overlaps in `world.probe`; the lists must hold."""
     _probe_pairs(world.bottles, world.pairs, world.probe)
-    _probe_rails(world, world.railed, world.probe, found)
+    _probe_rails(world, world.railed, world.probe, contacts)
 
 
 @part
@@ -71,15 +71,15 @@ def _probe_pairs(bottles: Bottles, pairs: Any, probe: GuardProbe) -> None:
 
 
 @part
-def _probe_rails(world: World, railed: Any, probe: GuardProbe, found: RailContacts) -> None:
+def _probe_rails(world: World, railed: Any, probe: GuardProbe, contacts: RailContacts) -> None:
     if railed is None:
         return
     bottles = world.bottles
     begin, stop = units(0, bottles.x.size)
     for place in range(railed.first[begin], railed.first[stop]):
         i = railed.bottle[place]
-        for c in range(find_rail_contacts(i, world, found)):
-            _note(probe, 1, found.overlap[c] / bottles.radius[i], i, found.rail[c])
+        for c in range(find_rail_contacts(i, world, contacts)):
+            _note(probe, 1, contacts.overlap[c] / bottles.radius[i], i, contacts.rail[c])
 
 
 @part

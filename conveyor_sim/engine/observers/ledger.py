@@ -14,8 +14,8 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
-from conveyor_sim.engine.arrays.observers import Ledger
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
+from conveyor_sim.engine.arrays.observers import LedgerArrays
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.threads.workers import UNIT, units
@@ -26,7 +26,7 @@ DAMPING, CONTACT_FRICTION, BASE_FRICTION, BELTS = 0, 1, 2, 3
 
 @part
 def note_powers(
-    bottles: Bottles, spin: Any, load: Load, ledger: Any, ahead: float, stage: int, first: int, end: int
+    bottles: Bottles, spin: Any, load: ForceSums, ledger: Any, ahead: float, stage: int, first: int, end: int
 ) -> None:
     """Compute the power of each account on bottles first to end at velocities `ahead` (s) after the present ones."""
     if ledger is None:
@@ -59,7 +59,7 @@ def _note_rails(power: F8, rail_power: Any, first: int, stage: int, unit: int) -
 
 @part
 def _powers(
-    bottles: Bottles, spin: Any, load: Load, ledger: Ledger, ahead: float, first: int, end: int
+    bottles: Bottles, spin: Any, load: ForceSums, ledger: LedgerArrays, ahead: float, first: int, end: int
 ) -> tuple[float, float, float]:
     """Return the powers of damping, contact friction and base on the bottles, W."""
     damping = friction = base = 0.0
@@ -90,7 +90,7 @@ def book(ledger: Any, stage: int, h: float, first: int, end: int) -> None:
 
 
 @part
-def book_kick(bottles: Bottles, spin: Any, load: Load, ledger: Any, h: float, first: int, end: int) -> None:
+def book_kick(bottles: Bottles, spin: Any, load: ForceSums, ledger: Any, h: float, first: int, end: int) -> None:
     """Book a kick of h seconds that bottles first to end are about to get."""
     note_powers(bottles, spin, load, ledger, 0.5 * h, 0, first, end)
     book(ledger, 0, h, first, end)

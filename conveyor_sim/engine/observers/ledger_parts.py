@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.integrators import Triple
 from conveyor_sim.engine.arrays.rails import RailContacts
 from conveyor_sim.engine.arrays.world import Worker, World
@@ -103,14 +103,14 @@ def _sum(slots: Any, by_pair: Triple, force: Triple, first: int, end: int) -> No
 
 @part
 def add_rail_parts(
-    world: World, found: RailContacts, c: int, i: int, normal: float, tangential: float, slip: float
+    world: World, contacts: RailContacts, c: int, i: int, normal: float, tangential: float, slip: float
 ) -> None:
     """Divide N and T (N) of contact c of bottle i with a rail into parts; slip in m/s."""
     ledger, law = world.ledger, world.rail_law
     if ledger is None:
         return
-    nx, ny, overlap, shared = found.nx[c], found.ny[c], found.overlap[c], found.share[c]
-    entry, arm = law_entry(world, found, c, i), rail_arm(overlap, world.bottles.radius[i], world.settings.lever)
+    nx, ny, overlap, shared = contacts.nx[c], contacts.ny[c], contacts.overlap[c], contacts.share[c]
+    entry, arm = law_entry(world, contacts, c, i), rail_arm(overlap, world.bottles.radius[i], world.settings.lever)
     elastic = elastic_force(law, entry, world.curves, overlap)
     drag = shared * drag_force(law, entry, elastic, overlap, -slip)
     along = normal - shared * elastic
@@ -122,7 +122,7 @@ def add_rail_parts(
     friction.x[i] -= across * ny
     friction.y[i] += across * nx
     friction.turn[i] += arm * across
-    add_rail_power(world, found, c, i, normal, tangential, along, drag, across)
+    add_rail_power(world, contacts, c, i, normal, tangential, along, drag, across)
 
 
 @part
@@ -137,7 +137,7 @@ def clear_belt_powers(ledger: Any, first: int, end: int) -> None:
 
 
 @part
-def keep_load(load: Load, spin: Any, ledger: Any, first: int, end: int) -> None:
+def keep_load(load: ForceSums, spin: Any, ledger: Any, first: int, end: int) -> None:
     """Store the contact forces on bottles first to end, before base friction is added."""
     if ledger is None:
         return

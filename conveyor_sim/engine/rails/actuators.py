@@ -34,20 +34,20 @@ def clear_push(actuators: Any, first: int, end: int) -> None:
 
 @part
 def add_push(
-    moving: MovingRails, found: RailContacts, c: int, q: int, bottles: Bottles, i: int, n: float, t: float
+    moving: MovingRails, contacts: RailContacts, c: int, q: int, bottles: Bottles, i: int, n: float, t: float
 ) -> None:
     """Add the force of contact c of bottle i on rail q along its motion; n and t: N and T on the bottle, N."""
     actuators = moving.actuators
     if actuators is None:
         return
-    ahead, aside = _motion_at(moving, found, c, q, bottles, i)
+    ahead, aside = _motion_at(moving, contacts, c, q, bottles, i)
     actuators.push[i // UNIT, q, 0] += n * ahead - t * aside
 
 
 @part
 def add_push_parts(
     moving: MovingRails,
-    found: RailContacts,
+    contacts: RailContacts,
     c: int,
     q: int,
     bottles: Bottles,
@@ -60,21 +60,21 @@ def add_push_parts(
     actuators = moving.actuators
     if actuators is None:
         return
-    ahead, aside = _motion_at(moving, found, c, q, bottles, i)
+    ahead, aside = _motion_at(moving, contacts, c, q, bottles, i)
     actuators.push[i // UNIT, q, 1] += damped * ahead - drag * aside
     actuators.push[i // UNIT, q, 2] -= across * aside
 
 
 @part
 def _motion_at(
-    moving: MovingRails, found: RailContacts, c: int, q: int, bottles: Bottles, i: int
+    moving: MovingRails, contacts: RailContacts, c: int, q: int, bottles: Bottles, i: int
 ) -> tuple[float, float]:
     """Return the velocity of rail q at contact c along its normal and across it, over the speed of the rail."""
-    arm = bottles.radius[i] - found.overlap[c]
-    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    arm = bottles.radius[i] - contacts.overlap[c]
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
     ux, uy = moving.along_x[q] - moving.turning[q] * dy, moving.along_y[q] + moving.turning[q] * dx
-    return ux * found.nx[c] + uy * found.ny[c], uy * found.nx[c] - ux * found.ny[c]
+    return ux * contacts.nx[c] + uy * contacts.ny[c], uy * contacts.nx[c] - ux * contacts.ny[c]
 
 
 @part
@@ -129,11 +129,11 @@ def _rejoin_profile(
     wanted = wanted_acceleration(position, speed, target, most, braking)
     acceleration = _possible(actuators, moving, q, wanted, push)
     if acceleration == wanted:
-        found = _found(actuators, q, acceleration, dt, centred)
-        speed += found
+        correction = _correction(actuators, q, acceleration, dt, centred)
+        speed += correction
         # A profile respects the speed limit, and reverses before the end stops.
         if abs(speed) <= most and 0.0 <= stopping_place(position, speed, braking) <= actuators.stroke[q]:
-            _book(ledger, actuators, q, dt * found)
+            _book(ledger, actuators, q, dt * correction)
             plan_profile(moving.course, q, time, position, speed, target, most, braking)
             actuators.mode[q], actuators.left[q] = ON_PROFILE, 1
     return acceleration
@@ -152,7 +152,7 @@ def _possible(actuators: Actuators, moving: MovingRails, q: int, wanted: float, 
 
 
 @part
-def _found(actuators: Actuators, q: int, acceleration: float, dt: float, centred: bool) -> float:
+def _correction(actuators: Actuators, q: int, acceleration: float, dt: float, centred: bool) -> float:
     """Return the correction of the predicted speed, now that the acceleration is known."""
     return 0.5 * dt * (acceleration - actuators.acceleration[q]) if centred else 0.0
 
@@ -163,10 +163,10 @@ def _move(
 ) -> None:
     position, speed, stroke = moving.position[q], moving.speed[q], actuators.stroke[q]
     if centred:
-        found = _found(actuators, q, acceleration, dt, centred)
-        position += dt * (speed + found + 0.5 * dt * acceleration)
-        speed += found + dt * acceleration
-        _book(ledger, actuators, q, dt * found)
+        correction = _correction(actuators, q, acceleration, dt, centred)
+        position += dt * (speed + correction + 0.5 * dt * acceleration)
+        speed += correction + dt * acceleration
+        _book(ledger, actuators, q, dt * correction)
     else:
         speed += dt * acceleration
         position += dt * speed
@@ -181,7 +181,7 @@ def _move(
 
 
 @part
-def _book(ledger: Any, actuators: Actuators, q: int, way: float) -> None:
+def _book(ledger: Any, actuators: Actuators, q: int, displacement: float) -> None:
     """Add the work of rail q over a displacement (m) that has not been booked."""
     if ledger is None:
         return
@@ -190,6 +190,6 @@ def _book(ledger: Any, actuators: Actuators, q: int, way: float) -> None:
         push += actuators.push[unit, q, 0]
         damped += actuators.push[unit, q, 1]
         rubbed += actuators.push[unit, q, 2]
-    ledger.work[0, BELTS + ledger.belt_power.shape[1] + q] -= push * way
-    ledger.work[0, DAMPING] -= damped * way
-    ledger.work[0, CONTACT_FRICTION] -= rubbed * way
+    ledger.work[0, BELTS + ledger.belt_power.shape[1] + q] -= push * displacement
+    ledger.work[0, DAMPING] -= damped * displacement
+    ledger.work[0, CONTACT_FRICTION] -= rubbed * displacement

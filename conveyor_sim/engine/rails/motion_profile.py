@@ -42,12 +42,12 @@ def plan_profile(
     braked = position + 0.5 * speed * abs(speed) / acceleration
     sign = 1.0 if target >= braked else -1.0
     # Accelerate to v and brake from it: (v^2 - speed^2) / 2a + v^2 / 2a is the distance, all along `sign`.
-    way = sign * (target - position)
-    top = min(max_speed, math.sqrt(max(0.0, acceleration * way + 0.5 * speed * speed)))
+    distance = sign * (target - position)
+    top = min(max_speed, math.sqrt(max(0.0, acceleration * distance + 0.5 * speed * speed)))
     speeding = max(0.0, (top - sign * speed) / acceleration)
     braking = top / acceleration
-    left = way - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
-    going = max(0.0, left / top) if top > 0.0 else 0.0
+    rest = distance - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
+    going = max(0.0, rest / top) if top > 0.0 else 0.0
     begin_brake = target - sign * 0.5 * top * braking
     course[q, 0, 0], course[q, 0, 1], course[q, 0, 2] = begin, position, speed
     course[q, 1, 0], course[q, 1, 1], course[q, 1, 2] = begin + speeding, begin_brake - sign * top * going, sign * top

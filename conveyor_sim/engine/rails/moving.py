@@ -94,7 +94,7 @@ def near_sweep(moving: Any, bottles: Bottles, i: int, margin: float) -> bool:
 
 
 @part
-def moving_contacts(i: int, bottles: Bottles, moving: Any, found: RailContacts, count: int) -> int:
+def moving_contacts(i: int, bottles: Bottles, moving: Any, contacts: RailContacts, count: int) -> int:
     """Append the contacts of bottle i with moving rails to the first `count`; return their new number."""
     if moving is None:
         return count
@@ -102,7 +102,7 @@ def moving_contacts(i: int, bottles: Bottles, moving: Any, found: RailContacts, 
         overlap, nx, ny = segment_contact(moving, q, bottles.x[i], bottles.y[i], bottles.radius[i])
         if overlap > 0.0:
             material, rail, surface = moving.material[q], moving.rail[q], moving.surface[q]
-            count = keep_deepest(found, count, overlap, nx, ny, material, rail, surface, MOVING + q)
+            count = keep_deepest(contacts, count, overlap, nx, ny, material, rail, surface, MOVING + q)
     return count
 
 
@@ -115,16 +115,16 @@ def moves(moving: Any, entry: int) -> bool:
 
 
 @part
-def surface_velocity(moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
+def surface_velocity(moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
     """Return the velocity (m/s) of the rail at contact c of bottle i; 0 for a rail at rest."""
     if moving is None:
         return 0.0, 0.0
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return 0.0, 0.0
-    arm = bottles.radius[i] - found.overlap[c]
-    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    arm = bottles.radius[i] - contacts.overlap[c]
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
     return moving.vx[q] - moving.turn[q] * dy, moving.vy[q] + moving.turn[q] * dx
 
 
@@ -138,29 +138,29 @@ def clear_rail_push(moving: Any, first: int, end: int) -> None:
 
 @part
 def add_rail_push(
-    moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int, normal: float, tangential: float
+    moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int, normal: float, tangential: float
 ) -> None:
     """Add the force of contact c of bottle i on its rail, if it is a moving one; N and T on the bottle, N."""
     if moving is None:
         return
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return
-    add_push(moving, found, c, q, bottles, i, normal, tangential)
+    add_push(moving, contacts, c, q, bottles, i, normal, tangential)
 
 
 @part
-def surface_path(moving: Any, found: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
+def surface_path(moving: Any, contacts: RailContacts, c: int, bottles: Bottles, i: int) -> tuple[float, float]:
     """Return the rail's displacement (m) at contact c of bottle i since springs were updated; 0 for a rail at rest."""
     if moving is None:
         return 0.0, 0.0
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return 0.0, 0.0
-    arm, path = bottles.radius[i] - found.overlap[c], moving.springs.path[q]
+    arm, path = bottles.radius[i] - contacts.overlap[c], moving.springs.path[q]
     turned = moving.turning[q] * path
-    dx = bottles.x[i] + arm * found.nx[c] - moving.x[q]
-    dy = bottles.y[i] + arm * found.ny[c] - moving.y[q]
+    dx = bottles.x[i] + arm * contacts.nx[c] - moving.x[q]
+    dy = bottles.y[i] + arm * contacts.ny[c] - moving.y[q]
     return moving.along_x[q] * path - turned * dy, moving.along_y[q] * path + turned * dx
 
 
@@ -203,7 +203,7 @@ def clear_rail_power(ledger: Any, moving: Any, first: int, end: int) -> None:
 @part
 def add_rail_power(
     world: World,
-    found: RailContacts,
+    contacts: RailContacts,
     c: int,
     i: int,
     normal: float,
@@ -220,14 +220,14 @@ def add_rail_power(
     moving, ledger = world.moving, world.ledger
     if moving is None:
         return
-    q = found.entry[c] - MOVING
+    q = contacts.entry[c] - MOVING
     if q < 0:
         return
-    ux, uy = surface_velocity(moving, found, c, world.bottles, i)
-    ahead = ux * found.nx[c] + uy * found.ny[c]
-    aside = uy * found.nx[c] - ux * found.ny[c]
+    ux, uy = surface_velocity(moving, contacts, c, world.bottles, i)
+    ahead = ux * contacts.nx[c] + uy * contacts.ny[c]
+    aside = uy * contacts.nx[c] - ux * contacts.ny[c]
     unit, rails = i // UNIT, moving.x.size
     ledger.rail_power[unit, q] += tangential * aside - normal * ahead
     ledger.rail_power[unit, rails] += drag * aside - damped * ahead
     ledger.rail_power[unit, rails + 1] += across * aside
-    add_push_parts(moving, found, c, q, world.bottles, i, damped, drag, across)
+    add_push_parts(moving, contacts, c, q, world.bottles, i, damped, drag, across)

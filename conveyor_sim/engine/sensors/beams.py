@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.compile import kernel, part
 
@@ -26,13 +26,13 @@ FREE, BLOCKED, CHANGES = 0, 1, 2
 
 
 @kernel
-def block_beams(ways: Ways, length: float, beams: LightBeams) -> int:
+def block_beams(motion: BottleMotion, length: float, beams: LightBeams) -> int:
     """Compute when in a tick of `length` s bottles block each beam: write its spans, their number and its state.
 
     Return which array is too small: 0 none, 1 near, 2 spans.
     """
     count, state, spans, near = beams.used, beams.state, beams.spans, beams.near
-    pairs = _near(ways, length / 3.0, beams.line, near)
+    pairs = _near(motion, length / 3.0, beams.line, near)
     if pairs < 0:
         return 1
     for beam in range(count.size):
@@ -41,14 +41,14 @@ def block_beams(ways: Ways, length: float, beams: LightBeams) -> int:
     for pair in range(pairs):
         beam, i = near[0, pair], near[1, pair]
         # Points within reach of a segment form a convex set: a path whose hull is inside stays inside.
-        if state[beam] != BLOCKED and _throughout(ways, length / 3.0, beams.line, beam, i):
+        if state[beam] != BLOCKED and _throughout(motion, length / 3.0, beams.line, beam, i):
             state[beam] = BLOCKED
             count[beam] = 1
             spans[beam, 0, 0], spans[beam, 0, 1] = 0.0, length
     for pair in range(pairs):
         beam, i = near[0, pair], near[1, pair]
         if state[beam] != BLOCKED:
-            if not _follow(ways, length, beams, beam, i):
+            if not _follow(motion, length, beams, beam, i):
                 return 2
     for beam in range(count.size):
         if state[beam] != BLOCKED and count[beam] > 0:
@@ -60,18 +60,18 @@ def block_beams(ways: Ways, length: float, beams: LightBeams) -> int:
 
 
 @part
-def _near(ways: Ways, third: float, line: F8, near: I8) -> int:
+def _near(motion: BottleMotion, third: float, line: F8, near: I8) -> int:
     """Write pairs of a beam and a slot whose path may come within reach. Return their number, -1 if they don't fit."""
-    start, x, y, radius = ways.start, ways.x, ways.y, ways.radius
+    start, x, y, radius = motion.start, motion.x, motion.y, motion.radius
     pairs = 0
     for i in range(x.size):
-        if ways.id[i] < 0:
+        if motion.id[i] < 0:
             continue
         # A cubic lies within the hull of its four control points (Bézier).
-        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * ways.vx[i]
+        ahead, behind = start[0, i] + third * start[2, i], x[i] - third * motion.vx[i]
         low_x = min(min(start[0, i], ahead), min(behind, x[i])) - radius[i]
         high_x = max(max(start[0, i], ahead), max(behind, x[i])) + radius[i]
-        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * ways.vy[i]
+        ahead, behind = start[1, i] + third * start[3, i], y[i] - third * motion.vy[i]
         low_y = min(min(start[1, i], ahead), min(behind, y[i])) - radius[i]
         high_y = max(max(start[1, i], ahead), max(behind, y[i])) + radius[i]
         for beam in range(line.shape[0]):
@@ -85,13 +85,13 @@ def _near(ways: Ways, third: float, line: F8, near: I8) -> int:
 
 
 @part
-def _throughout(ways: Ways, third: float, line: F8, beam: int, i: int) -> bool:
+def _throughout(motion: BottleMotion, third: float, line: F8, beam: int, i: int) -> bool:
     """Return True if the complete path of slot i is within reach of a beam."""
-    start, x, y, radius = ways.start, ways.x[i], ways.y[i], ways.radius[i]
+    start, x, y, radius = motion.start, motion.x[i], motion.y[i], motion.radius[i]
     return (
         _beside(line, beam, start[0, i], start[1, i]) <= radius
         and _beside(line, beam, start[0, i] + third * start[2, i], start[1, i] + third * start[3, i]) <= radius
-        and _beside(line, beam, x - third * ways.vx[i], y - third * ways.vy[i]) <= radius
+        and _beside(line, beam, x - third * motion.vx[i], y - third * motion.vy[i]) <= radius
         and _beside(line, beam, x, y) <= radius
     )
 
@@ -112,12 +112,12 @@ def _seen_from(line: F8, beam: int, x: float, y: float) -> tuple[float, float]:
 
 
 @part
-def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> bool:
+def _follow(motion: BottleMotion, length: float, beams: LightBeams, beam: int, i: int) -> bool:
     """Add the blocked intervals of one path to the spans of a beam, by start; return False if there is no room."""
     third, share = length / 3.0, length / CHORDS
-    start, x, y, line, spans, count = ways.start, ways.x[i], ways.y[i], beams.line, beams.spans, beams.used
-    x1, x2 = start[0, i] + third * start[2, i], x - third * ways.vx[i]
-    y1, y2 = start[1, i] + third * start[3, i], y - third * ways.vy[i]
+    start, x, y, line, spans, count = motion.start, motion.x[i], motion.y[i], beams.line, beams.spans, beams.used
+    x1, x2 = start[0, i] + third * start[2, i], x - third * motion.vx[i]
+    y1, y2 = start[1, i] + third * start[3, i], y - third * motion.vy[i]
     a, b = _seen_from(line, beam, start[0, i], start[1, i])
     for chord in range(CHORDS):
         # Ends are exact, so that ticks join without a gap.
@@ -125,7 +125,7 @@ def _follow(ways: Ways, length: float, beams: LightBeams, beam: int, i: int) -> 
         end_x = x if last else cubic(start[0, i], x1, x2, x, (chord + 1) / CHORDS)
         end_y = y if last else cubic(start[1, i], y1, y2, y, (chord + 1) / CHORDS)
         next_a, next_b = _seen_from(line, beam, end_x, end_y)
-        enter, leave = within_reach(a, b, next_a, next_b, line[beam, 8], ways.radius[i])
+        enter, leave = within_reach(a, b, next_a, next_b, line[beam, 8], motion.radius[i])
         if enter <= leave:
             if count[beam] == spans.shape[1]:
                 return False
@@ -194,11 +194,11 @@ def _widen(enter: float, leave: float, first: float, last: float) -> tuple[float
 
 
 @part
-def _slab(place: float, way: float, low: float, high: float) -> tuple[float, float]:
+def _slab(place: float, step: float, low: float, high: float) -> tuple[float, float]:
     """Return the shares of a motion between which a coordinate is in [low, high]."""
-    if way == 0.0:
+    if step == 0.0:
         return (-np.inf, np.inf) if low <= place <= high else (np.inf, -np.inf)
-    one, other = (low - place) / way, (high - place) / way
+    one, other = (low - place) / step, (high - place) / step
     return min(one, other), max(one, other)
 
 

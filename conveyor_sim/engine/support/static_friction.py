@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import uint64
 
-from conveyor_sim.engine.arrays.bodies import Bottles, Load
+from conveyor_sim.engine.arrays.bodies import Bottles, ForceSums
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.support.base import relative_velocity
@@ -20,7 +20,7 @@ from conveyor_sim.engine.support.base import relative_velocity
 
 @part
 def add_static_friction(
-    bottles: Bottles, load: Load, footing: Any, static: Any, lag: float, drags: bool, first: int, end: int
+    bottles: Bottles, load: ForceSums, footing: Any, static: Any, lag: float, drags: bool, first: int, end: int
 ) -> None:
     """Add the pull of the springs to `load` of bottles first to end; `footing` must be up to date.
 

@@ -14,7 +14,7 @@ from conveyor_sim.engine.arrays.contacts import ContactLaw, Curves
 from conveyor_sim.engine.arrays.lists import StaticGrid
 from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.types import F8
-from conveyor_sim.engine.arrays.world import Settings
+from conveyor_sim.engine.arrays.world import EngineSettings
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
 from conveyor_sim.engine.integrators import AHEAD, LAG
 from conveyor_sim.errors import SceneError
@@ -79,7 +79,7 @@ class Model:
     moving_shapes: tuple[MovingShape, ...]
     rail_materials: tuple[str, ...]
     """By number in `rail_law`."""
-    settings: Settings
+    settings: EngineSettings
     pair_law: ContactLaw | None
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
     rail_law: ContactLaw | None
@@ -155,7 +155,7 @@ def build_model(scene: Scene) -> Model:
         rail_shapes=tuple(all_rails),
         moving_shapes=tuple(moving),
         rail_materials=tuple(rail_materials),
-        settings=Settings(
+        settings=EngineSettings(
             slip_limit=scene.slip_limit,
             lever=1.0 if scene.lever_arm == "overlap" else 0.0,
             skin=skin,
