@@ -173,7 +173,7 @@ def test_damage_in_every_file_is_compiled_away(filled: Path) -> None:
         path.write_bytes(content)
     damaged = force(filled)
     assert damaged.stdout == "-3.0\n"
-    assert damaged.stderr.count(" cached kernel not used, for it is damaged; compiling it again\n") == len(files)
+    assert damaged.stderr.count(" cached kernel not used because it is damaged; compiling it again\n") == len(files)
     again = force(filled)
     assert again.stdout == "-3.0\n"
     assert "not used" not in again.stderr

@@ -91,7 +91,7 @@ class Line:
         return np.concatenate([vx, vy, omega, world.load.fx[:n] * inverse, world.load.fy[:n] * inverse, turn])
 
     def end(self, time: float, method: str, gaps: list[Gap], rtol: float, longest: float) -> F8:
-        """Return the state after `time` (s). Integration restarts where a gap (m) changes sign: the force jumps there."""
+        """Return the state after `time` (s). The force jumps where a gap (m) changes sign: integration restarts."""
         now, y = 0.0, self.start
         events = [_event(gap) for gap in gaps]
         while now < time:

@@ -101,7 +101,7 @@ def test_a_damaged_file_is_compiled_again(
     file.write_bytes(damage(file.read_bytes()))
     assert counts(compiled(file.parent)) == (0, 1)
     (line,) = caplog.messages
-    assert line.startswith(f"{file}: cached kernel not used, for it ")
+    assert line.startswith(f"{file}: cached kernel not used because it ")
     assert counts(compiled(file.parent)) == (1, 0)
     assert len(caplog.messages) == 1
 
@@ -120,7 +120,7 @@ def test_a_file_that_another_could_have_put_is_compiled_again(
             "folder": lambda: file.mkdir(),
         }[kind]()
     assert counts(compiled(file.parent)) == (0, 1)
-    assert caplog.messages[0].startswith(f"{file}: cached kernel not used, for ")
+    assert caplog.messages[0].startswith(f"{file}: cached kernel not used because ")
     assert counts(compiled(file.parent)) == ((0, 1) if kind == "folder" else (1, 0))
 
 

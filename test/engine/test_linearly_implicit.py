@@ -40,7 +40,7 @@ def test_a_spring_in_contact_keeps_its_energy() -> None:
 
 
 def packing(ratio: float, stiffness: float = 1e5) -> Simulation:
-    """Return 48 hexagonally packed bottles, pressed onto a wall by a belt; steps of `ratio` times the explicit limit."""
+    """Return 48 hexagonally packed bottles, pressed onto a wall by a belt; steps: `ratio` times the explicit limit."""
     rows, columns, pitch = 6, 8, 0.131
     height, length = (rows - 1) * pitch * math.sqrt(3.0) / 2.0, columns * pitch + 0.2
     side = RADIUS + 0.0005
