@@ -10,7 +10,7 @@ from scenes import NO_FLOOR, RADIUS, bottle, contact, scene
 
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.contact.path import forget_path
+from conveyor_sim.engine.contact.path import reset_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators import INTEGRATORS, START
 from conveyor_sim.engine.lists.riding import step_all
@@ -49,7 +49,7 @@ def evaluate(world: World, dt: float = 1e-5) -> None:
 
 @kernel
 def _evaluate(world: World, worker: Worker, dt: float) -> None:
-    forget_path(world.path, world.moving, worker)
+    reset_path(world.path, world.moving, worker)
     step_all(world.riding, world.bottles, worker)
     pack_all(world, worker)
     pair_phase(world, worker, dt, 0.0)

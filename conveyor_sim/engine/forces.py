@@ -16,7 +16,7 @@ from conveyor_sim.engine.observers.ledger_parts import (
     clear_belt_powers,
     find_base_parts,
     find_pair_parts,
-    keep_load,
+    store_load,
     sum_pair_parts,
 )
 from conveyor_sim.engine.rails.rails import add_rail_forces, count_rail_contacts
@@ -64,7 +64,7 @@ def bottle_forces(world: World, worker: Worker, dt: float, spring_dt: float, fir
     check_footing(world.bottles, world.belts, world.surface, world.footing, world.ring, first, end)
     for run in range(stepped_runs(world.riding, first)):
         begin, stop = stepped_run(world.riding, first, end, run)
-        keep_load(world.load, world.spin, world.ledger, begin, stop)
+        store_load(world.load, world.spin, world.ledger, begin, stop)
         add_base_friction(world, world.spin, world.load, world.implicit, dt, begin, stop)
     add_straddling_friction(world, world.spin, world.load, _belt_power(world.ledger), lag, first, end)
     add_static_friction(world.bottles, world.load, world.footing, world.static_friction, lag, True, first, end)

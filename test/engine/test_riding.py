@@ -13,7 +13,7 @@ from scenes import COMMON, RADIUS, base, belt, bottle, contact, kind, scene, seg
 
 from conveyor_sim.engine.arrays.riding import Riding
 from conveyor_sim.engine.compiler.compile import kernel
-from conveyor_sim.engine.lists.riding import LEAST, STEPPED, _plan, left_out
+from conveyor_sim.engine.lists.riding import LEAST, STEPPED, _plan, skipped_slots
 from conveyor_sim.engine.threads.workers import UNIT
 from conveyor_sim.errors import SimulationError
 from conveyor_sim.scene import Scene, parse_scene
@@ -75,7 +75,7 @@ def stepped(given: Scene, **more: Any) -> Simulation:
 def riders(sim: Simulation) -> set[int]:
     """Return the ids of the bottles that the last step of the last tick skipped; on one thread."""
     world = sim._state.world
-    return set(world.bottles.id[left_out(world.riding, world.bottles.id.size)].tolist()) - {-1}
+    return set(world.bottles.id[skipped_slots(world.riding, world.bottles.id.size)].tolist()) - {-1}
 
 
 def everything(sim: Simulation) -> list[bytes]:
@@ -339,12 +339,12 @@ def test_runs_are_all_who_do_not_ride_and_leave_out_only_many_at_once() -> None:
                 steps[begin:stop] = True
             assert not steps[:first].any()
             assert not steps[end:].any()
-            left_out = ~steps[first:end]
-            assert riding.rides[first:end][left_out].all()
-            lengths = runs_of(left_out)
+            skipped_slots = ~steps[first:end]
+            assert riding.rides[first:end][skipped_slots].all()
+            lengths = runs_of(skipped_slots)
             assert all(length >= LEAST for length in lengths)
             # A rider that is stepped has too few adjacent ones.
-            assert all(length < LEAST for length in runs_of((riding.rides[first:end] != 0) & ~left_out))
+            assert all(length < LEAST for length in runs_of((riding.rides[first:end] != 0) & ~skipped_slots))
 
 
 def empty(slots: int) -> Riding:

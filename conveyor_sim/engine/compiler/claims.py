@@ -43,7 +43,7 @@ class Claims:
             waited = True
         return waited
 
-    def give_back(self, name: str) -> None:
+    def release(self, name: str) -> None:
         """Release a claim. Raises nothing."""
         if self._file is not None:
             with suppress(OSError):

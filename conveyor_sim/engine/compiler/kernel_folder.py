@@ -94,7 +94,7 @@ class KernelFolder:
     def release(self, name: str) -> None:
         """Give back the claim, after compiling or a failure."""
         if self._claims is not None:
-            self._claims.give_back(name)
+            self._claims.release(name)
 
     def _call_before_read(self) -> None:
         if self.before_read is not None:

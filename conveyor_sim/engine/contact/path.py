@@ -46,7 +46,7 @@ def note_stage(world: World, times: F8, squared: F8, s: int, h: float, first: in
 
 
 @part
-def forget_path(path: Any, moving: Any, worker: Worker) -> None:
+def reset_path(path: Any, moving: Any, worker: Worker) -> None:
     """Reset all displacements, which springs now contain. All workers see it after the next `wait_for_all`."""
     if path is None:
         return
@@ -54,11 +54,11 @@ def forget_path(path: Any, moving: Any, worker: Worker) -> None:
     for i in range(begin, stop):
         path.x[i] = path.y[i] = path.turn[i] = 0.0
     if worker.rank == 0:
-        _forget_rails(moving)
+        _reset_rails(moving)
 
 
 @part
-def _forget_rails(moving: Any) -> None:
+def _reset_rails(moving: Any) -> None:
     if moving is None:
         return
     _clear(moving.springs)

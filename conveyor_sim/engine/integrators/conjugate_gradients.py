@@ -58,7 +58,7 @@ def begin_search(bottles: Bottles, spin: Any, load: ForceSums, linear: Linear, d
         moment = dt * spin.moment[i] if spin is not None else 0.0
         left.turn[i] = moment - (own.xt[i] * x + own.yt[i] * y + own.tt[i] * turn)
         linear.way.x[i] = linear.way.y[i] = linear.way.turn[i] = 0.0
-    _look_back(bottles, spin, linear, first, end)
+    _precondition(bottles, spin, linear, first, end)
 
 
 @part
@@ -76,12 +76,12 @@ def search(world: World, worker: Worker, small: float) -> bool:
         resist_pairs(world.pairs, linear.product, linear.way, beta, worker)
         wait_for_all(worker)
         for first in range(begin, stop, UNIT):
-            _go_on(world.pairs, world.slots, linear, beta, first, min(first + UNIT, stop))
+            _new_direction(world.pairs, world.slots, linear, beta, first, min(first + UNIT, stop))
         wait_for_all(worker)
         alpha = before / _total(linear.way_sum)
         for first in range(begin, stop, UNIT):
             _step(linear, alpha, first, min(first + UNIT, stop))
-            _look_back(bottles, world.spin, linear, first, min(first + UNIT, stop))
+            _precondition(bottles, world.spin, linear, first, min(first + UNIT, stop))
         wait_for_all(worker)
         after = _total(linear.left_sum)
         beta, before = after / before, after
@@ -113,7 +113,7 @@ def _largest(column: Any) -> float:
 
 
 @part
-def _look_back(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int) -> None:
+def _precondition(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int) -> None:
     """Compute by units: inverse blocks times residual, its product with the residual, and the largest kick."""
     left, product, inverse = linear.left, linear.product, linear.inverse
     for start in range(first, end, UNIT):
@@ -138,7 +138,7 @@ def _look_back(bottles: Bottles, spin: Any, linear: Linear, first: int, end: int
 
 
 @part
-def _go_on(pairs: Any, slots: Any, linear: Linear, beta: float, first: int, end: int) -> None:
+def _new_direction(pairs: Any, slots: Any, linear: Linear, beta: float, first: int, end: int) -> None:
     """Compute for a unit of bottles the new direction, the matrix times it, and their scalar product."""
     way, product, own = linear.way, linear.product, linear.own
     for i in range(uint64(first), uint64(end)):

@@ -37,12 +37,12 @@ from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, probe
 from conveyor_sim.engine.integrators.phase import RESUME
 from conveyor_sim.engine.integrators.runge_kutta import (
     add_impulses,
-    come_to_rest,
     go_to,
-    keep_slopes,
-    keep_state,
     note_peaks,
+    settle_all,
     squared_weights,
+    store_slopes,
+    store_state,
     turn,
 )
 from conveyor_sim.engine.observers.damage import note_damage
@@ -114,10 +114,10 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             bottle_forces(world, worker, h, 0.0, first, end)
-            keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
+            store_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
             if stage == 0:
-                keep_state(bottles, world.spin, slopes, first, end)
+                store_state(bottles, world.spin, slopes, first, end)
                 note_peaks(world.load, world.peaks, first, end)
             if stage == LAST:
                 _note_errors(bottles.radius, world.spin, slopes, h, first, end)
@@ -150,7 +150,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             go_to(world, TIMES, WEIGHTS, SQUARED, stage, h, first, end)
             if stage == LAST:
-                come_to_rest(bottles, world.spin, first, end)
+                settle_all(bottles, world.spin, first, end)
             pack(bottles, first, end)
             note_moved(world, worker, first, end)
         if not lists_hold(world, worker):
@@ -223,8 +223,8 @@ def _accept(world: World, slopes: Any, h: float, first: int, end: int) -> None:
     book_stages(world.ledger, WEIGHTS, h, first, end)
     note_powers(world.bottles, world.spin, world.load, world.ledger, 0.0, 0, first, end)
     note_peaks(world.load, world.peaks, first, end)
-    keep_state(world.bottles, world.spin, slopes, first, end)
-    keep_slopes(world.bottles, world.load, world.spin, slopes.normal, slopes, 0, first, end)
+    store_state(world.bottles, world.spin, slopes, first, end)
+    store_slopes(world.bottles, world.load, world.spin, slopes.normal, slopes, 0, first, end)
 
 
 @part

@@ -61,13 +61,13 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
         for first in range(begin, stop, BLOCK):
             end = min(first + BLOCK, stop)
             _begin(bottles, linear, first, end)
-            _look_ahead(world, dt, 0.0, first, end)
+            _predict(world, dt, 0.0, first, end)
         squared = dt * dt * _stiffest(world, worker)
         theta = _theta_of(squared)
         small = enough = 0.0
         for again in range(PASSES if theta > 0.5 else 1):
             for first in range(begin, stop, BLOCK):
-                _look_ahead(world, theta * dt, theta, first, min(first + BLOCK, stop))
+                _predict(world, theta * dt, theta, first, min(first + BLOCK, stop))
             wait_for_all(worker)
             linear_pairs(world, worker, (dt, theta), again)
             wait_for_all(worker)
@@ -108,7 +108,7 @@ def _begin(bottles: Bottles, linear: Linear, first: int, end: int) -> None:
 
 
 @part
-def _look_ahead(world: World, time: float, theta: float, first: int, end: int) -> None:
+def _predict(world: World, time: float, theta: float, first: int, end: int) -> None:
     """Move bottles to their predicted positions after some time (s), but no farther than the lists hold."""
     bottles: Bottles = world.bottles
     linear: Any = world.linear
@@ -247,7 +247,7 @@ def _book_solution(world: World, linear: Linear, ledger: Any, worker: Worker, dt
             way.x[i], way.y[i], product.x[i], product.y[i] = bottles.x[i], bottles.y[i], bottles.vx[i], bottles.vy[i]
             bottles.vx[i] -= change.x[i]
             bottles.vy[i] -= change.y[i]
-        _look_ahead(world, theta * dt, theta, first, end)
+        _predict(world, theta * dt, theta, first, end)
         _set_velocities(bottles, world.spin, linear, 1.0 - theta, True, first, end)
     pack_all(world, worker)
     pair_phase(world, worker, dt, 0.0)

@@ -22,18 +22,18 @@ import numpy as np
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.contact.pairs import pack
-from conveyor_sim.engine.contact.path import forget_path, note_stage
+from conveyor_sim.engine.contact.path import note_stage, reset_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import lists_hold, note_moved, probe_rebuilt
 from conveyor_sim.engine.integrators.phase import RESUME, START
 from conveyor_sim.engine.integrators.runge_kutta import (
     add_impulses,
-    come_to_rest,
     go_to,
-    keep_slopes,
-    keep_state,
     note_peaks,
+    settle_all,
     squared_weights,
+    store_slopes,
+    store_state,
     turn,
 )
 from conveyor_sim.engine.observers.damage import note_damage
@@ -63,7 +63,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     stage = int(slopes.progress[0]) if phase == RESUME else 0
     taken = 0
     if phase == START:
-        forget_path(world.path, world.moving, worker)
+        reset_path(world.path, world.moving, worker)
     pack_all(world, worker)
     while True:
         if stage == 0 and taken < steps:
@@ -78,13 +78,13 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
                 note_peaks(world.load, world.peaks, first, end)
                 if taken == steps:
                     continue
-                keep_state(bottles, world.spin, slopes, first, end)
+                store_state(bottles, world.spin, slopes, first, end)
             note_powers(bottles, world.spin, world.load, world.ledger, 0.0, stage, first, end)
-            keep_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
+            store_slopes(bottles, world.load, world.spin, slopes.normal, slopes, stage, first, end)
             go_to(world, TIMES, WEIGHTS, SQUARED, stage + 1, dt, first, end)
             note_stage(world, TIMES, SQUARED, stage + 1, dt, first, end)
             if stage + 1 == STAGES:
-                come_to_rest(bottles, world.spin, first, end)
+                settle_all(bottles, world.spin, first, end)
                 turn(world.spin, slopes, SQUARED, dt, first, end)
                 add_impulses(world.peaks, slopes, WEIGHTS, dt, first, end)
                 book_stages(world.ledger, WEIGHTS, dt, first, end)

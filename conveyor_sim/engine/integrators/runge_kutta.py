@@ -24,7 +24,7 @@ def squared_weights(weights: F8) -> F8:
 
 
 @part
-def keep_state(bottles: Bottles, spin: Any, slopes: Any, first: int, end: int) -> None:
+def store_state(bottles: Bottles, spin: Any, slopes: Any, first: int, end: int) -> None:
     """Store the state at the start of a step."""
     for i in range(uint64(first), uint64(end)):
         slopes.x[i] = bottles.x[i]
@@ -37,7 +37,7 @@ def keep_state(bottles: Bottles, spin: Any, slopes: Any, first: int, end: int) -
 
 
 @part
-def keep_slopes(
+def store_slopes(
     bottles: Bottles, load: ForceSums, spin: Any, normals: Any, slopes: Any, stage: int, first: int, end: int
 ) -> None:
     """Store the accelerations of the last evaluation, the `stage`-th of a step. normals: `slopes.normal`."""
@@ -96,7 +96,7 @@ def _add_slope(
 
 
 @part
-def come_to_rest(bottles: Bottles, spin: Any, first: int, end: int) -> None:
+def settle_all(bottles: Bottles, spin: Any, first: int, end: int) -> None:
     """Set very small speeds to 0 (`settle`)."""
     for i in range(uint64(first), uint64(end)):
         bottles.vx[i] = settle(bottles.vx[i])

@@ -22,7 +22,14 @@ from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, lists_hold, note_moved, probe_rebuilt, settle
-from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
+from conveyor_sim.engine.lists.riding import (
+    begin_examination,
+    end_examination,
+    ride,
+    step_all,
+    stepped_run,
+    stepped_runs,
+)
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -45,14 +52,14 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             end = min(first + BLOCK, stop)
             bottle_forces(world, worker, dt, dt, first, end)
             book_kick(bottles, world.spin, world.load, world.ledger, dt, first, end)
-            begin_look(bottles, world.spin, world.riding, first, end)
+            begin_examination(bottles, world.spin, world.riding, first, end)
             for run in range(stepped_runs(world.riding, first)):
                 left, right = stepped_run(world.riding, first, end, run)
                 _move(bottles, world.load, dt, left, right)
                 _turn(world.spin, dt, left, right)
                 accumulate_peaks(world.load, world.peaks, dt, left, right)
             ride(bottles, world.spin, world.riding, dt, first, end)
-            end_look(world, None, first, end)
+            end_examination(world, None, first, end)
             carry_anchors(world.footing, world.static_friction, dt, first, end)
             note_moved(world, worker, first, end)
         hold = lists_hold(world, worker)

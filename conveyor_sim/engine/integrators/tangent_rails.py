@@ -66,8 +66,8 @@ def linear_rails(world: World, contacts: RailContacts, step: tuple[float, float]
                 else:
                     before = _overlap(world, contacts.entry[c], old_x, old_y, radius)
                     ahead = overlap
-                seen_to = earlier and _touched(world, contacts.surface[c], i, x, y, radius)
-                if contacts.share[c] > 0.0 and not seen_to:
+                handled = earlier and _touches(world, contacts.surface[c], i, x, y, radius)
+                if contacts.share[c] > 0.0 and not handled:
                     _add_contact(world, contacts, c, i, (before, ahead), step, earlier > 0)
 
 
@@ -96,7 +96,7 @@ def _arc_overlap(arcs: Any, near: Any, entry: int, x: float, y: float, radius: f
 
 
 @part
-def _touched(world: World, surface: int, i: int, x: float, y: float, radius: float) -> bool:
+def _touches(world: World, surface: int, i: int, x: float, y: float, radius: float) -> bool:
     """Return True if bottle i at (x, y) touches a rail surface."""
     segments, near_segments, arcs, near_arcs = world.segments, world.near_segments, world.arcs, world.near_arcs
     touched = False

@@ -22,11 +22,18 @@ from conveyor_sim.engine.arrays.integrators import Stage
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.contact.pairs import pack_row
-from conveyor_sim.engine.contact.path import forget_path, note_path
+from conveyor_sim.engine.contact.path import note_path, reset_path
 from conveyor_sim.engine.forces import bottle_forces, pack_all, pair_phase
 from conveyor_sim.engine.integrators.motion import accumulate_peaks, kick, lists_hold, note_moved, probe_rebuilt, settle
 from conveyor_sim.engine.integrators.phase import START
-from conveyor_sim.engine.lists.riding import begin_look, end_look, ride, step_all, stepped_run, stepped_runs
+from conveyor_sim.engine.lists.riding import (
+    begin_examination,
+    end_examination,
+    ride,
+    step_all,
+    stepped_run,
+    stepped_runs,
+)
 from conveyor_sim.engine.observers.damage import note_damage
 from conveyor_sim.engine.observers.ledger import book_kick
 from conveyor_sim.engine.rails.moving import pass_step, place_rails
@@ -47,7 +54,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
     # Commands and supply act between ticks, so the last forces are outdated. The first evaluation ends no step.
     fresh = phase == START
     if fresh:
-        forget_path(world.path, world.moving, worker)
+        reset_path(world.path, world.moving, worker)
     step_all(world.riding, world.bottles, worker)
     pack_all(world, worker)
     done = 0
@@ -61,7 +68,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             bottle_forces(world, worker, dt, drawn, first, end)
             if not fresh:
                 _end_step(world, stage, dt, first, end)
-                end_look(world, stage, first, end)
+                end_examination(world, stage, first, end)
             if done < steps and not damage:
                 _begin_step(world, stage, worker, dt, first, end)
         if done == steps:
@@ -88,7 +95,7 @@ def _begin_step(world: World, stage: Stage, worker: Worker, dt: float, first: in
     """Move bottles first to end, and set the velocities at which the forces at the end of the step are evaluated."""
     bottles, spin, load, half = world.bottles, world.spin, world.load, 0.5 * dt
     book_kick(bottles, spin, load, world.ledger, half, first, end)
-    begin_look(bottles, spin, world.riding, first, end)
+    begin_examination(bottles, spin, world.riding, first, end)
     for run in range(stepped_runs(world.riding, first)):
         left, right = stepped_run(world.riding, first, end, run)
         _move(bottles, load, stage, dt, left, right)

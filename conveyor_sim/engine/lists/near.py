@@ -20,7 +20,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
     """List the straight rail pieces within radius + margin of each bottle; return the number of entries needed."""
     if segments is None:
         return 0
-    _keep_springs(near, near.springs)
+    _copy_springs(near, near.springs)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -42,7 +42,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
                 count += 1
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
-        _put_springs_back(near, near.springs)
+        _restore_springs(near, near.springs)
     return count
 
 
@@ -51,7 +51,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
     """List the arcs within radius + margin of each bottle; return the number of entries needed."""
     if arcs is None:
         return 0
-    _keep_springs(near, near.springs)
+    _copy_springs(near, near.springs)
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
@@ -70,7 +70,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
                 count += 1
     near.start[bottles.x.size] = min(count, near.piece.size)
     if count <= near.piece.size:
-        _put_springs_back(near, near.springs)
+        _restore_springs(near, near.springs)
     return count
 
 
@@ -104,7 +104,7 @@ def _has_near(near: Any, i: int) -> bool:
 
 
 @part
-def _keep_springs(near: Near, springs: Any) -> None:
+def _copy_springs(near: Near, springs: Any) -> None:
     """Copy the springs by bottle and piece, unless that is done and the list was too short."""
     if springs is None:
         return
@@ -122,7 +122,7 @@ def _keep_springs(near: Near, springs: Any) -> None:
 
 
 @part
-def _put_springs_back(near: Near, springs: Any) -> None:
+def _restore_springs(near: Near, springs: Any) -> None:
     """Restore the springs of entries that are still listed; both lists are by bottle."""
     if springs is None:
         return

@@ -21,7 +21,7 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
     """
     if pairs is None:
         return 0
-    _keep_springs(pairs, pairs.spring)
+    _copy_springs(pairs, pairs.spring)
     sort_into_cells(bottles, hood, cell)
     buckets = hood.bucket.size - 1
     capacity = pairs.i.size
@@ -52,7 +52,7 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
     pairs.used[0] = min(count, capacity)
     _fill_radii(pairs, pairs.reach, bottles)
     if count <= capacity:
-        _put_springs_back(pairs, pairs.spring)
+        _restore_springs(pairs, pairs.spring)
     return count
 
 
@@ -97,7 +97,7 @@ def _fill_radii(pairs: Pairs, reach: Any, bottles: Bottles) -> None:
 
 
 @part
-def _keep_springs(pairs: Pairs, springs: Any) -> None:
+def _copy_springs(pairs: Pairs, springs: Any) -> None:
     """Copy the springs by pair, unless that is done and the list was too short."""
     if springs is None:
         return
@@ -114,7 +114,7 @@ def _keep_springs(pairs: Pairs, springs: Any) -> None:
 
 
 @part
-def _put_springs_back(pairs: Pairs, springs: Any) -> None:
+def _restore_springs(pairs: Pairs, springs: Any) -> None:
     """Restore the springs of pairs that are still listed; both lists are sorted by (i, j)."""
     if springs is None:
         return

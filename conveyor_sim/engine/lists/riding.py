@@ -27,7 +27,7 @@ from conveyor_sim.engine.threads.workers import BLOCK, UNIT, share, units, wait_
 LEAST = 8
 """Adjacent bottles that can ride, the number on which one instruction works."""
 
-STEPPED, LOOKED_AT, PLANNED = 0, 1, 2
+STEPPED, EXAMINED, PLANNED = 0, 1, 2
 """State of a block: all its bottles are stepped; its velocities are stored for comparison; riders are determined."""
 
 
@@ -72,7 +72,7 @@ def stepped_run(riding: Any, first: int, end: int, run: int) -> tuple[int, int]:
     return int(riding.first[first // LEAST + run]), int(riding.end[first // LEAST + run])
 
 
-def left_out(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
+def skipped_slots(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
     """Return which of all slots the next step would skip, free ones included; with blocks as on one thread."""
     rides = np.zeros(slots, np.bool_)
     if riding is None:
@@ -86,13 +86,13 @@ def left_out(riding: Riding | None, slots: int) -> NDArray[np.bool_]:
 
 
 @part
-def begin_look(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -> None:
+def begin_examination(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -> None:
     """Store the velocities of a block before its kick, if this step is to be examined."""
     if riding is None:
         return
     if riding.progress[first // UNIT] != STEPPED:
         return
-    riding.progress[first // UNIT] = LOOKED_AT
+    riding.progress[first // UNIT] = EXAMINED
     for i in range(uint64(first), uint64(end)):
         riding.vx[i] = bottles.vx[i]
         riding.vy[i] = bottles.vy[i]
@@ -102,7 +102,7 @@ def begin_look(bottles: Bottles, spin: Any, riding: Any, first: int, end: int) -
 
 
 @part
-def end_look(world: World, stage: Any, first: int, end: int) -> None:
+def end_examination(world: World, stage: Any, first: int, end: int) -> None:
     """Determine the riders of a block after its kick, if this step is to be examined.
 
     stage: velocities within the step that must be unchanged, too, or None.
@@ -110,7 +110,7 @@ def end_look(world: World, stage: Any, first: int, end: int) -> None:
     riding = world.riding
     if riding is None:
         return
-    if riding.progress[first // UNIT] != LOOKED_AT:
+    if riding.progress[first // UNIT] != EXAMINED:
         return
     riding.progress[first // UNIT] = PLANNED
     _find_steady(world, stage, riding, first, end)
@@ -181,13 +181,13 @@ def ride(bottles: Bottles, spin: Any, riding: Any, dt: float, first: int, end: i
     begin = first
     for run in range(stepped_runs(riding, first)):
         left, right = stepped_run(riding, first, end, run)
-        _go_on(bottles, spin, dt, begin, left)
+        _coast(bottles, spin, dt, begin, left)
         begin = right
-    _go_on(bottles, spin, dt, begin, end)
+    _coast(bottles, spin, dt, begin, end)
 
 
 @part
-def _go_on(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
+def _coast(bottles: Bottles, spin: Any, dt: float, first: int, end: int) -> None:
     for i in range(uint64(first), uint64(end)):
         bottles.x[i] = bottles.x[i] + dt * bottles.vx[i]
         bottles.y[i] = bottles.y[i] + dt * bottles.vy[i]

@@ -54,7 +54,7 @@ def _note(world: World, damage: Any, worker: Worker, dt: float) -> None:
                 _hit(i, damage.impacts, worker.history, count)
                 _tip(i, world.bottles, damage.tipping, worker.history, count, dt)
     wait_for_all(worker)
-    _keep_velocities(world.bottles, damage.impacts, begin, stop)
+    _store_velocities(world.bottles, damage.impacts, begin, stop)
 
 
 @part
@@ -262,7 +262,7 @@ def _raise(worst: Maximum, i: int, value: float) -> None:
 
 
 @part
-def _keep_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> None:
+def _store_velocities(bottles: Bottles, impacts: Any, begin: int, stop: int) -> None:
     if impacts is None:
         return
     for i in range(begin, stop):

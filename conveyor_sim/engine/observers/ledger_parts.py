@@ -137,7 +137,7 @@ def clear_belt_powers(ledger: Any, first: int, end: int) -> None:
 
 
 @part
-def keep_load(load: ForceSums, spin: Any, ledger: Any, first: int, end: int) -> None:
+def store_load(load: ForceSums, spin: Any, ledger: Any, first: int, end: int) -> None:
     """Store the contact forces on bottles first to end, before base friction is added."""
     if ledger is None:
         return

@@ -180,7 +180,7 @@ def set_moving_spring(moving: Any, i: int, entry: int, elongation: float) -> Non
 
 
 @part
-def forget_moving_springs(moving: Any, i: int) -> None:
+def reset_moving_springs(moving: Any, i: int) -> None:
     """Reset the springs of bottle i at all moving rails."""
     if moving is not None:
         for q in range(moving.x.size):

@@ -16,10 +16,10 @@ from conveyor_sim.engine.rails.moving import (
     add_rail_push,
     clear_rail_power,
     clear_rail_push,
-    forget_moving_springs,
     moves,
     moving_contacts,
     moving_spring,
+    reset_moving_springs,
     set_moving_spring,
     surface_path,
     surface_velocity,
@@ -226,9 +226,9 @@ def _store_springs(world: World, contacts: RailContacts, count: int, i: int) -> 
     """Store the springs of the closed contacts of bottle i; reset those of all its other rails."""
     if world.rail_law.tangential_stiffness is None:
         return
-    _forget_springs(world.near_segments, i)
-    _forget_springs(world.near_arcs, i)
-    forget_moving_springs(world.moving, i)
+    _reset_springs(world.near_segments, i)
+    _reset_springs(world.near_arcs, i)
+    reset_moving_springs(world.moving, i)
     for c in range(count):
         if moves(world.moving, contacts.entry[c]):
             set_moving_spring(world.moving, i, contacts.entry[c], contacts.solution[c])
@@ -239,7 +239,7 @@ def _store_springs(world: World, contacts: RailContacts, count: int, i: int) -> 
 
 
 @part
-def _forget_springs(near: Any, i: int) -> None:
+def _reset_springs(near: Any, i: int) -> None:
     if near is not None:
         for entry in range(near.start[i], near.start[i + 1]):
             near.springs.elongation[entry] = 0.0

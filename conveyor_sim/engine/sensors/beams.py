@@ -54,8 +54,8 @@ def block_beams(motion: BottleMotion, length: float, beams: LightBeams) -> int:
         if state[beam] != BLOCKED and count[beam] > 0:
             count[beam] = _join(spans[beam], count[beam])
             first, last = spans[beam, 0, 0], spans[beam, count[beam] - 1, 1]
-            whole = count[beam] == 1 and first <= ROUNDING and last >= length - ROUNDING
-            state[beam] = BLOCKED if whole else CHANGES
+            throughout = count[beam] == 1 and first <= ROUNDING and last >= length - ROUNDING
+            state[beam] = BLOCKED if throughout else CHANGES
     return 0
 
 

@@ -49,7 +49,7 @@ def _rail_contacts() -> RailContacts:
     def reals() -> F8:
         return np.zeros(MOST_CONTACTS)
 
-    def whole() -> U4:
+    def indices() -> U4:
         return np.zeros(MOST_CONTACTS, np.uint32)
 
     return RailContacts(
@@ -57,9 +57,9 @@ def _rail_contacts() -> RailContacts:
         ny=reals(),
         overlap=reals(),
         share=reals(),
-        material=whole(),
-        rail=whole(),
-        surface=whole(),
+        material=indices(),
+        rail=indices(),
+        surface=indices(),
         entry=np.zeros(MOST_CONTACTS, np.int64),
         solution=reals(),
     )
