@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -28,6 +27,7 @@ from conveyor_sim.studies.run_file import (
 from conveyor_sim.studies.setup import Setup
 from conveyor_sim.studies.study import Study
 from conveyor_sim.studies.units_file import UNITS, Units, read_units
+from conveyor_sim.support.file_lock import lock
 from conveyor_sim.support.files import MB, FileError, read_file, write_file
 from conveyor_sim.support.sealed_json import Kept, sealed
 
@@ -64,11 +64,9 @@ class Journal(AbstractContextManager["Journal"]):
             (folder / RUNS).mkdir(parents=True, exist_ok=True)
             self._lock = open(folder / ".lock", "ab")  # noqa: SIM115 (closed by __exit__)
             try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock(self._lock)
             except BlockingIOError:
                 raise StudyError(f"{folder}: another process works on this study, expected it to end first") from None
-            except OSError:
-                pass  # a file system without locks
             try:
                 self._read()
             except BaseException:

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError, ConveyorError, StudyError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.physics.model import Model
 from conveyor_sim.run.compilation import compile_kernels

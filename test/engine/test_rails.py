@@ -127,7 +127,7 @@ def test_wider_mouths_and_joined_ends_leave_an_arc_whole() -> None:
               "b": segment((0.0, 0.05), (-1.0, 0.05))}  # fmt: skip
     for rails, pieces in (({"a": wide}, 1), ({"a": narrow}, 2), ({"a": closed}, 1), (fillet, 3)):
         model = build_model(rail_scene(rails))
-        assert sum(len(shape.pieces) for shape in model.rail_shapes) == pieces
+        assert sum(len(shape.pieces) for shape in model.plant.rails) == pieces
 
 
 def test_collinear_pieces_push_as_one_segment() -> None:

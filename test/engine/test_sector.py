@@ -7,7 +7,7 @@ import pytest
 from worlds import callable_part
 
 from conveyor_sim.engine.support.sector import span_distance as span_distance_part
-from conveyor_sim.physics.model.plant import reach_code
+from conveyor_sim.physics.model.plant_arrays import reach_code
 
 span_distance = callable_part(span_distance_part)
 

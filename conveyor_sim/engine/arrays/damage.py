@@ -169,9 +169,3 @@ def lasting_columns(damage: DamageArrays) -> Iterator[F8]:
         yield worst.output
     if damage.scuffing is not None:
         yield damage.scuffing.work
-
-
-def bin_columns(damage: DamageArrays) -> Iterator[F8]:
-    """Yield every array by bin of rails, (units, B)."""
-    if damage.scuffing is not None and damage.scuffing.bins is not None:
-        yield from (damage.scuffing.bins.work, damage.scuffing.bins.impulse)

@@ -3,9 +3,7 @@
 Shapes: Q moving rails. SI units; columns are float64, (Q,), unless stated otherwise.
 """
 
-from typing import Any, NamedTuple
-
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.rails import Ends
 from conveyor_sim.engine.arrays.types import F8, I1, U4
@@ -97,11 +95,3 @@ class MovingRails(NamedTuple):
     """Steps since the tick began, (1,)."""
     actuators: Actuators | None
     springs: MovingSprings | None
-
-
-def present(moving: MovingRails) -> tuple[NDArray[Any], ...]:
-    """Return the arrays of the rails' positions, their time, and their motion profiles."""
-    where = (moving.x, moving.y, moving.tx, moving.ty, moving.ends.x, moving.ends.y)
-    now = (*where, moving.vx, moving.vy, moving.turn, moving.position, moving.speed, moving.course, moving.clock)
-    actuators = moving.actuators
-    return now if actuators is None else (*now, actuators.mode, actuators.left, actuators.acceleration)

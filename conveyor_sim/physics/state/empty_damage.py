@@ -79,7 +79,7 @@ def rail_places(model: Model) -> RailPlaces:
 
 def _pieces(model: Model) -> Iterator[tuple[int, Piece]]:
     """Rail and piece in the order of `plant.rail_arrays`."""
-    pieces = [(index, piece) for index, rail in enumerate(model.rail_shapes) for piece in rail.pieces]
+    pieces = [(index, piece) for index, rail in enumerate(model.plant.rails) for piece in rail.pieces]
     for wanted, there in ((False, model.segments), (True, model.arcs)):
         if there is not None:
             yield from (entry for entry in pieces if isinstance(entry[1], ArcPiece) is wanted)
