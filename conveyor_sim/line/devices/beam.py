@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.beams import LightBeams, Ways
+from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.sensors.beams import block_beams
 from conveyor_sim.line.device import Device, ScanContext
@@ -32,7 +32,7 @@ class Beams(Device):
         )
         self._room: F8 = np.empty((4, 0))
         self._began: F8 | None = None
-        self._ways: Ways | None = None
+        self._ways: BottleMotion | None = None
         self._states: list[int] = [0] * len(ends)
 
     def begin(self, now: ScanContext) -> None:
@@ -51,7 +51,7 @@ class Beams(Device):
             vx = vy = np.zeros(bottles.x.size)
             start = np.stack((bottles.x, bottles.y, vx, vy))
         self._began = None
-        ways = Ways(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
+        ways = BottleMotion(start, bottles.x, bottles.y, vx, vy, bottles.radius, bottles.id)
         # A group is laid out for kernels once, so the same arrays are given in the same one.
         if self._ways is None or any(a is not b for a, b in zip(self._ways, ways, strict=True)):
             self._ways = ways
