@@ -171,7 +171,7 @@ def serve(what: str | None, node: str | None, bind: str, stamps: Stamps, **given
 
 
 def tell_end(summary: str, bags: Sequence[Path]) -> None:
-    """Print the summary and the paths of recordings. Raise BagError if one is not intact, for example on a full disk."""
+    """Print the summary and the paths of recordings. Raise BagError if one is not intact, as on a full disk."""
     from conveyor_sim.bag.reader import open_bag
 
     whole: list[str] = []
@@ -198,7 +198,8 @@ def _require_lockstep(settings: ServerSettings) -> None:
     _require_not_given("--lockstep", ("real_time_factor",), "none: the PLC says when")
     if settings.modbus_role != "controller" and settings.users is None:
         raise ConveyorError(
-            "--lockstep: no client may advance the line, expected --modbus-role controller, or --users with a controller"
+            "--lockstep: no client may advance the line, expected --modbus-role controller, or --users with a "
+            "controller"
         )
 
 

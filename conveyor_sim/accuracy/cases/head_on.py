@@ -74,7 +74,7 @@ class HeadOn:
         return (*COARSE, *(first * 2**power for power in range(4)))
 
     def run(self, integrator: str, steps: int) -> Simulation:
-        """Run until all impacts are over, at `steps` + 1/2 steps per contact: at a whole number, end errors would cancel."""
+        """Run all impacts at `steps` + 1/2 steps per contact: at a whole number, end errors would cancel."""
         scene, meeting = self.collision.terms.scene, self.collision.meeting
         tick = round(self.duration * steps / (steps + 0.5), 9)
         fields = {}
