@@ -65,12 +65,18 @@ def read_file(path: Path, most: int, folder: Path | None = None) -> bytes:
     return content
 
 
-def write_file(path: Path, content: bytes, folder: Path | None = None, objection: Objection | None = None) -> None:
+def write_file(
+    path: Path,
+    content: bytes,
+    folder: Path | None = None,
+    objection: Objection | None = None,
+    mode: int = 0o666,
+) -> None:
     """Write a file in one go: it is complete and on the disk, or what was there before is untouched.
 
     A link of that name is replaced, not followed. folder: as for `read_file`; it is made if it is not there.
     objection: checks a file of that name, or the file that a link of that name leads to; None: any file is replaced.
-    Raises FileError.
+    mode: permissions, which the umask reduces. Raises FileError.
     """
     try:
         if folder is not None:
@@ -81,7 +87,7 @@ def write_file(path: Path, content: bytes, folder: Path | None = None, objection
         parent = os.open(place.parent, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
             _require_below(parent, folder)
-            _replace(parent, place.name, content, objection)
+            _replace(parent, place.name, content, objection, mode)
         finally:
             os.close(parent)
     except (OSError, ValueError) as error:
@@ -93,12 +99,12 @@ def in_mb(size: int) -> str:
     return f"{size / MB:.3g} MB" if size < 1000 * MB else f"{size / MB:.0f} MB"
 
 
-def _replace(parent: int, name: str, content: bytes, objection: Objection | None) -> None:
+def _replace(parent: int, name: str, content: bytes, objection: Objection | None, mode: int) -> None:
     _is_there(parent, name, objection)  # a refusal costs no write
     unfinished = f".{uuid4().hex}.unfinished"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     try:
-        with open(os.open(unfinished, flags, 0o666, dir_fd=parent), "wb") as stream:
+        with open(os.open(unfinished, flags, mode, dir_fd=parent), "wb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -13,6 +12,8 @@ from contextlib import AbstractContextManager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import TypeVar
+
+from conveyor_sim.support.child_process import end_with
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -107,10 +108,4 @@ class WorkerPool(AbstractContextManager["WorkerPool"]):
 def _begin(lifeline: Connection) -> None:
     """Start of a process: Ctrl-C is its parent's affair, and it ends with its parent, or when asked to."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
-
-
-def _end_with(lifeline: Connection) -> None:
-    """Wait until the other end, which only the parent holds, is closed, by the parent or by its death."""
-    lifeline.poll(None)
-    os._exit(1)
+    end_with(lifeline)

@@ -16,9 +16,9 @@ from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.cli import main
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.counters import RESET_COUNTERS
-from conveyor_sim.line.inputs import FORCE, Input
-from conveyor_sim.line.time_account import CATEGORIES
+from conveyor_sim.line.commands.inputs import FORCE, Input
+from conveyor_sim.line.machines.counters import RESET_COUNTERS
+from conveyor_sim.line.machines.time_account import CATEGORIES
 from conveyor_sim.report.periods import longest_stops, stop_reasons
 from conveyor_sim.report.production import read_production
 from conveyor_sim.report.production_record import Production

@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.scene import Scene, load_scene
+from conveyor_sim.support.files import FileError, write_file
 
 
 def apply(scene: Scene, setting: Setting, copy: Path) -> Scene:
@@ -76,10 +77,7 @@ def _take_tables_along(lines: list[str], data: Any, before: Path, copy: Path) ->
 
 def _write(file: Path, text: str) -> None:
     """The whole file or nothing."""
-    part = file.with_name(file.name + ".part")
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        raise ConveyorError(f"{file}: can't be written ({error.strerror}), expected a file to write to") from None
+        write_file(file, text.encode(), file.parent)
+    except FileError as error:
+        raise ConveyorError(f"{file}: {error}, expected a file to write to") from None

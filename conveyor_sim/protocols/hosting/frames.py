@@ -1,4 +1,4 @@
-"""`Frames`: the data of a view, collected in bounded memory for one process that mirrors the view."""
+"""`Frames`: updates of a line mirror, collected in bounded memory for one process that copies it."""
 
 from __future__ import annotations
 

@@ -80,9 +80,9 @@ class ServerHost:
         everyone: Callable[[], tuple[Health, ...]],
         ready: ServerChild | None,
     ) -> None:
-        """Return at once; `wait_until_started` waits. place: port or URL. say: takes sentences for people.
-        everyone: returns the health of all protocol servers, for the page. ready: process for the first start; None:
-        it is started here.
+        """Start and return at once; `wait_until_started` waits. place: port or URL. say: takes sentences for the user.
+        everyone: returns the health of all protocol servers, for the page. ready: process for the first start; None: it
+        is started here.
         """
         self.kind = kind
         self._place, self._settings, self._view, self._logins, self._say = place, settings, view, logins, say
@@ -121,7 +121,7 @@ class ServerHost:
 
     @property
     def pid(self) -> int | None:
-        """The process; None: there is none at present."""
+        """ID of the process; None: there is none at present."""
         return None if self._process is None else self._process.pid
 
     def status(self, fresh: bool = False) -> Status:

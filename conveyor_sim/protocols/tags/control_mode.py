@@ -1,21 +1,22 @@
-"""In whose hands a device is, as a face sees it at once: the line itself decides at the tick."""
+"""Control mode of devices, as protocol servers check it at once; the line itself decides at the tick."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, covers, stops
-from conveyor_sim.line.inputs import SET, Input, WriterKind
-from conveyor_sim.line.receipt import Receipt, Refusal
+from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MODES, PEOPLE, covers
+from conveyor_sim.line.commands.inputs import SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Receipt, Refusal
+from conveyor_sim.line.machines.packml import stops
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
 
 TAKES_NO_INPUT = (ENDED, STOPPED, REPLAYING)
-"""States of a run in which nothing that is given would ever act."""
+"""States of a run in which inputs never take effect."""
 
 MAY_CONTROL: tuple[WriterKind, ...] = ("operator", "engineer", "test")
-"""Who may pause a run, have it go on, and so on."""
+"""Roles that may control a run: pause, resume and so on."""
 
 
 CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 - 1.0), "speed": (0.0, 1e6)}
@@ -23,14 +24,14 @@ CONTROL_RANGES: Mapping[Control, tuple[float, float]] = {"step": (1.0, 2.0**32 -
 
 
 def is_mode(tag: Tag) -> bool:
-    """Whether a tag is the mode of a device that takes commands: who may, puts it into another by writing this."""
+    """Return True if a tag is the control mode of a device. An authorised client changes the mode by writing it."""
     return bool(tag.device) and tag.name == f"{tag.device}/mode"
 
 
 def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
-    """Why a command is not taken of a writer, as the line was last; "" if it is."""
+    """Return why a command of a writer would be refused in the latest state of the line; "" if it would not."""
     shown, device = source.shown, command.device
-    if stops(command.name, value, kind):
+    if kind in PEOPLE and stops(command.name, value):
         return ""
     mode = int(shown.values.get(f"{device}/mode", AUTOMATIC))
     if kind not in IN_CONTROL[mode]:

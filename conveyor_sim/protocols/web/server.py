@@ -1,4 +1,4 @@
-"""`WebServer`: a line as a page in the browser, by HTTP and one websocket for each that looks."""
+"""`WebServer`: a line as a page in the browser, by HTTP and one WebSocket per page."""
 
 from __future__ import annotations
 
@@ -26,39 +26,39 @@ from conveyor_sim.protocols.web.feed import Feed, text_message
 from conveyor_sim.protocols.web.viewer import Viewer
 
 MOST_CONNECTIONS = 256
-"""At once, of pages and whatever else: for one more the oldest makes room that is no page."""
+"""Largest number of connections at once. For one more, the oldest connection that is not a page is closed."""
 
 HANDSHAKE = 5.0
-"""s of wall time in which a client has to agree on TLS."""
+"""Wall time in which a client must complete the TLS handshake, s."""
 
 LONGEST_REQUEST = 16_384
-"""Bytes that a page sends at once, at most; who sends more is cut off."""
+"""Largest size of a message from a page, bytes; beyond it the connection ends."""
 
 SIGN_IN = 60.0
 """Seconds that a new page has for a sign-in while guests hold all their places."""
 
 MOST_REQUESTS, RATE = 400, 200.0
-"""Of a page: at once, and a second (of wall time) for longer; who sends more is cut off. Of each frame a page says that
-it has shown it.
+"""Largest number of requests of a page at once, and per second of wall time; beyond it the connection ends. A page
+sends one request per frame that it has shown.
 """
 
 WRONG_PASSWORD = 1.0
-"""s of wall time that a page waits for the answer to a wrong one."""
+"""Wall time before the answer to a wrong password, s."""
 
 HEARTBEAT = 20.0
-"""s of wall time after which a page is gone that has not answered."""
+"""Wall time without an answer after which a page counts as gone, s."""
 
 CLOSING = 2.0
-"""s of wall time in which a page may say that it has heard of the end."""
+"""Wall time in which a page may confirm the end of the connection, s."""
 
 _LIVE = '<meta name="line" content="live">'
-"""In the page: by it the page knows that it shows a line that runs."""
+"""Tag in the page that marks it as showing a running line."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class WebServer:
-    """Serves one source: a Face."""
+    """Protocol server for one tag provider, as a web page."""
 
     def __init__(
         self,
@@ -72,9 +72,9 @@ class WebServer:
         quota: Quota = QUOTA,
         logins: LoginService | None = None,
     ) -> None:
-        """users: who may do more than look, by name. anonymous: whether those who give no name may look. secured: for
-        TLS; None: plain, which is for this machine only. port: 0 for any that is free. quota: places of the pages.
-        logins: checks passwords, in place of `users`.
+        """Prepare the server. users: users by name, who may do more than read. anonymous: True if clients without a
+        user may read. secured: context for TLS; None: plain HTTP, for this machine only. port: 0 for any free one.
+        quota: limits of the connections. logins: checks passwords, in place of `users`.
         """
         self._places = ConnectionSlots(quota)
         self._logins, self._anonymous, self._secured = logins or Logins(dict(users or {})), anonymous, secured
@@ -93,14 +93,14 @@ class WebServer:
 
     @property
     def port(self) -> int:
-        """On which it listens. RuntimeError before `start`."""
+        """Port on which it listens. Raises RuntimeError before `start`."""
         if self._listening is None:
             raise RuntimeError("the server was not started")
         return int(self._listening.sockets[0].getsockname()[1])
 
     @property
     def address(self) -> str:
-        """Where the page is."""
+        """Address of the page."""
         host, port = self._at
         where = f"[{host}]" if ":" in host else host
         return f"{self._scheme}://{where}:{port if self._listening is None else self.port}/"
@@ -110,7 +110,7 @@ class WebServer:
         return "https" if self._secured else "http"
 
     def status(self) -> Status:
-        """Pages that look; what was passed on to the line for them, and what was not."""
+        """Return the number of open pages, and counts of their accepted and refused requests."""
         longest, self._feed.longest = self._feed.longest, 0.0
         return Status(len(self._sockets), 0, self._commands.writes, self._commands.refused, longest)
 
@@ -152,13 +152,13 @@ class WebServer:
             await runner.cleanup()
 
     def _connection(self) -> asyncio.Protocol:
-        """Of one more client."""
+        """Make the protocol of a new connection."""
         assert self._runner is not None and self._runner.server is not None
         asyncio.get_running_loop().call_soon(self._make_room)  # then those that come with it are known
         return self._runner.server()
 
     def _make_room(self) -> None:
-        """Have those go that hold a connection open for longest, and are no page, rather than those who come."""
+        """Close the oldest connections that are not pages, if there are too many."""
         known = [] if self._runner is None or self._runner.server is None else self._runner.server.connections
         ways = {one: way for one in known if (way := one.transport) is not None and not way.is_closing()}
         others = [way for one, way in ways.items() if one not in self._pages]
@@ -303,7 +303,7 @@ class WebServer:
 
 
 def _request(data: str) -> dict[str, Any] | None:
-    """What a page asks for; None: that is none."""
+    """Return a request of a page; None: the message is not a JSON object."""
     try:
         request = json.loads(data)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""What the page is served by to other machines: TLS, for passwords travel."""
+"""TLS for the page, if other machines can reach it: users send passwords."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from conveyor_sim.protocols.server.certificates import KEY, default_folder, iden
 from conveyor_sim.protocols.server.interface import ServerError
 
 CHAIN = "certificate.pem"
-"""In a folder, beside KEY: what an authority has signed, and the certificates that lead there."""
+"""Name of the file beside KEY: certificate signed by an authority, and the certificates that lead to it."""
 
 
 def server_context(folder: Path | None, of_opcua: Path | None) -> ssl.SSLContext:
-    """folder: of CHAIN and KEY; None: the certificate that the OPC UA face makes, in of_opcua if that is given.
+    """Return a context for TLS. folder: contains CHAIN and KEY; None: the certificate that the OPC UA server makes, in
+    `of_opcua` if given.
 
     Raises ServerError if it can't be read, CertificateError.
     """

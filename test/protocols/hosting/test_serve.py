@@ -43,9 +43,9 @@ def test_a_scene_is_served_until_ctrl_c_and_what_clients_wrote_replays(
         until(lambda: speed_of(client) == 0.5, "the line")
         give(client, 0.25)
         until(lambda: speed_of(client) == 0.25, "the speed")
-    page = re.search(r"(http://127\.0\.0\.1:\d+/): clients can read all, and write nothing", served.told)
+    page = re.search(r"(http://127\.0\.0\.1:\d+/): clients can read everything and write nothing", served.told)
     assert page and b'<meta name="line" content="live">' in urlopen(page.group(1), timeout=PATIENCE).read()
-    assert "clients can read all, and write as controller" in served.told
+    assert "clients can read everything and write as controller" in served.told
     out = served.end()
     assert re.fullmatch(
         r"served up to [\d.]+ s; modbus 1 written, 0 refused, web 0 written, 0 refused; recorded to bag\n", out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import time
 from pathlib import Path
 
@@ -76,8 +77,8 @@ def test_it_ends_with_the_process_that_it_draws_for(bag: Path, tmp_path: Path) -
         drawing.begin(bag)
         while len(members(group)) < 2:
             time.sleep(0.01)
-        assert drawing._process is not None and drawing._process.stdin is not None
-        drawing._process.stdin.close()  # as the kernel does where that process was killed
+        with socket.fromfd(drawing._pipe.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as pipe:
+            pipe.shutdown(socket.SHUT_WR)  # as the kernel does for a process that was killed
         with pytest.raises(ConveyorError, match="has ended early"):
             drawing.pictures(tmp_path / "pictures")
 
