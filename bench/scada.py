@@ -22,7 +22,7 @@ from bench.markdown import table as markdown
 from bench.measure import Effort, say
 from bench.rows import Row, Rows
 from conveyor_sim.columns.events import Event
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag, count
 from conveyor_sim.protocols.hosting.server_kinds import SERVER_KINDS

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from conveyor_sim.bag.mcap_file import HASH_KEY, QOS_KEY, Schema
-from conveyor_sim.bag.metadata import to_yaml
-from conveyor_sim.bag.qos import Qos
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import definition, type_hash
+from conveyor_sim.bag.mcap.file import HASH_KEY, QOS_KEY, Schema
+from conveyor_sim.bag.mcap.metadata import to_yaml
+from conveyor_sim.bag.messages.qos import Qos
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import definition, type_hash
 
 ENCODING = "cdr"
 

@@ -17,15 +17,15 @@ from typing import Any
 from mcap.opcode import Opcode
 from mcap.records import Header
 
-from conveyor_sim.bag.cdr import tick_of
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
-from conveyor_sim.bag.chunk import chunk_at, read_content
-from conveyor_sim.bag.index import Index, read_index
-from conveyor_sim.bag.mcap_file import LIBRARY, PROFILE, Schema
-from conveyor_sim.bag.records import MAGIC, RECORD_HEAD, Data, Malformed, head_at, parse
+from conveyor_sim.bag.mcap.chunk import chunk_at, read_content
+from conveyor_sim.bag.mcap.file import LIBRARY, PROFILE, Schema
+from conveyor_sim.bag.mcap.index import Index, read_index
+from conveyor_sim.bag.mcap.records import MAGIC, RECORD_HEAD, Data, Malformed, head_at, parse
+from conveyor_sim.bag.messages.cdr import tick_of
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import DEFAULT, type_hash, typestore
 from conveyor_sim.bag.source import Raw, Recorded
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import DEFAULT, type_hash, typestore
 
 KEPT = 1 << 26
 """Bytes of decompressed chunks that are kept, so that a second pass over a short recording finds them."""

@@ -188,8 +188,8 @@ def tell_end(summary: str, bags: Sequence[Path]) -> None:
 
 
 def _is_bag(what: str) -> bool:
+    from conveyor_sim.bag.mcap.storage import other_storage
     from conveyor_sim.bag.reader import SUFFIXES
-    from conveyor_sim.bag.storage import other_storage
 
     return Path(what).is_dir() or Path(what).suffix in SUFFIXES or bool(other_storage(Path(what)))
 

@@ -29,7 +29,7 @@ class CounterColumns:
     """Rejected bottles."""
     failures: NDArray[np.uint64]
     running: NDArray[np.float64]
-    """Time in this category and in those that follow, s; `line/time_account.py` defines them."""
+    """Time in this category and in those that follow, s; `line/machines/time_account.py` defines them."""
     starved: NDArray[np.float64]
     blocked: NDArray[np.float64]
     down: NDArray[np.float64]
@@ -38,7 +38,7 @@ class CounterColumns:
     rate: NDArray[np.float64]
     """Nominal rate, 1/s."""
     availability: NDArray[np.float64]
-    """Ratios as defined in `line/efficiency.py`; NaN before the first cycle."""
+    """Ratios as defined in `line/machines/efficiency.py`; NaN before the first cycle."""
     effectiveness: NDArray[np.float64]
     quality: NDArray[np.float64]
     oee: NDArray[np.float64]

@@ -11,8 +11,8 @@ from rich.console import RenderableType
 from rich.table import Table
 
 from conveyor_sim.line.line import image_of
+from conveyor_sim.line.machines.weihenstephan import names_of
 from conveyor_sim.line.tag import MOST_COUNT, Tag
-from conveyor_sim.line.weihenstephan import names_of
 from conveyor_sim.scene import Scene
 
 NONE = "-"

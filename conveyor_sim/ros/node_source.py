@@ -15,10 +15,10 @@ from rclpy.context import Context
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.columns.events import Event
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, LineMirrorError, decoded
 from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING, Control
 from conveyor_sim.ros.context import new_node, one_sentence, start_ros

@@ -9,7 +9,7 @@ from conveyor_sim.control.line_tags import LineTags, bind
 from conveyor_sim.control.recorded import Recorded
 from conveyor_sim.control.scan import AlarmChanges, ControlError, Controller, Inputs, commands_of, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
-from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.simulation import Simulation
 
 SOURCE = "controller"

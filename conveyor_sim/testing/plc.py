@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from conveyor_sim.control.scan import ControlError, Inputs
-from conveyor_sim.line.inputs import SET
+from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.server.interface import ProtocolServer

@@ -18,7 +18,7 @@ from conveyor_sim.control.scan import (
     commands_of,
     declared_alarms,
 )
-from conveyor_sim.line.inputs import DECLARE, CommandOutcome, Input
+from conveyor_sim.line.commands.inputs import DECLARE, CommandOutcome, Input
 from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.testing.conditions import Present

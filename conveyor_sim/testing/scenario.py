@@ -16,7 +16,7 @@ from conveyor_sim.bag.outputs import Outputs, forget_past
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.errors import CommandError, SimulationError
-from conveyor_sim.line.inputs import DISOWN, FAULT, INJECT, SET, Input
+from conveyor_sim.line.commands.inputs import DISOWN, FAULT, INJECT, SET, Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.protocols.tags.tag_provider import SCADA_SOURCES, SteppedTagProvider
 from conveyor_sim.scene import Scene

@@ -14,12 +14,12 @@ import pytest
 
 from conveyor_sim.bag import own_source as module
 from conveyor_sim.bag.any_source import AnySource
-from conveyor_sim.bag.cdr import tick_of
-from conveyor_sim.bag.messages import Header, commands_message
+from conveyor_sim.bag.messages.cdr import tick_of
+from conveyor_sim.bag.messages.encode import Header, commands_message
+from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.own_source import OwnSource, own_source
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import OUTPUTS
 
 SECOND = 1_000_000_000
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conveyor_sim.bag.packing import CODES, packer
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages.packing import CODES, packer
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 
 TYPES = sorted({topic.type for topic in TOPICS.values() if topic.type.startswith("conveyor_msgs/")})
 TEXTS = ("", "a", "infeeds/infeed/fed", "Zuführung 1 ▲", "x" * 1000)

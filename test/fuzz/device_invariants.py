@@ -10,8 +10,8 @@ from fuzz.violation import Violation
 from numpy.typing import NDArray
 
 from conveyor_sim.columns.bottles import BottleColumns
-from conveyor_sim.line.inputs import INJECT, CommandOutcome
-from conveyor_sim.line.packml import State
+from conveyor_sim.line.commands.inputs import INJECT, CommandOutcome
+from conveyor_sim.line.machines.packml import State
 from conveyor_sim.scene.geometry import SegmentPiece
 from conveyor_sim.scene.moving import MovingShape, moving_shapes
 from conveyor_sim.scene.parts.inspection import Inspection

@@ -25,9 +25,9 @@ from page.live_line import (
 from page.pixels import count_where_they_are, settled
 from protocols.waiting import until
 
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.protocols.hosting.serving import Serving
 from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.tags.bag_provider import BagTagProvider

@@ -22,12 +22,12 @@ from page.test_page import clock
 from protocols.waiting import until
 
 from conveyor_sim.bag import own_source
-from conveyor_sim.bag.chunk import next_chunk
-from conveyor_sim.bag.messages import Header
+from conveyor_sim.bag.mcap.chunk import next_chunk
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.bag.topics import TOPICS
 from conveyor_sim.columns.bottles import BottleColumns
 from conveyor_sim.columns.events import Event, event_columns
 from conveyor_sim.errors import BagError, ConveyorError

@@ -11,7 +11,7 @@ import pytest
 from ros.line_client import LineClient, halted, until
 
 from conveyor_sim.bag.replay import replay
-from conveyor_sim.line.inputs import FORCE, MODE, OPERATE, SET, Input
+from conveyor_sim.line.commands.inputs import FORCE, MODE, OPERATE, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import PAUSED, RUNNING
 from conveyor_sim.ros.child import Child

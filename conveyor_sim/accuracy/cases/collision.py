@@ -13,6 +13,7 @@ from conveyor_sim.engine.contact.laws.linear import LINEAR
 from conveyor_sim.physics.effects import choose_effects
 from conveyor_sim.physics.effects.terms import Meeting, Terms, deepest
 from conveyor_sim.physics.laws.coefficients import build_laws
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.timestep.presets import DEFAULT, PRESETS
 from conveyor_sim.scene import Scene, rail_shapes
 
@@ -47,8 +48,9 @@ class Collision:
 
 def terms_of(scene: Scene) -> Terms:
     """A scene's coefficients, and the effects that are on."""
-    on = frozenset(choice.name for choice in choose_effects(scene) if choice.on)
-    return Terms(scene, build_laws(scene, rail_materials(scene), on), on, PRESETS[DEFAULT])
+    plant = Plant.of(scene)
+    on = frozenset(choice.name for choice in choose_effects(plant) if choice.on)
+    return Terms(plant, build_laws(scene, rail_materials(scene), on), on, PRESETS[DEFAULT])
 
 
 def rail_materials(scene: Scene) -> list[str]:

@@ -79,7 +79,7 @@ def _astray(frame: Frame, true: Frame, model: Model) -> str:
 
 def _rail_between(model: Model, one: F8, other: F8) -> str:
     """A rail that the straight way between two points crosses, empty if there is none."""
-    for rail in model.rail_shapes:
+    for rail in model.plant.rails:
         points = rail.outline()
         if _crossed(one, other, points[:-1], points[1:]).any():
             return rail.name

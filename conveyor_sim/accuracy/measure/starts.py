@@ -13,7 +13,7 @@ from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.trajectory import variant
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.errors import SimulationError
-from conveyor_sim.physics.effects.terms import impact_speed, meetings
+from conveyor_sim.physics.effects.terms import meetings
 from conveyor_sim.scene import Scene
 from conveyor_sim.simulation import Simulation
 
@@ -142,6 +142,6 @@ def _lead(scene: Scene) -> int:
     A short contact, of the beginning of which up to a twentieth of a tick would be lost, gets none.
     """
     terms = terms_of(scene)
-    times = [duration(collision_of(meeting, terms), impact_speed(scene)) for meeting in meetings(terms)]
+    times = [duration(collision_of(meeting, terms), terms.plant.impact_speed) for meeting in meetings(terms)]
     longest = max((time for time in times if time < math.inf), default=0.0)
     return math.ceil(0.5 * longest / scene.tick - 0.05)

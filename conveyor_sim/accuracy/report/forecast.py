@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from conveyor_sim.accuracy.candidates import candidates
 from conveyor_sim.accuracy.results import Point
 from conveyor_sim.accuracy.setting import Setting, with_setting
-from conveyor_sim.physics.effects import most_bottles
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.physics.model.remedies import BESIDE, BOTTLE_STEP, STEP_COST
+from conveyor_sim.physics.plant import Plant
 from conveyor_sim.scene import Scene
 
 TRUSTED = ("leapfrog", "velocity_verlet")
@@ -54,7 +54,7 @@ def forecast(scene: Scene, tolerance: float) -> Forecast:
     """Predict what settings do on a scene; the cheapest one of at most a tolerance (relative) is chosen."""
     points = [_unmeasured(scene, one) for one in candidates(scene) if one.integrator in TRUSTED and one.stiffness == 1]
     kept = [point for point in points if point.beyond is None or point.beyond <= 1.0 + 1e-12]
-    bottles = most_bottles(scene)
+    bottles = Plant.of(scene).most_bottles
     many = MANY if bottles is None else max(1, bottles)
     point = _cheapest(kept, tolerance)
     better = None if point is None else _cheapest(kept, predicted_error(point) / BETTER)

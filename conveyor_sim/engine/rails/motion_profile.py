@@ -1,7 +1,7 @@
-"""Motion profiles of rails that move: a trapezoid of speed at a bounded acceleration, as a closed form of time.
+"""Motion profiles of moving rails: a trapezoid of speed at limited acceleration, as a closed form of time.
 
-A profile is (PHASES, 4): for each phase when it begins (s), and position, speed and acceleration then. All in m and s,
-or rad and s.
+A profile is (PHASES, 4): start of each phase (s), and position, speed and acceleration then. Units: m and s, or rad and
+s.
 """
 
 import math
@@ -13,7 +13,7 @@ from conveyor_sim.engine.compiler.compile import part
 
 @part
 def phase_at(course: F8, q: int, time: float) -> int:
-    """The phase that profile q is in at a time (s)."""
+    """Return the phase of profile q at a time (s)."""
     k = 0
     while k + 1 < PHASES and course[q, k + 1, 0] <= time:
         k += 1
@@ -31,9 +31,9 @@ def plan_profile(
     max_speed: float,
     acceleration: float,
 ) -> None:
-    """Write profile q: the fastest way from a position and speed, at most `max_speed`, to rest at the target.
+    """Write profile q: the fastest motion from a position and speed, at most `max_speed`, to rest at the target.
 
-    It may turn round first. begin: s, when it does.
+    It may reverse first. begin: s, its start.
     """
     if speed == 0.0 and target == position:
         for k in range(PHASES):
@@ -41,13 +41,13 @@ def plan_profile(
         return
     braked = position + 0.5 * speed * abs(speed) / acceleration
     sign = 1.0 if target >= braked else -1.0
-    # Speed up to v and brake from it: (v^2 - speed^2) / 2a + v^2 / 2a is the way, speeds and way along `sign`.
-    way = sign * (target - position)
-    top = min(max_speed, math.sqrt(max(0.0, acceleration * way + 0.5 * speed * speed)))
+    # Accelerate to v and brake from it: (v^2 - speed^2) / 2a + v^2 / 2a is the distance, all along `sign`.
+    distance = sign * (target - position)
+    top = min(max_speed, math.sqrt(max(0.0, acceleration * distance + 0.5 * speed * speed)))
     speeding = max(0.0, (top - sign * speed) / acceleration)
     braking = top / acceleration
-    left = way - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
-    going = max(0.0, left / top) if top > 0.0 else 0.0
+    rest = distance - 0.5 * (top + sign * speed) * speeding - 0.5 * top * braking
+    going = max(0.0, rest / top) if top > 0.0 else 0.0
     begin_brake = target - sign * 0.5 * top * braking
     course[q, 0, 0], course[q, 0, 1], course[q, 0, 2] = begin, position, speed
     course[q, 1, 0], course[q, 1, 1], course[q, 1, 2] = begin + speeding, begin_brake - sign * top * going, sign * top
@@ -63,7 +63,7 @@ def plan_profile(
 
 @part
 def wanted_acceleration(position: float, speed: float, target: float, max_speed: float, acceleration: float) -> float:
-    """The acceleration with which the fastest way to rest at the target begins, from any speed."""
+    """Return the initial acceleration of the fastest motion to rest at the target, from any speed."""
     if speed == 0.0 and position == target:
         return 0.0
     sign = 1.0 if target >= stopping_place(position, speed, acceleration) else -1.0
@@ -75,5 +75,5 @@ def wanted_acceleration(position: float, speed: float, target: float, max_speed:
 
 @part
 def stopping_place(position: float, speed: float, acceleration: float) -> float:
-    """Where it comes to rest if it brakes from now on."""
+    """Return the position of rest after braking from now on."""
     return position + 0.5 * speed * abs(speed) / acceleration

@@ -12,7 +12,7 @@ from conveyor_sim.physics.timestep.prediction import Impact
 def impacts(terms: Terms, effects: Sequence[Effect]) -> tuple[Impact, ...]:
     """One for every pair of types that can touch, and every type and rail material."""
     adding = [effect.shares for effect in effects if effect.shares is not None and effect.name in terms.on]
-    speed = terms.impact_speed
+    speed = terms.plant.impact_speed
     return tuple(
         Impact(
             what=meeting.what,

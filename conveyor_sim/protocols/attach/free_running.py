@@ -15,8 +15,8 @@ from pathlib import Path
 
 from conveyor_sim.control.scan import ALARMS, AlarmChanges
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.commands import refusal
-from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.line.commands.inputs import SET, Input
+from conveyor_sim.line.commands.refusal import refusal
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.attach.link import Link, LinkError
 from conveyor_sim.protocols.attach.links import all_of, link

@@ -17,10 +17,10 @@ import numpy as np
 from foxglove.websocket import ChannelView, Client, ServerListener, WebSocketServer
 
 from conveyor_sim.bag.channels import schema_of
-from conveyor_sim.bag.markers import bottles_markers, plant_markers
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.markers import bottles_markers, plant_markers
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.protocols.server.interface import ServerError, Status
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, DrawableProvider
 from conveyor_sim.scene import parse_overrides, parse_scene

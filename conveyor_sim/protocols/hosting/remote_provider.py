@@ -19,7 +19,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.protocols.hosting.server_messages import (
     LineFrame,
     ParentAnswer,

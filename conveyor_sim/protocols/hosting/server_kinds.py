@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.hosting.settings import ServerSettings
 from conveyor_sim.protocols.hosting.shared_state import SharedState
 from conveyor_sim.protocols.server.interface import HERE, ProtocolServer, ServerError, require_free

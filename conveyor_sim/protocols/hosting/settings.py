@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.opcua.limits import LIMITS, OpcUaLimits
 from conveyor_sim.protocols.server.interface import HERE, Stamps
 from conveyor_sim.protocols.server.quotas import QUOTA, Quota

@@ -27,9 +27,9 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from conveyor_sim.line.authority import MAY
-from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
-from conveyor_sim.line.receipt import Cause, Receipt
+from conveyor_sim.line.commands.authority import MAY
+from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS
 from conveyor_sim.protocols.modbus.address_map import SET_MODE
 from conveyor_sim.protocols.server.interface import HERE, ServerError, Status, require_free

@@ -10,8 +10,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
-from conveyor_sim.line.receipt import Receipt
+from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.protocols.mqtt.line_metrics import number_of
 from conveyor_sim.protocols.mqtt.payload import decoded

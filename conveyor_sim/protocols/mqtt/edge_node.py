@@ -16,7 +16,7 @@ from datetime import datetime, timezone
 from types import MappingProxyType
 
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.mqtt.birth_numbers import BirthNumbers
 from conveyor_sim.protocols.mqtt.broker import Broker
 from conveyor_sim.protocols.mqtt.commands import SILENCE, HostCommands

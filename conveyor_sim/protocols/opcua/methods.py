@@ -11,7 +11,7 @@ from asyncua import ua
 from asyncua.crypto.permission_rules import User
 
 from conveyor_sim.line.alarms.alarm import WAITING
-from conveyor_sim.line.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE
+from conveyor_sim.line.commands.inputs import DISOWN, FORCE, INJECT, MODE, OWN, SET, UNFORCE
 from conveyor_sim.line.run_state import RUN
 from conveyor_sim.line.tag import COMMANDS, SIGNALS
 from conveyor_sim.protocols.opcua.nodes import LINE, Nodes, name_of, node_id

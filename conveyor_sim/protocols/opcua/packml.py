@@ -15,8 +15,8 @@ from asyncua import Server, ua
 from asyncua.common.instantiate_util import instantiate
 from asyncua.crypto.permission_rules import User
 
-from conveyor_sim.line.inputs import MODE, SET
-from conveyor_sim.line.packml import Command, State, objection
+from conveyor_sim.line.commands.inputs import MODE, SET
+from conveyor_sim.line.machines.packml import Command, State, objection
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.opcua.nodes import INDEX, Nodes, name_of, node_id
 from conveyor_sim.protocols.opcua.packml_admin import A_MINUTE, Admin

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from asyncua import ua
 from asyncua.crypto.permission_rules import User, UserRole
 
-from conveyor_sim.line.authority import MAY
-from conveyor_sim.line.inputs import MODE, SET, Input, WriterKind
-from conveyor_sim.line.receipt import Cause, Receipt
+from conveyor_sim.line.commands.authority import MAY
+from conveyor_sim.line.commands.inputs import MODE, SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Cause, Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.protocols.opcua.nodes import name_of
 from conveyor_sim.protocols.opcua.values import type_of

@@ -22,7 +22,7 @@ from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
 
-from conveyor_sim.line.inputs import SET
+from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.protocols.opcua.bounds import Bounds
 from conveyor_sim.protocols.opcua.limits import OpcUaLimits
 from conveyor_sim.protocols.opcua.nodes import WRITE, name_of

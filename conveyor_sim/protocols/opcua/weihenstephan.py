@@ -10,8 +10,8 @@ from datetime import datetime
 
 from asyncua import ua
 
+from conveyor_sim.line.machines.weihenstephan import DATA_POINTS, data_points, names_of
 from conveyor_sim.line.tag import Tag
-from conveyor_sim.line.weihenstephan import DATA_POINTS, data_points, names_of
 from conveyor_sim.protocols.opcua.nodes import Nodes, node_id
 from conveyor_sim.protocols.opcua.values import status_of
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider

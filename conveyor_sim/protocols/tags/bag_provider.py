@@ -11,7 +11,7 @@ from pathlib import Path
 
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.errors import BagError, ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING, RunState
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror
 from conveyor_sim.protocols.tags.tag_history import TagHistory

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from conveyor_sim.line.authority import AUTOMATIC, IN_CONTROL, MODES, covers, stops
-from conveyor_sim.line.inputs import SET, Input, WriterKind
-from conveyor_sim.line.receipt import Receipt, Refusal
+from conveyor_sim.line.commands.authority import AUTOMATIC, IN_CONTROL, MODES, PEOPLE, covers
+from conveyor_sim.line.commands.inputs import SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Receipt, Refusal
+from conveyor_sim.line.machines.packml import stops
 from conveyor_sim.line.run_state import ENDED, REPLAYING, STOPPED
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.tags.tag_provider import Control, TagProvider
@@ -30,7 +31,7 @@ def is_mode(tag: Tag) -> bool:
 def objection(source: TagProvider, command: Tag, value: float, kind: WriterKind, writer: str) -> str:
     """Return why a command of a writer would be refused in the latest state of the line; "" if it would not."""
     shown, device = source.shown, command.device
-    if stops(command.name, value, kind):
+    if kind in PEOPLE and stops(command.name, value):
         return ""
     mode = int(shown.values.get(f"{device}/mode", AUTOMATIC))
     if kind not in IN_CONTROL[mode]:

@@ -12,7 +12,7 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING
 
-from conveyor_sim.line.inputs import Input, WriterKind
+from conveyor_sim.line.commands.inputs import Input, WriterKind
 from conveyor_sim.line.run_state import LOCKSTEP, RUN, RunState
 from conveyor_sim.protocols.tags.tag_provider import Control, SteppedTagProvider
 

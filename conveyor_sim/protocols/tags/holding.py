@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from conveyor_sim.line.inputs import DISOWN, OWN, Input
+from conveyor_sim.line.commands.inputs import DISOWN, OWN, Input
 from conveyor_sim.protocols.tags.tag_provider import LineSnapshot, TagProvider
 
 GRACE = 30.0

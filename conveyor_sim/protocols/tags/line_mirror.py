@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
-from conveyor_sim.bag import messages
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import typestore
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import typestore
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Event, EventColumns
 from conveyor_sim.columns.image import Image
 from conveyor_sim.columns.read_back import ReadBackColumns
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, RUNNING, STOPPED, RunState
 from conveyor_sim.line.tag import Tag
 from conveyor_sim.protocols.server.interface import Health
@@ -213,7 +213,7 @@ class LineMirror:
             case "run_state":
                 self._run = TOPICS[topic].unpack(message)
             case "signals":
-                self._tick, self._image = int(message.tick), messages.to_image(message)
+                self._tick, self._image = int(message.tick), encode.to_image(message)
             case "readback":
                 self._read_back = TOPICS[topic].unpack(message)
             case "alarm_states":

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.protocols.tags.tag_provider import Control
 from conveyor_sim.scene import Scene
 
@@ -67,7 +67,7 @@ class DrawingRequest(NamedTuple):
     on: bool
 
 
-class LineCopy(NamedTuple):
+class LineUpdate(NamedTuple):
     """Sent by the process: serialized messages, and the progress with inputs."""
 
     states: Mapping[str, bytes]

@@ -17,11 +17,11 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from conveyor_sim.bag.folder import bag_folder
-from conveyor_sim.bag.messages import Header
-from conveyor_sim.bag.topics import TOPICS
-from conveyor_sim.bag.typestore import default_distro
+from conveyor_sim.bag.messages.encode import Header
+from conveyor_sim.bag.messages.topics import TOPICS
+from conveyor_sim.bag.messages.typestore import default_distro
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import SET
+from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.page.watch import with_forces
 from conveyor_sim.protocols.tags.handshake import HANDSHAKE
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS
@@ -30,7 +30,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     ControlRequest,
     DrawingRequest,
     InputRequest,
-    LineCopy,
+    LineUpdate,
     SceneTask,
     SimulationFailed,
     TargetRequest,
@@ -150,7 +150,7 @@ class Copies:
                         self._wake.wait()
                     done = self._closed
                     others = list(self._others)
-                    copy = LineCopy(self._states, list(self._events), *self._counts, self._at)
+                    copy = LineUpdate(self._states, list(self._events), *self._counts, self._at)
                     self._states, self._new, self._sent = {}, False, time.monotonic()
                     self._events.clear()
                     self._others.clear()

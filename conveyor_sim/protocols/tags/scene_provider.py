@@ -17,7 +17,7 @@ from typing import Any
 
 from conveyor_sim.bag.folder import bag_folder
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import ENDED, PAUSED, STOPPED
 from conveyor_sim.protocols.tags.handshake import TARGET, problem
 from conveyor_sim.protocols.tags.line_mirror import DRAWING_TOPICS, STATE_TOPICS, LineMirror, decoded
@@ -26,7 +26,7 @@ from conveyor_sim.protocols.tags.scene_messages import (
     ControlRequest,
     DrawingRequest,
     InputRequest,
-    LineCopy,
+    LineUpdate,
     SceneTask,
     SimulationFailed,
     TargetRequest,
@@ -263,7 +263,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                 continue
             message, heard = pipe.recv(), time.monotonic()
             match message:
-                case LineCopy():
+                case LineUpdate():
                     self._take_copy(message)
                 case UserMessage():
                     if message.bad or not self._closing:
@@ -271,7 +271,7 @@ class SceneTagProvider(LineMirror, AbstractContextManager["SceneTagProvider"]):
                 case SimulationFailed():
                     return message.reason
 
-    def _take_copy(self, copy: LineCopy) -> None:
+    def _take_copy(self, copy: LineUpdate) -> None:
         for topic in STATE_TOPICS:
             if (data := copy.states.get(topic)) is not None:
                 self.take(topic, decoded(topic, data))

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from conveyor_sim.bag import messages
+from conveyor_sim.bag.messages import encode
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import open_bag
-from conveyor_sim.bag.topics import TOPICS
 
 MOST_READ = 20_000
 """Largest number of messages read for one answer; the caller continues from the returned tick."""
@@ -91,7 +91,7 @@ class TagHistory:
         topic, place = self._places[name]
         for _, _, data in self._bag.raw({topic}, start_ns, stop_ns):
             message = self._bag.decode(topic, data)
-            columns = messages.to_image(message).values if topic == "signals" else TOPICS[topic].unpack(message).value
+            columns = encode.to_image(message).values if topic == "signals" else TOPICS[topic].unpack(message).value
             yield TagSample(int(message.tick), float(columns[place]))
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 from conveyor_sim.columns.alarms import AlarmColumns
 from conveyor_sim.columns.events import Event
 from conveyor_sim.columns.read_back import ReadBackColumns
-from conveyor_sim.line.inputs import Input
+from conveyor_sim.line.commands.inputs import Input
 from conveyor_sim.line.run_state import RUNNING, RunState
 from conveyor_sim.line.tag import Tag
 

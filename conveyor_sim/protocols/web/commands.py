@@ -9,9 +9,9 @@ import sys
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from conveyor_sim.line.authority import MAY, unauthorized
-from conveyor_sim.line.inputs import DECLARE, SET, Input, WriterKind
-from conveyor_sim.line.receipt import Receipt
+from conveyor_sim.line.commands.authority import MAY, unauthorized
+from conveyor_sim.line.commands.inputs import DECLARE, SET, Input, WriterKind
+from conveyor_sim.line.commands.receipt import Receipt
 from conveyor_sim.line.tag import COMMANDS, Tag
 from conveyor_sim.protocols.server.users import Role
 from conveyor_sim.protocols.tags.control_mode import MAY_CONTROL, TAKES_NO_INPUT, objection, refused_for_good

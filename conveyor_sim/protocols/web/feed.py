@@ -13,7 +13,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from conveyor_sim.bag.topics import TOPICS
+from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.page.block import Content, block_ticks, pack
 from conveyor_sim.page.head import head
 from conveyor_sim.page.recording import text

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from conveyor_sim.bag.channels import metadata_of, schema_of
+from conveyor_sim.bag.messages.topics import OUTPUTS
+from conveyor_sim.bag.messages.typestore import DEFAULT
 from conveyor_sim.bag.reader import Bag, open_bag
-from conveyor_sim.bag.topics import OUTPUTS
-from conveyor_sim.bag.typestore import DEFAULT
 from conveyor_sim.errors import ConveyorError
 from conveyor_sim.report.figures import style
 from conveyor_sim.report.figures.data import Velocity

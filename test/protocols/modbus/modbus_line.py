@@ -14,7 +14,7 @@ pytest.importorskip("pymodbus", reason="pymodbus is not installed: pip install c
 
 from pymodbus.client import ModbusTcpClient
 
-from conveyor_sim.line.inputs import WriterKind
+from conveyor_sim.line.commands.inputs import WriterKind
 from conveyor_sim.protocols.hosting.server_thread import ServerThread
 from conveyor_sim.protocols.modbus.address_map import modbus_map
 from conveyor_sim.protocols.modbus.server import ModbusServer

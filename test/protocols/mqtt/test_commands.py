@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from conveyor_sim.line.inputs import DISOWN, OWN
+from conveyor_sim.line.commands.inputs import DISOWN, OWN
 from conveyor_sim.protocols.mqtt import link
 from conveyor_sim.protocols.mqtt.line_metrics import number_of
 from conveyor_sim.protocols.tags.tag_provider import MOST_WAITING

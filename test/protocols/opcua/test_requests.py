@@ -198,7 +198,7 @@ def test_calls_that_can_not_be_are_refused(line: Line) -> None:
 
 
 def _own(writer: str, released: tuple[str, ...]) -> object:
-    from conveyor_sim.line.inputs import OWN, Input
+    from conveyor_sim.line.commands.inputs import OWN, Input
 
     return Input("lockstep", writer, "controller", OWN, (), (), released)
 

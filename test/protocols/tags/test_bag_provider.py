@@ -14,7 +14,7 @@ from conveyor_sim.bag.outputs import Outputs
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.recorder import Recorder
 from conveyor_sim.errors import BagError
-from conveyor_sim.line.inputs import FORCE, OPERATE, OWN, SET, Input
+from conveyor_sim.line.commands.inputs import FORCE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, PAUSED, REPLAYING
 from conveyor_sim.protocols.tags import tag_history

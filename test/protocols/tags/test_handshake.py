@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from conveyor_sim.line.inputs import SET, Input
+from conveyor_sim.line.commands.inputs import SET, Input
 from conveyor_sim.protocols.tags.handshake import FURTHEST, HandshakeTagProvider
 from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation

@@ -18,7 +18,7 @@ from scenes import scene as bottle_scene
 from conveyor_sim.bag.reader import open_bag
 from conveyor_sim.bag.replay import replay
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.line.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
+from conveyor_sim.line.commands.inputs import INJECT, MODE, OPERATE, OWN, SET, Input
 from conveyor_sim.line.line import image_of
 from conveyor_sim.line.run_state import ENDED, LOCKSTEP, PAUSED, RUNNING, STOPPED
 from conveyor_sim.protocols.hosting.frames import MOST_FRAMES, Frames
