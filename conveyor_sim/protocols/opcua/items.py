@@ -1,4 +1,4 @@
-"""`Items`: the monitored items of a subscription, with dead bands that hold back what is small and nothing else."""
+"""`Items`: monitored items of a subscription, with dead bands that hold back only small changes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ _AT_ONCE = 100
 
 
 class Items(MonitoredItemService):
-    """The library's compares a value with the one before it, not with the one that was sent last: by that a dead band
-    hides a ramp for ever, and a change of status too. And of what is no number it takes the difference all the same.
+    """Monitored items of one subscription.
+
+    The library compares a value with the one before it, not with the last one that was sent. So a dead band hides a
+    ramp for ever, and changes of the status as well. It also subtracts values that are no numbers.
     """
 
     def __init__(self, subscription: Any, aspace: Any, limits: OpcUaLimits) -> None:
@@ -93,7 +95,7 @@ class Items(MonitoredItemService):
         item = self._monitored_items.get(mid)
         if item is None or item.mode == ua.MonitoringMode.Disabled or not self.isub.spend(self._units[mid]):
             return
-        with suppress(Exception):  # of one client's fields that can't be; to the others it goes all the same
+        with suppress(Exception):  # invalid fields of one client do not affect others
             if item.where_clause_evaluator is None or item.where_clause_evaluator.eval(event):
                 fields = ua.EventFieldList(item.client_handle, _fields(event, self._names[mid]))
                 await self.isub.enqueue_event(mid, fields, item.queue_size)
@@ -183,10 +185,10 @@ def _fields(event: Any, names: list[str]) -> list[ua.Variant]:
 
 
 def _exceeds(old: ua.DataValue, new: ua.DataValue, band: ua.DataChangeFilter) -> bool:
-    """Whether a change is beyond a dead band, if there is an absolute one (OPC 10000-4, 7.22.2)."""
+    """Return True if a change exceeds an absolute dead band, or there is none (OPC 10000-4, 7.22.2)."""
     if band.DeadbandType != ua.DeadbandType.Absolute or old.StatusCode != new.StatusCode:
         return True
     before, now = (None if each.Value is None else each.Value.Value for each in (old, new))
     if not (isinstance(before, int | float) and isinstance(now, int | float)) or isinstance(now, bool):
         return True
-    return not abs(now - before) <= band.DeadbandValue  # NaN is beyond, too
+    return not abs(now - before) <= band.DeadbandValue  # NaN exceeds it

@@ -1,4 +1,4 @@
-"""Connections of OPC UA clients: bounded in what they may send, and closed with the reason when it makes no sense."""
+"""Connections of OPC UA clients, with bounded input. Malformed input ends them, with the reason."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from conveyor_sim.protocols.server.budget import Budget
 from conveyor_sim.protocols.server.quotas import GREETED, OPENED, ConnectionSlot, ConnectionSlots
 
 ACTIVATION = 30.0
-"""s that a connection has for beginning a session, and may stay without one."""
+"""Time in which a connection must activate a session, and may stay without one, s."""
 
 _SIZE = slice(4, 8)
-"""Bytes of a message that say how long it is (OPC 10000-6, 7.1.2.2)."""
+"""Bytes of a message that hold its length (OPC 10000-6, 7.1.2.2)."""
 
 _WAITING = 16
-"""Messages of a connection that may wait to be answered; meanwhile no more are read."""
+"""Largest number of unanswered messages of a connection; beyond it no more are read."""
 
 
 class Connection(OPCUAProtocol):
-    """One of them."""
+    """Connection of one client."""
 
     longest: list[float]
-    """One element, for all connections: s of wall time from a message to its being done with, the longest."""
+    """Longest wall time from a message to its completion, s; one element, shared by all connections."""
     bounds: OpcUaLimits
     places: ConnectionSlots
     guests: Budget
-    """Work of all sessions without a user."""
+    """Budget of all sessions without a user."""
     turn: asyncio.Lock
     """Held by the session without a user whose request is next, until it is answered."""
     place: ConnectionSlot | None = None
@@ -57,7 +57,7 @@ class Connection(OPCUAProtocol):
         self.processor = Processor(self.iserver, self.transport, self.bounds)
         self.processor.set_policies(self.policies)
         if (connection := transport.get_extra_info("socket")) is not None:
-            # A client that is gone without a word is noticed.
+            # Detect clients that vanish without closing the connection.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
 
     def connection_lost(self, ex: BaseException | None) -> None:
@@ -67,7 +67,7 @@ class Connection(OPCUAProtocol):
 
     @property
     def has_session(self) -> bool:
-        """Whether a client has begun a session here that has not ended."""
+        """True if the connection has a session that is not closed."""
         session = self.processor.session if self.processor else None
         return session is not None and session.state.name != "Closed"
 
@@ -79,13 +79,13 @@ class Connection(OPCUAProtocol):
 
     @property
     def encrypts(self) -> bool:
-        """Whether what comes here can't be read on the way."""
+        """True if the channel is encrypted."""
         policy = self.processor._connection.security_policy if self.processor else None
         return policy is not None and policy.Mode == ua.MessageSecurityMode.SignAndEncrypt
 
     @property
     def peer(self) -> bytes | None:
-        """Certificate of the client, which has proved that it is its own; None: the channel is not secured."""
+        """Certificate of the client, which has proved that it owns the key; None: the channel is not secured."""
         policy = self.processor._connection.security_policy if self.processor else None
         if policy is None or policy.Mode == ua.MessageSecurityMode.None_:
             return None
@@ -101,7 +101,7 @@ class Connection(OPCUAProtocol):
             raise ServiceError(ua.StatusCodes.BadTooManySessions)
 
     def leave(self) -> None:
-        """Have nothing more to do with the session."""
+        """Detach the connection from its session."""
         if self.processor is not None:
             self.processor.session = None
         if self.place is not None:
@@ -146,7 +146,9 @@ class Connection(OPCUAProtocol):
             self.transport.resume_reading()
 
     async def _activation_watchdog(self) -> None:
-        """Not only at first: a session may time out, and its connection stay."""
+        """Close connections without an active session, at any time. The library checks only once, but a session may
+        time out.
+        """
         while True:
             await asyncio.sleep(ACTIVATION)
             session = self.processor.session if self.processor else None
@@ -155,7 +157,7 @@ class Connection(OPCUAProtocol):
                 return
 
     async def _process_one_msg(self, header: Any, buf: Any) -> bool:
-        """The library leaves a client without an answer whose message it can't make out."""
+        """Answer one message within the budgets. The library does not answer messages that it can't decode."""
         channel.set(self)
         await asyncio.sleep(self.work.delay())  # until the work of earlier messages is within the budget
         if not self._is_guest:
@@ -224,7 +226,7 @@ class Connection(OPCUAProtocol):
 
 
 channel: ContextVar[Connection | None] = ContextVar("channel", default=None)
-"""The connection whose message is being answered."""
+"""Connection whose message is being answered."""
 
 
 class _Port(BinaryServer):
@@ -242,10 +244,10 @@ class _Port(BinaryServer):
 
 
 class BoundedServer(Server):
-    """The library's server, listening by connections of this kind."""
+    """Server of the library with bounded connections."""
 
     def __init__(self, internal: Any, bounds: OpcUaLimits, places: ConnectionSlots) -> None:
-        """bounds: of each client. places: of the connections."""
+        """Prepare the server. bounds: limits of each client. places: slots of the connections."""
         super().__init__(iserver=internal)
         self.longest = [0.0]
         self.bounds, self.places = bounds, places
@@ -257,7 +259,7 @@ class BoundedServer(Server):
         self.iserver.max_unacked_messages_per_subscription = 20
 
     async def listen(self, host: str, port: int) -> int:
-        """Serve from now on; the port. Raises OSError."""
+        """Serve from now on. Return the port. Raises OSError."""
         await self._setup_server_nodes()
         await self.iserver.start()
         rate = self.bounds.guest_units_per_second
@@ -273,7 +275,7 @@ class BoundedServer(Server):
         return self.bserver.port
 
     async def stop(self) -> None:
-        """The library waits for its clock, a second."""
+        """Stop the server, without waiting a second for the clock of the library."""
         clock, self.iserver.time_task = self.iserver.time_task, None
         if clock is not None:
             clock.cancel()
