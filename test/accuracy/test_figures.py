@@ -28,6 +28,12 @@ from conveyor_sim.report.figures import style
 VERDICTS = ("equivalent", "different", "undecided")
 
 
+@pytest.fixture
+def ax() -> Iterator[Axes]:
+    with style.look():
+        yield style.new_figure(6.0, 6.0).subplots()
+
+
 @pytest.fixture(autouse=True)
 def look() -> Iterator[None]:
     with style.look():

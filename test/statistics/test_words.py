@@ -37,6 +37,6 @@ def test_a_difference_that_is_not_significant_comes_with_the_seeds_that_would_sh
     said = told(Interval(0.3, 0.5, 20), "A", "B", "%")
     assert missing(said, ["not significant", "20 seeds"]) == [] and "+0.30 ± 0.50 %" in said
     assert "about 110 seeds" in said
-    assert "no number of seeds" in told(Interval(0.0, 0.5, 20), "A", "B")
+    assert missing(told(Interval(0.0, 0.5, 20), "A", "B"), ["no", "number of seeds"]) == []
     assert told(Interval(0.0, 0.0, 5), "A", "B").endswith("are equal with each of 5 seeds")
-    assert "with 1 seed; no number" in told(Interval(0.3, math.inf, 1), "A", "B")
+    assert missing(told(Interval(0.3, math.inf, 1), "A", "B"), ["1 seed", "no", "number of seeds"]) == []

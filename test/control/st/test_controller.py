@@ -339,7 +339,9 @@ def test_the_documented_line_and_its_fault(tmp_path: Path) -> None:
 
 def test_a_program_that_stops_says_where(tmp_path: Path) -> None:
     plc = bound(tmp_path, "VAR n : INT; END_VAR", "WHILE TRUE DO\n  n := n + 1;\nEND_WHILE")
-    with pytest.raises(StructuredTextError, match=stating("program.st:2:1: watchdog", "more than", "100000")):
+    with pytest.raises(
+        StructuredTextError, match=stating("program.st:2:1: watchdog", "more than", "1000000 statements")
+    ):
         scan(plc, 0)
 
 
