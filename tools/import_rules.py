@@ -52,8 +52,7 @@ WITHIN: Mapping[str, Mapping[str, str]] = {
         "stepping": "accounts model state",
     },
     "line": {
-        "units": "",
-        "tag": "units",
+        "tag": "",
         "process_image": "tag",
         "alarms": "",
         "device": "alarms process_image tag",
